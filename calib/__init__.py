@@ -1,0 +1,1 @@
+"""What stays constant: cameras and their clocks, base frame, start pose."""

@@ -1,0 +1,1 @@
+"""The robot on paper: frames, trajectory, cables, free motion, dynamics, effects, simulation."""

@@ -1,0 +1,1 @@
+"""The front door: session files, commands and the report."""

@@ -1,0 +1,1 @@
+"""Trajectory in; inertial parameters, validation and missing effects out."""

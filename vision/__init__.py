@@ -1,0 +1,1 @@
+"""Recorded frames in, trajectory with covariance out."""
