@@ -1,0 +1,71 @@
+"""What a command says: a summary on stdout, progress and complaints on stderr."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Self
+
+if TYPE_CHECKING:
+    from rich.progress import Progress, TaskID
+
+
+class Console:
+    """The two streams of a command.
+
+    Progress is drawn only where stderr is a terminal. With `json` the result file is the only
+    thing on stdout; with `quiet` nothing but complaints is printed.
+    """
+
+    def __init__(self, *, json: bool = False, quiet: bool = False) -> None:
+        self._summary = not json and not quiet
+        self._json = json
+        self._draws = sys.stderr.isatty() and not quiet
+        self._bar: Progress | None = None
+        self._tasks: dict[str, TaskID] = {}
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stop_bar()
+
+    def say(self, text: str = "") -> None:
+        """One line of the summary."""
+        if self._summary:
+            self._stop_bar()
+            sys.stdout.write(text + "\n")
+            sys.stdout.flush()
+
+    def complain(self, text: str) -> None:
+        """A failure or a warning, on stderr."""
+        self._stop_bar()
+        sys.stderr.write(f"freeswing: {text}\n")
+
+    def show_file(self, path: Path) -> None:
+        """With `--json`: the result file, whole, on stdout."""
+        if self._json:
+            self._stop_bar()
+            sys.stdout.write(path.read_text(encoding="utf-8").rstrip("\n") + "\n")
+
+    def progress(self, label: str, fraction: float) -> None:
+        """How far a step has come, from 0 to 1."""
+        if not self._draws:
+            return
+        bar = self._bar or self._start_bar()
+        if label not in self._tasks:
+            self._tasks[label] = bar.add_task(label, total=1.0)
+        bar.update(self._tasks[label], completed=min(max(fraction, 0.0), 1.0))
+
+    def _start_bar(self) -> Progress:
+        from rich.console import Console as RichConsole
+        from rich.progress import Progress
+
+        self._bar = Progress(console=RichConsole(stderr=True), transient=True)
+        self._bar.start()
+        return self._bar
+
+    def _stop_bar(self) -> None:
+        if self._bar is not None:
+            self._bar.stop()
+            self._bar, self._tasks = None, {}
