@@ -1,0 +1,151 @@
+"""Rotations and rigid transforms, batch axes first.
+
+Orientation angles are Tait-Bryan `phi, theta, chi` with R = Rx(phi) Ry(theta) Rz(chi); quaternions
+are w, x, y, z; rotation vectors are axis times angle in radians. NaN in gives NaN out, so that
+missing samples stay missing.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+SMALL_ANGLE_RAD = 1e-3
+GIMBAL_COSINE = 1e-9
+
+
+def skew(v: ArrayLike) -> Array:
+    """Matrix S of the cross product, S @ w = v x w. (..., 3) -> (..., 3, 3)."""
+    v = np.asarray(v, dtype=np.float64)
+    x, y, z = v[..., 0], v[..., 1], v[..., 2]
+    zero = np.zeros_like(x)
+    return _matrix([[zero, -z, y], [z, zero, -x], [-y, x, zero]])
+
+
+def matrix_from_angles(angles: ArrayLike) -> Array:
+    """R = Rx(phi) Ry(theta) Rz(chi) from (phi, theta, chi) [rad]. (..., 3) -> (..., 3, 3)."""
+    angles = np.asarray(angles, dtype=np.float64)
+    (cp, ct, cc), (sp, st, sc) = (np.moveaxis(f(angles), -1, 0) for f in (np.cos, np.sin))
+    return _matrix(
+        [
+            [ct * cc, -ct * sc, st],
+            [cp * sc + sp * st * cc, cp * cc - sp * st * sc, -sp * ct],
+            [sp * sc - cp * st * cc, sp * cc + cp * st * sc, cp * ct],
+        ]
+    )
+
+
+def angles_from_matrix(R: ArrayLike) -> Array:
+    """(phi, theta, chi) [rad] with theta in [-pi/2, pi/2]. (..., 3, 3) -> (..., 3).
+
+    At theta = +-pi/2 only phi +- chi is defined: chi = 0 is returned there.
+    """
+    R = np.asarray(R, dtype=np.float64)
+    cos_theta = np.hypot(R[..., 0, 0], R[..., 0, 1])
+    locked = cos_theta < GIMBAL_COSINE
+    phi = np.where(
+        locked,
+        np.arctan2(R[..., 2, 1], R[..., 1, 1]),
+        np.arctan2(-R[..., 1, 2], R[..., 2, 2]),
+    )
+    theta = np.arctan2(R[..., 0, 2], cos_theta)
+    chi = np.where(locked, 0.0, np.arctan2(-R[..., 0, 1], R[..., 0, 0]))
+    return np.stack([phi, theta, chi], axis=-1)
+
+
+def angle_rate_matrix(angles: ArrayLike) -> Array:
+    """H with omega_base = H @ (phi', theta', chi') (FIDIM 2022, eq. 5). (..., 3) -> (..., 3, 3)."""
+    angles = np.asarray(angles, dtype=np.float64)
+    phi, theta = angles[..., 0], angles[..., 1]
+    cp, sp, ct, st = np.cos(phi), np.sin(phi), np.cos(theta), np.sin(theta)
+    zero, one = np.zeros_like(phi), np.ones_like(phi)
+    return _matrix([[one, zero, st], [zero, cp, -sp * ct], [zero, sp, cp * ct]])
+
+
+def matrix_from_quaternion(q_wxyz: ArrayLike) -> Array:
+    """R of a quaternion of any non-zero length. (..., 4) -> (..., 3, 3); length 0 gives NaN."""
+    q = np.asarray(q_wxyz, dtype=np.float64)
+    norm = np.linalg.norm(q, axis=-1, keepdims=True)
+    w, x, y, z = np.moveaxis(q / np.where(norm > 0.0, norm, np.nan), -1, 0)
+    return _matrix(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def quaternion_from_matrix(R: ArrayLike) -> Array:
+    """Unit quaternion (w, x, y, z), w >= 0. (..., 3, 3) -> (..., 4).
+
+    Every row of the symmetric matrix 4 q q^T is q times one of its entries; the row with the
+    largest diagonal entry is the accurate one (Shepperd 1978).
+    """
+    R = np.asarray(R, dtype=np.float64)
+    xx, yy, zz = R[..., 0, 0], R[..., 1, 1], R[..., 2, 2]
+    wx, wy, wz = (
+        R[..., 2, 1] - R[..., 1, 2],
+        R[..., 0, 2] - R[..., 2, 0],
+        R[..., 1, 0] - R[..., 0, 1],
+    )
+    xy, xz, yz = (
+        R[..., 1, 0] + R[..., 0, 1],
+        R[..., 0, 2] + R[..., 2, 0],
+        R[..., 2, 1] + R[..., 1, 2],
+    )
+    outer = _matrix(
+        [
+            [1 + xx + yy + zz, wx, wy, wz],
+            [wx, 1 + xx - yy - zz, xy, xz],
+            [wy, xy, 1 - xx + yy - zz, yz],
+            [wz, xz, yz, 1 - xx - yy + zz],
+        ]
+    )
+    best = np.argmax(np.diagonal(outer, axis1=-2, axis2=-1), axis=-1)
+    q = np.take_along_axis(outer, best[..., None, None], axis=-2)[..., 0, :]
+    q = q / np.linalg.norm(q, axis=-1, keepdims=True)
+    return np.where(q[..., :1] < 0.0, -q, q)
+
+
+def exp_rotation(rotvec: ArrayLike) -> Array:
+    """R = exp(skew(rotvec)), Rodrigues' formula. (..., 3) [rad] -> (..., 3, 3)."""
+    v = np.asarray(rotvec, dtype=np.float64)
+    half = 0.5 * np.linalg.norm(v, axis=-1, keepdims=True)
+    # numpy's sinc is sin(pi x)/(pi x): exact at 0, so that no series branch is needed.
+    q = np.concatenate([np.cos(half), 0.5 * np.sinc(half / np.pi) * v], axis=-1)
+    return matrix_from_quaternion(q)
+
+
+def log_rotation(R: ArrayLike) -> Array:
+    """Rotation vector of length in [0, pi]. (..., 3, 3) -> (..., 3) [rad]."""
+    q = quaternion_from_matrix(R)
+    w, sine = q[..., :1], np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
+    small = sine < SMALL_ANGLE_RAD
+    # angle / sin(angle / 2) = 2 (1 + s^2/6 + 3 s^4/40 + ...) with s = sin(angle / 2), w >= 0.
+    series = 2.0 + sine**2 / 3.0 + 3.0 * sine**4 / 20.0
+    safe = np.where(small, 1.0, sine)
+    return q[..., 1:] * np.where(small, series, 2.0 * np.arctan2(safe, w) / safe)
+
+
+def transform(R: ArrayLike, t: ArrayLike) -> Array:
+    """Homogeneous T with x_a = T x_b. (..., 3, 3), (..., 3) -> (..., 4, 4)."""
+    R, t = np.asarray(R, dtype=np.float64), np.asarray(t, dtype=np.float64)
+    batch = np.broadcast_shapes(R.shape[:-2], t.shape[:-1])
+    T = np.zeros((*batch, 4, 4))
+    T[..., :3, :3], T[..., :3, 3], T[..., 3, 3] = R, t, 1.0
+    return T
+
+
+def invert(T: ArrayLike) -> Array:
+    """Inverse of rigid transforms. (..., 4, 4) -> (..., 4, 4)."""
+    T = np.asarray(T, dtype=np.float64)
+    R_transposed = np.swapaxes(T[..., :3, :3], -1, -2)
+    return transform(R_transposed, -np.einsum("...ij,...j->...i", R_transposed, T[..., :3, 3]))
+
+
+def _matrix(rows: list[list[Array]]) -> Array:
+    """Stack scalar fields (...) into matrices (..., len(rows), len(rows[0]))."""
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
