@@ -13,19 +13,9 @@ import numpy as np
 
 from calib.camera import Camera
 from calib.camera_models import PARAMETER_NAMES
-from cdpr.documents import InputError, Problems, dump_toml, load_toml
+from cdpr.documents import Problems, Reader, dump_toml, load_toml
 from cdpr.rotation import matrix_from_quaternion, quaternion_from_matrix, transform
 
-_KEYS = {
-    "name",
-    "size_px",
-    "model",
-    "params",
-    "q_camera_base",
-    "t_camera_base_m",
-    "clock_offset_s",
-    "line_time_s",
-}
 _UNIT_TOLERANCE = 1e-3
 
 
@@ -35,17 +25,11 @@ def read_cameras(path: Path | str) -> tuple[Camera, ...]:
     Raises:
         InputError: naming every key that is missing, unknown or out of range.
     """
-    path = Path(path)
-    document = load_toml(path, "cameras")
     problems = Problems()
-    entries = document.get("cameras")
-    if not isinstance(entries, list) or not entries:
-        raise InputError(f"{path}: holds no [[cameras]] entry")
-    cameras = [
-        camera
-        for index, entry in enumerate(entries)
-        if (camera := _camera(entry, f"cameras[{index}]", problems)) is not None
-    ]
+    document = Reader(load_toml(path, "cameras", problems), problems)
+    entries = document.children("cameras")
+    document.finish()
+    cameras = [camera for entry in entries if (camera := _camera(entry)) is not None]
     names = [camera.name for camera in cameras]
     for name in sorted({name for name in names if names.count(name) > 1}):
         problems.add("cameras", f"two cameras are named {name!r}")
@@ -78,66 +62,26 @@ def camera_entry(camera: Camera) -> dict[str, Any]:
     return entry
 
 
-def _camera(entry: Any, where: str, problems: Problems) -> Camera | None:
-    if not isinstance(entry, dict):
-        problems.add(where, "is not a table")
-        return None
-    name = entry.get("name")
-    if not isinstance(name, str) or not name:
-        problems.add(f"{where}.name", "is missing or not a text")
-        name = where
-    else:
-        where = f"{where} ({name})"
-    for key in sorted(set(entry) - _KEYS):
-        problems.add(f"{where}.{key}", f"is unknown; known keys are {', '.join(sorted(_KEYS))}")
-    model = entry.get("model")
-    if model not in PARAMETER_NAMES:
-        problems.add(f"{where}.model", f"is {model!r}, not one of {', '.join(PARAMETER_NAMES)}")
-        return None
-    parameter_names = PARAMETER_NAMES[model]
-    size = _numbers(entry, "size_px", 2, where, problems)
-    params = _numbers(
-        entry, "params", len(parameter_names), where, problems, " ".join(parameter_names)
-    )
-    quaternion = _numbers(entry, "q_camera_base", 4, where, problems, "w x y z")
-    position = _numbers(entry, "t_camera_base_m", 3, where, problems)
-    times = [
-        _optional_number(entry, key, where, problems) for key in ("clock_offset_s", "line_time_s")
-    ]
-    if size is None or params is None or quaternion is None or position is None:
-        return None
+def _camera(entry: Reader) -> Camera | None:
+    name = entry.string("name")
+    model = entry.string("model", choices=tuple(PARAMETER_NAMES))
+    size = entry.vector("size_px", 2)
     if (size < 1).any() or (size != np.round(size)).any():
-        problems.add(f"{where}.size_px", f"is {size.tolist()}, not two positive whole numbers")
+        entry.add("size_px", f"{size.tolist()} is not two positive whole numbers")
+    params = entry.vector("params", None)
+    parameter_names = PARAMETER_NAMES.get(model, ())
+    if parameter_names and len(params) != len(parameter_names):
+        wanted = f"{len(parameter_names)} ({' '.join(parameter_names)})"
+        entry.add("params", f"{len(params)} numbers, {model} takes {wanted}")
+    elif parameter_names and (params[: 1 if parameter_names[0] == "f" else 2] <= 0.0).any():
+        entry.add("params", f"focal length {params[0]:g} px must be above 0")
+    quaternion = entry.unit_vector("q_camera_base", 4, _UNIT_TOLERANCE)
+    position = entry.vector("t_camera_base_m", 3)
+    clock_offset = entry.optional_number("clock_offset_s") or 0.0
+    line_time = entry.optional_number("line_time_s") or 0.0
+    entry.finish()
+    if entry.problems:
         return None
-    norm = float(np.linalg.norm(quaternion))
-    if abs(norm - 1.0) > _UNIT_TOLERANCE:
-        problems.add(f"{where}.q_camera_base", f"has norm {norm:.6g}, a rotation needs 1")
-        return None
-    focal = params[: 1 if parameter_names[0] == "f" else 2]
-    if (focal <= 0.0).any():
-        problems.add(f"{where}.params", f"focal length {focal.tolist()} px must be above 0")
-        return None
-    pose = transform(matrix_from_quaternion(quaternion / norm), position)
-    return Camera(name, (int(size[0]), int(size[1])), model, params, pose, *times)
-
-
-def _numbers(
-    entry: dict[str, Any], key: str, count: int, where: str, problems: Problems, names: str = ""
-) -> np.ndarray | None:
-    values = entry.get(key)
-    is_list = isinstance(values, list) and all(
-        isinstance(v, int | float) and not isinstance(v, bool) and np.isfinite(v) for v in values
-    )
-    if not is_list or len(values) != count:  # pyright: ignore[reportArgumentType]
-        what = "is missing" if values is None else f"is {values}"
-        problems.add(f"{where}.{key}", f"{what}; expected {count} finite numbers {names}".rstrip())
-        return None
-    return np.array(values, dtype=np.float64)
-
-
-def _optional_number(entry: dict[str, Any], key: str, where: str, problems: Problems) -> float:
-    value = entry.get(key, 0.0)
-    if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
-        problems.add(f"{where}.{key}", f"is {value!r}, expected a finite number")
-        return 0.0
-    return float(value)
+    pose = transform(matrix_from_quaternion(quaternion), position)
+    size_px = (int(size[0]), int(size[1]))
+    return Camera(name, size_px, model, params, pose, clock_offset, line_time)
