@@ -1,0 +1,431 @@
+"""Newton-Euler integration of the platform in maximal coordinates: the truth's time evolution.
+
+State: P (3), quaternion (4), velocity of P (3), angular velocity in the base frame (3), then the
+place and velocity (3 + 3) of a bob that may hang on the platform. Rigid cables act through
+Lagrange multipliers; pose and twist are projected back on the cable lengths after every
+Runge-Kutta step. Elastic cables act through their own tension, no constraint at all.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from tests.oracle.forces import add_force, applied_wrench, bob_at_rest, bob_force, friction_force
+from tests.oracle.geometry import (
+    cable,
+    cross,
+    dot,
+    factor,
+    length_acceleration,
+    quaternion_rate,
+    rotate,
+    rotation_of,
+    solve_factored,
+    turn,
+)
+from tests.oracle.world import Array, World
+
+STATE_SIZE = 19
+RIGID_STEP_S = 5e-4
+ELASTIC_STEP_S = 1e-4
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """A simulated run.
+
+    Attributes:
+        times_s: (n_t,).
+        positions_m: P in the base frame, (n_t, 3).
+        quaternions: w, x, y, z of T_base_platform, sign continuous, (n_t, 4).
+        twists: velocity of P and angular velocity in the base frame, (n_t, 6).
+        tensions_n: (n_t, n).
+        drift_m: largest departure of a rigid cable from its length at a step's end.
+    """
+
+    times_s: Array
+    positions_m: Array
+    quaternions: Array
+    twists: Array
+    tensions_n: Array
+    drift_m: float
+
+    @property
+    def rotations(self) -> Array:
+        """R of T_base_platform, (n_t, 3, 3)."""
+        out = np.empty((len(self.quaternions), 3, 3))
+        for k, quaternion in enumerate(self.quaternions):
+            rotation_of(quaternion, out[k])
+        return out
+
+
+def simulate(
+    world: World,
+    position_m: Array,
+    quaternion: Array,
+    duration_s: float,
+    twist: Array | None = None,
+    rate_hz: float = 100.0,
+    step_s: float | None = None,
+) -> Motion:
+    """The free motion from a pose and a twist, sampled at `rate_hz` with both ends.
+
+    With rigid cables the pose must already hold `world.length`. `step_s` is rounded so that a
+    sample interval is a whole number of steps.
+    """
+    if step_s is None:
+        step_s = ELASTIC_STEP_S if world.stiffness_ea > 0.0 else RIGID_STEP_S
+    substeps = max(1, round(1.0 / (rate_hz * step_s)))
+    samples = round(duration_s * rate_hz) + 1
+    state = start_state(world, position_m, quaternion, twist)
+    states, tensions, drift = _integrate(
+        state, samples, substeps, 1.0 / (rate_hz * substeps), world
+    )
+    return Motion(
+        np.arange(samples) / rate_hz,
+        states[:, :3].copy(),
+        states[:, 3:7].copy(),
+        states[:, 7:13].copy(),
+        tensions,
+        float(drift),
+    )
+
+
+def start_state(
+    world: World, position_m: Array, quaternion: Array, twist: Array | None = None
+) -> Array:
+    """The integrator's state (19,) with a bob, if there is one, hanging at rest."""
+    state = np.zeros(STATE_SIZE)
+    state[:3] = position_m
+    state[3:7] = np.asarray(quaternion) / np.linalg.norm(quaternion)
+    state[7:13] = 0.0 if twist is None else twist
+    R = np.empty((3, 3))
+    rotation_of(state[3:7], R)
+    if world.bob_mass > 0.0:
+        state[13:16] = bob_at_rest(state[:3], R, world)
+    return state
+
+
+@njit(cache=True)
+def _integrate(state, samples, substeps, h, world):
+    n = world.entry.shape[0]
+    states = np.empty((samples, 19))
+    tensions = np.empty((samples, n))
+    k1, k2, k3, k4 = np.empty(19), np.empty(19), np.empty(19), np.empty(19)
+    tension, unused = np.zeros(n), np.zeros(n)
+    state, drift, time = state.copy(), 0.0, 0.0
+    for sample in range(samples):
+        time = sample * substeps * h
+        derivative(time, state, world, k1, tension)
+        states[sample] = state
+        tensions[sample] = tension
+        if sample == samples - 1:
+            break
+        for sub in range(substeps):
+            time = (sample * substeps + sub) * h
+            derivative(time, state, world, k1, tension)
+            unused[:] = tension
+            derivative(time + 0.5 * h, state + 0.5 * h * k1, world, k2, unused)
+            derivative(time + 0.5 * h, state + 0.5 * h * k2, world, k3, unused)
+            derivative(time + h, state + h * k3, world, k4, unused)
+            state = state + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+            state[3:7] /= math.sqrt(np.sum(state[3:7] ** 2))
+            if world.stiffness_ea == 0.0:
+                drift = max(drift, project(time + h, state, world))
+    return states, tensions, drift
+
+
+@njit(cache=True)
+def derivative(time, state, world, out, tension):
+    """Time derivative of the state; `tension` (n,) comes in as a guess and leaves as solved."""
+    n = world.entry.shape[0]
+    p, q, v, omega = state[0:3], state[3:7], state[7:10], state[10:13]
+    R = np.empty((3, 3))
+    rotation_of(q, R)
+    wrench = np.empty(6)
+    applied_wrench(time, p, R, v, omega, world, wrench)
+    _bob(state, p, R, v, omega, world, wrench, out)
+    mass = mass_matrix(R, world)
+    _inertial_bias(R, omega, world, wrench)
+    J, gamma, arms, frames, scalars = constraint_rows(p, R, v, omega, world)
+    _cable_weight(R, omega, arms, scalars, world, mass, wrench)
+    factor(mass)
+    _solve_tensions(time, v, omega, world, mass, wrench, J, gamma, arms, frames, scalars, tension)
+    for i in range(n):
+        for k in range(6):
+            wrench[k] -= J[i, k] * tension[i]
+    solve_factored(mass, wrench)
+    out[0:3] = v
+    quaternion_rate(q, omega, out[3:7])
+    out[7:13] = wrench
+
+
+@njit(cache=True)
+def _bob(state, p, R, v, omega, world, wrench, out):
+    out[13:19] = 0.0
+    if world.bob_mass <= 0.0:
+        return
+    arm = rotate(R, world.bob_pivot)
+    pull = bob_force(p + arm, v + cross(omega, arm), state[13:16], state[16:19], world)
+    add_force(wrench, pull, arm)
+    out[13:16] = state[16:19]
+    out[16:19] = world.gravity - pull / world.bob_mass
+
+
+@njit(cache=True)
+def mass_matrix(R, world):
+    """Mass matrix of the platform at P in the base frame, (6, 6)."""
+    s = rotate(R, world.com)
+    out = np.zeros((6, 6))
+    for i in range(3):
+        out[i, i] = world.mass
+        for j in range(3):
+            total = 0.0
+            for a in range(3):
+                for b in range(3):
+                    total += R[i, a] * world.inertia[a, b] * R[j, b]
+            out[3 + i, 3 + j] = total
+    _add_skew(out, world.mass, s)
+    return out
+
+
+@njit(cache=True)
+def _add_skew(out, mass, s):
+    """The off-diagonal blocks -m s~ and m s~ of a mass at arm s."""
+    out[0, 4] += mass * s[2]
+    out[0, 5] -= mass * s[1]
+    out[1, 3] -= mass * s[2]
+    out[1, 5] += mass * s[0]
+    out[2, 3] += mass * s[1]
+    out[2, 4] -= mass * s[0]
+    for i in range(3):
+        for j in range(3):
+            out[3 + j, i] = out[i, 3 + j]
+
+
+@njit(cache=True)
+def _inertial_bias(R, omega, world, wrench):
+    """Takes the centripetal and gyroscopic terms from the wrench."""
+    s = rotate(R, world.com)
+    centripetal = cross(omega, cross(omega, s))
+    local = np.zeros(3)
+    for i in range(3):
+        for j in range(3):
+            local[i] += R[j, i] * omega[j]
+    momentum = rotate(R, rotate(world.inertia, local))
+    gyro = cross(omega, momentum)
+    for k in range(3):
+        wrench[k] -= world.mass * centripetal[k]
+        wrench[3 + k] -= gyro[k]
+
+
+@njit(cache=True)
+def constraint_rows(p, R, v, omega, world):
+    """Rows of the length Jacobian and everything else the cables need.
+
+    Returns:
+        J (n, 6); gamma (n,), the part of the length's second derivative that velocities make;
+        arms (n, 3); frames (n, 3, 3) with t, n, w; scalars (n, 4) of length, rho, psi, s.
+    """
+    count = world.entry.shape[0]
+    J, gamma = np.empty((count, 6)), np.empty(count)
+    arms, frames, scalars = np.empty((count, 3)), np.empty((count, 3, 3)), np.empty((count, 4))
+    for i in range(count):
+        arm = rotate(R, world.attach[i])
+        t, n, w = frames[i, 0], frames[i, 1], frames[i, 2]
+        length, rho, psi, s = cable(
+            world.entry[i], world.radius[i], world.swivel[i], p + arm, t, n, w
+        )
+        velocity = v + cross(omega, arm)
+        gamma[i] = length_acceleration(world.radius[i], t, n, w, rho, psi, s, velocity)
+        gamma[i] += dot(t, cross(omega, cross(omega, arm)))
+        moment = cross(arm, t)
+        for k in range(3):
+            J[i, k], J[i, 3 + k], arms[i, k] = t[k], moment[k], arm[k]
+        scalars[i, 0], scalars[i, 1], scalars[i, 2], scalars[i, 3] = length, rho, psi, s
+    return J, gamma, arms, frames, scalars
+
+
+@njit(cache=True)
+def _cable_weight(R, omega, arms, scalars, world, mass, wrench):
+    """A straight massive cable pinned at the pulley: a third of its mass moves with A.
+
+    Its velocity grows linearly from the exit point, so the kinetic energy is that of a third of
+    the straight part's mass at A; half of its weight hangs on A.
+    """
+    if world.density == 0.0:
+        return
+    for i in range(arms.shape[0]):
+        hanging = world.density * scalars[i, 1]
+        add_force(wrench, 0.5 * hanging * world.gravity, arms[i])
+        moving = hanging / 3.0
+        centripetal = cross(omega, cross(omega, arms[i]))
+        add_force(wrench, -moving * centripetal, arms[i])
+        for k in range(3):
+            mass[k, k] += moving
+        _add_skew(mass, moving, arms[i])
+        square = dot(arms[i], arms[i])
+        for k in range(3):
+            mass[3 + k, 3 + k] += moving * square
+            for j in range(3):
+                mass[3 + k, 3 + j] -= moving * arms[i, k] * arms[i, j]
+
+
+@njit(cache=True)
+def held_length(time, i, world):
+    """Length of cable i that the winch holds at `time`, its rate and its acceleration."""
+    w = 2.0 * math.pi * world.hunting_hz
+    angle = w * time + world.hunting_phase
+    start = math.sin(world.hunting_phase)
+    length = world.length[i] + world.creep[i] * time
+    length += world.hunting[i] * (math.sin(angle) - start)
+    rate = world.creep[i] + world.hunting[i] * w * math.cos(angle)
+    return length, rate, -world.hunting[i] * w * w * math.sin(angle)
+
+
+@njit(cache=True)
+def elastic_tension(time, i, world, length, rate):
+    """Tension of an elastic cable stretched to `length`, never pushing."""
+    held, held_rate, _ = held_length(time, i, world)
+    strain, strain_rate = (length - held) / held, (rate - held_rate) / held
+    return max(0.0, world.stiffness_ea * (strain + world.relaxation * strain_rate))
+
+
+@njit(cache=True)
+def _solve_tensions(time, v, omega, world, mass, wrench, J, gamma, arms, frames, scalars, tension):
+    """Tensions, with friction added to the wrench; friction that grows with tension is iterated."""
+    n = world.entry.shape[0]
+    rates = np.empty(n)
+    rough = np.sum(world.swivel_coulomb) + np.sum(world.swivel_viscous) > 0.0
+    loaded = np.sum(world.bending) > 0.0
+    for i in range(n):
+        rates[i] = dot(J[i, :3], v) + dot(J[i, 3:], omega)
+        if world.stiffness_ea > 0.0:
+            tension[i] = elastic_tension(time, i, world, scalars[i, 0], rates[i])
+    rounds = 1 if world.stiffness_ea > 0.0 or not loaded else 4
+    bare = wrench.copy()
+    for _ in range(rounds):
+        wrench[:] = bare
+        if rough or loaded:
+            _friction(v, omega, world, arms, frames, scalars, tension, wrench)
+        if world.stiffness_ea == 0.0:
+            _multipliers(time, world, mass, wrench, J, gamma, tension)
+
+
+@njit(cache=True)
+def _friction(v, omega, world, arms, frames, scalars, tension, wrench):
+    for i in range(arms.shape[0]):
+        velocity = v + cross(omega, arms[i])
+        force = friction_force(
+            i, world, tension[i], velocity, frames[i, 1], frames[i, 2], scalars[i, 1], scalars[i, 3]
+        )
+        add_force(wrench, force, arms[i])
+
+
+@njit(cache=True)
+def _multipliers(time, world, mass, wrench, J, gamma, tension):
+    """Tensions that keep the second derivative of every length at that of its winch."""
+    n = J.shape[0]
+    free = wrench.copy()
+    solve_factored(mass, free)
+    columns = np.empty((n, 6))
+    for i in range(n):
+        columns[i] = J[i]
+        solve_factored(mass, columns[i])
+    normal = np.empty((n, n))
+    for i in range(n):
+        _, _, acceleration = held_length(time, i, world)
+        tension[i] = gamma[i] - acceleration
+        for k in range(6):
+            tension[i] += J[i, k] * free[k]
+        for j in range(n):
+            normal[i, j] = 0.0
+            for k in range(6):
+                normal[i, j] += J[i, k] * columns[j, k]
+    factor(normal)
+    solve_factored(normal, tension)
+
+
+@njit(cache=True)
+def project(time, state, world):
+    """Moves pose and twist onto the held lengths, in the metric of the mass; in place.
+
+    Returns:
+        largest length error left, m.
+    """
+    n = world.entry.shape[0]
+    R, gap, speed = np.empty((3, 3)), np.empty(n), np.empty(n)
+    left = 0.0
+    for attempt in range(4):
+        rotation_of(state[3:7], R)
+        J, _, _, _, scalars = constraint_rows(state[0:3], R, state[7:10], state[10:13], world)
+        left = 0.0
+        for i in range(n):
+            length, rate, _ = held_length(time, i, world)
+            gap[i] = length - scalars[i, 0]
+            speed[i] = rate - dot(J[i, :3], state[7:10]) - dot(J[i, 3:], state[10:13])
+            left = max(left, abs(gap[i]))
+        mass = mass_matrix(R, world)
+        factor(mass)
+        if left < 1e-13 or attempt == 3:
+            state[7:13] += _correction(mass, J, speed)
+            return left
+        move = _correction(mass, J, gap)
+        state[0:3] += move[:3]
+        turn(state[3:7], move[3:])
+    return left
+
+
+@njit(cache=True)
+def _correction(mass, J, gap):
+    n = J.shape[0]
+    columns, normal = np.empty((n, 6)), np.empty((n, n))
+    for i in range(n):
+        columns[i] = J[i]
+        solve_factored(mass, columns[i])
+    for i in range(n):
+        for j in range(n):
+            normal[i, j] = 0.0
+            for k in range(6):
+                normal[i, j] += J[i, k] * columns[j, k]
+    factor(normal)
+    solve_factored(normal, gap)
+    out = np.zeros(6)
+    for i in range(n):
+        for k in range(6):
+            out[k] += columns[i, k] * gap[i]
+    return out
+
+
+@njit(cache=True)
+def energy(time, state, world, tension_energy):
+    """Mechanical energy of body, cable weights, tether, torsion spring and bob, J.
+
+    `tension_energy` adds the strain energy of elastic cables.
+    """
+    p, v, omega = state[0:3], state[7:10], state[10:13]
+    R = np.empty((3, 3))
+    rotation_of(state[3:7], R)
+    mass = mass_matrix(R, world)
+    wrench = np.zeros(6)
+    _, _, arms, _, scalars = constraint_rows(p, R, v, omega, world)
+    _cable_weight(R, omega, arms, scalars, world, mass, wrench)
+    total = 0.0
+    for i in range(6):
+        for j in range(6):
+            total += 0.5 * state[7 + i] * mass[i, j] * state[7 + j]
+    total -= world.mass * dot(world.gravity, p + rotate(R, world.com))
+    line = world.tether_anchor - p - rotate(R, world.tether_point)
+    distance = math.sqrt(dot(line, line))
+    total += 0.5 * world.tether_stiffness * max(0.0, distance - world.tether_rest) ** 2
+    total += 0.5 * world.torsion * (math.atan2(R[1, 0], R[0, 0]) - world.torsion_yaw) ** 2
+    if tension_energy and world.stiffness_ea > 0.0:
+        for i in range(scalars.shape[0]):
+            held, _, _ = held_length(time, i, world)
+            stretch = max(0.0, scalars[i, 0] - held)
+            total += 0.5 * world.stiffness_ea / held * stretch**2
+    return total
