@@ -12,7 +12,7 @@ from types import ModuleType
 from freeswing import __version__
 from freeswing.console import Console
 
-COMMANDS = ("run",)
+COMMANDS = ("report",)
 DONE, NO_RESULT, WRONG_INPUT, INTERRUPTED = 0, 1, 2, 130
 
 
@@ -42,7 +42,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def exit_status(failure: BaseException) -> int:
     """2 for a file or a flag that is wrong, 1 for data that cannot give a result."""
-    from cdpr.documents import InputError
+    from cdpr.problems import InputError
 
     unusable_file = isinstance(failure, OSError) and failure.filename is not None
     return WRONG_INPUT if isinstance(failure, InputError) or unusable_file else NO_RESULT
@@ -50,7 +50,7 @@ def exit_status(failure: BaseException) -> int:
 
 def describe(failure: BaseException) -> str:
     """One plain sentence for a failure; what is not ours to explain says how to learn more."""
-    from cdpr.documents import DataError, InputError
+    from cdpr.problems import DataError, InputError
 
     if isinstance(failure, InputError | DataError):
         return str(failure)

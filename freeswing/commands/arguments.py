@@ -1,0 +1,26 @@
+"""Flags that several commands share."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from freeswing.session import Session
+
+
+def add_session(parser: ArgumentParser) -> None:
+    """The session and where its results go."""
+    parser.add_argument("session", metavar="SESSION", help="a session's folder or session.toml")
+    parser.add_argument(
+        "--results",
+        metavar="DIR",
+        help="write everything to DIR instead of SESSION/results (for read-only sessions)",
+    )
+
+
+def open_session(options: Namespace) -> Session:
+    """The session that the flags of `add_session` name."""
+    from freeswing.session import read_session
+
+    return read_session(options.session, options.results)
