@@ -1,0 +1,231 @@
+"""Trajectories as CSV: `t_s,x_m,y_m,z_m,qw,qx,qy,qz` or `t_s` and some coordinates.
+
+Optional columns tell the noise: `std_x_m, std_y_m, std_z_m` and, of poses, `std_rx_rad, std_ry_rad,
+std_rz_rad` of the small rotation vector in the base frame; `corr_x_y`, `corr_x_rx` and so on are
+the correlations between them. An empty cell is a missing sample.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cdpr.documents import InputError, Problems, read_text, replace_file
+from cdpr.number_table import MOST_TEXT_BYTES, NumberTable, check_times, read_numbers, text_lines
+from cdpr.robot import POSE_COORDINATES
+from cdpr.rotation import angles_from_matrix, matrix_from_quaternion, quaternion_from_matrix
+from cdpr.trajectory import Trajectory, angle_noise, rotation_noise, unwrapped
+
+Array = NDArray[np.float64]
+
+QUATERNION = ("qw", "qx", "qy", "qz")
+POSE_COLUMNS = ("x_m", "y_m", "z_m", *QUATERNION)
+POSE_NOISE = ("x", "y", "z", "rx", "ry", "rz")
+QUATERNION_TOLERANCE = 0.02
+LEAST_CORRELATION = 1e-12
+
+
+def read_csv(path: Path | str, free_coordinates: tuple[str, ...] | None = None) -> Trajectory:
+    """Read a CSV trajectory, separated by commas or semicolons (then decimal commas are read too).
+
+    Args:
+        path: the file.
+        free_coordinates: of the robot; a file without poses must hold these, others are left out.
+            None or empty keeps what the file holds.
+
+    Raises:
+        InputError: naming file, line, column and remedy.
+    """
+    lines = text_lines(read_text(path, MOST_TEXT_BYTES))
+    separator = ";" if ";" in lines[0] else ","
+    header = tuple(cell.strip().strip("\"'") for cell in lines[0].split(separator))
+    while header and not header[-1]:
+        header = header[:-1]
+    coordinates = _coordinates(path, header)
+    rows = enumerate(lines[1:], start=2)
+    table = read_numbers(path, rows, separator, header, decimal_comma=separator == ";")
+    check_times(path, table, header.index("t_s"), "t_s")
+    columns = {name: table.values[:, i] for i, name in enumerate(header)}
+    if coordinates is None:
+        return _poses(path, table, columns)
+    return _selected(path, _plain_coordinates(path, table, columns, coordinates), free_coordinates)
+
+
+def write_csv(path: Path | str, trajectory: Trajectory) -> None:
+    """Write a trajectory to full precision; the file is replaced whole.
+
+    Poses are written with quaternions; standard deviations, and correlations other than zero,
+    follow when the covariances are known.
+    """
+    if trajectory.is_pose:
+        header = ["t_s", *POSE_COLUMNS]
+        quaternions = _continuous(quaternion_from_matrix(trajectory.rotations()))
+        parts = [trajectory.times_s[:, None], trajectory.positions(), quaternions]
+    else:
+        header = ["t_s", *(column_name(name) for name in trajectory.coordinates)]
+        parts = [trajectory.times_s[:, None], trajectory.values]
+    if trajectory.covariances is not None:
+        names, noise = _noise_columns(trajectory)
+        header += names
+        parts.append(noise)
+    rows = (",".join(map(_cell, row)) for row in np.concatenate(parts, axis=1).tolist())
+    replace_file(path, "\n".join([",".join(header), *rows, ""]).encode())
+
+
+def column_name(coordinate: str) -> str:
+    """Column of a coordinate: x -> x_m, phi -> phi_rad."""
+    return f"{coordinate}_m" if coordinate in POSE_COORDINATES[:3] else f"{coordinate}_rad"
+
+
+def _noise_names(names: tuple[str, ...]) -> tuple[str, ...]:
+    return tuple(f"std_{name}_m" if name in "xyz" else f"std_{name}_rad" for name in names)
+
+
+def _coordinates(path: Path | str, header: tuple[str, ...]) -> tuple[str, ...] | None:
+    """Coordinates of a header, None for poses.
+
+    Raises:
+        InputError: naming every wrong column.
+    """
+    problems = Problems()
+    is_pose = any(name in header for name in QUATERNION)
+    found = tuple(name for name in POSE_COORDINATES if column_name(name) in header)
+    ordered = tuple(sorted(found, key=lambda name: header.index(column_name(name))))
+    noise = POSE_NOISE if is_pose else ordered
+    known = {"t_s", *(POSE_COLUMNS if is_pose else map(column_name, ordered)), *_noise_names(noise)}
+    known |= {f"corr_{a}_{b}" for a, b in combinations(noise, 2)}
+    for name in header:
+        if header.count(name) > 1:
+            problems.add(f"line 1: {name[:40]!r}", f"{header.count(name)} columns of this name")
+        elif name not in known:
+            problems.add(f"line 1: {name[:40]!r}", f"unknown column; known: {_known(is_pose)}")
+    for name in ("t_s", *(POSE_COLUMNS if is_pose else ())):
+        if name not in header:
+            problems.add(f"line 1: {name}", "missing column")
+    if not is_pose and not found and not problems:
+        problems.add("line 1", "no coordinate; the header must be t_s,x_m,y_m or alike")
+    problems.raise_if_any(path)
+    return None if is_pose else ordered
+
+
+def _known(is_pose: bool) -> str:
+    free = tuple(map(column_name, POSE_COORDINATES))
+    return ", ".join(("t_s", *(POSE_COLUMNS if is_pose else free), "std_x_m ..."))
+
+
+def _poses(path: Path | str, table: NumberTable, columns: dict[str, Array]) -> Trajectory:
+    position = np.stack([columns[name] for name in POSE_COLUMNS[:3]], axis=1)
+    quaternion = np.stack([columns[name] for name in QUATERNION], axis=1)
+    norm = np.linalg.norm(quaternion, axis=1)
+    wrong = np.flatnonzero(np.abs(norm - 1.0) > QUATERNION_TOLERANCE)
+    if len(wrong):
+        raise InputError(
+            f"{path}: line {table.lines[wrong[0]]}: the quaternion's length is "
+            f"{norm[wrong[0]]:.4g}, must be 1 (order qw, qx, qy, qz)"
+        )
+    angles = unwrapped(angles_from_matrix(matrix_from_quaternion(quaternion)))
+    values = np.concatenate([position, angles], axis=1)
+    covariances = _covariances(path, table, columns, POSE_NOISE)
+    return Trajectory(
+        columns["t_s"], POSE_COORDINATES, values, covariances, f"{Path(path).name}: measured poses"
+    )
+
+
+def _plain_coordinates(
+    path: Path | str,
+    table: NumberTable,
+    columns: dict[str, Array],
+    coordinates: tuple[str, ...],
+) -> Trajectory:
+    values = np.stack([columns[column_name(name)] for name in coordinates], axis=1)
+    covariances = _covariances(path, table, columns, coordinates)
+    if covariances is not None:
+        covariances = rotation_noise(coordinates, values, covariances)
+    provenance = f"{Path(path).name}: measured {', '.join(coordinates)}"
+    return Trajectory(columns["t_s"], coordinates, values, covariances, provenance)
+
+
+def _selected(
+    path: Path | str, trajectory: Trajectory, wanted: tuple[str, ...] | None
+) -> Trajectory:
+    is_pose = set(trajectory.coordinates) == set(POSE_COORDINATES)
+    if is_pose or not wanted:
+        return trajectory.select(POSE_COORDINATES if is_pose else trajectory.coordinates)
+    absent = [column_name(name) for name in wanted if name not in trajectory.coordinates]
+    if absent:
+        needed = ",".join(["t_s", *map(column_name, wanted)])
+        raise InputError(
+            f"{path}: line 1: {', '.join(absent)} missing; the robot's free coordinates need the "
+            f"header {needed}"
+        )
+    return trajectory.select(wanted)
+
+
+def _covariances(
+    path: Path | str, table: NumberTable, columns: dict[str, Array], names: tuple[str, ...]
+) -> Array | None:
+    """Covariances (n_t, n, n) of the `std_` and `corr_` columns.
+
+    None unless every coordinate has its `std_` column: a part of them cannot weight a pose.
+    """
+    wanted = _noise_names(names)
+    for column in (name for name in wanted if name in columns):
+        bad = np.flatnonzero(columns[column] < 0.0)
+        if len(bad):
+            raise InputError(
+                f"{path}: line {table.lines[bad[0]]}: {column} is {columns[column][bad[0]]:g}, "
+                "must be >= 0"
+            )
+    if not all(name in columns for name in wanted):
+        return None
+    std = np.stack([columns[name] for name in wanted], axis=1)
+    correlation = np.broadcast_to(np.eye(len(names)), (len(std), len(names), len(names))).copy()
+    for (i, a), (j, b) in combinations(enumerate(names), 2):
+        column = columns.get(f"corr_{a}_{b}")
+        if column is None:
+            continue
+        bad = np.flatnonzero(np.abs(column) > 1.0)
+        if len(bad):
+            raise InputError(
+                f"{path}: line {table.lines[bad[0]]}: corr_{a}_{b} is {column[bad[0]]:g}, "
+                "must be -1 to 1"
+            )
+        correlation[:, i, j] = correlation[:, j, i] = column
+    return correlation * std[:, :, None] * std[:, None, :]
+
+
+def _noise_columns(trajectory: Trajectory) -> tuple[list[str], Array]:
+    names, covariances = trajectory.coordinates, trajectory.covariances
+    if covariances is None:
+        return [], np.empty((len(trajectory), 0))
+    if trajectory.is_pose:
+        names = POSE_NOISE
+    else:
+        covariances = angle_noise(names, trajectory.values, covariances)
+    std = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
+    scale = np.where(std > 0.0, std, 1.0)
+    correlation = covariances / (scale[:, :, None] * scale[:, None, :])
+    header, parts = list(_noise_names(names)), [std]
+    for (i, a), (j, b) in combinations(enumerate(names), 2):
+        column = np.clip(correlation[:, i, j], -1.0, 1.0)
+        if np.nanmax(np.abs(column), initial=0.0) > LEAST_CORRELATION:
+            header.append(f"corr_{a}_{b}")
+            parts.append(column[:, None])
+    return header, np.concatenate(parts, axis=1)
+
+
+def _continuous(quaternions: Array) -> Array:
+    """Quaternions with signs chosen so that successive known ones do not jump, (n_t, 4)."""
+    result = quaternions.copy()
+    known = np.flatnonzero(np.isfinite(quaternions).all(axis=1))
+    steps = np.sum(quaternions[known][1:] * quaternions[known][:-1], axis=1)
+    signs = np.cumprod(np.concatenate([[1.0], np.where(steps < 0.0, -1.0, 1.0)]))
+    result[known] *= signs[: len(known), None]
+    return result
+
+
+def _cell(number: float) -> str:
+    return "" if number != number else repr(number)
