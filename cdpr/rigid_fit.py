@@ -102,7 +102,7 @@ def fit_markers(layout: ArrayLike, points: ArrayLike, *, refine_layout: bool = T
             "once); name the markers as in the target file, or add markers"
         )
     residuals = points - np.einsum("tij,mj->tmi", R, used) - t[:, None, :]
-    seen = np.isfinite(residuals).all(axis=2)
+    seen = np.asarray(np.isfinite(residuals).all(axis=2))
     squares = np.where(seen[:, :, None], residuals, 0.0) ** 2
     n_markers = seen.sum(axis=1)
     rms = np.where(determined, np.sqrt(squares.sum(axis=(1, 2)) / np.maximum(n_markers, 1)), np.nan)
@@ -122,7 +122,7 @@ def is_planar_or_better(layout: ArrayLike) -> bool:
 
 def _usable(points: Array, weights: ArrayLike | None) -> tuple[Array, Array]:
     """Weights (n_t, n_m), zero where a point is missing, and points with zeros there."""
-    seen = np.isfinite(points).all(axis=2)
+    seen = np.asarray(np.isfinite(points).all(axis=2))
     given = 1.0 if weights is None else np.asarray(weights, dtype=np.float64)
     w = np.where(seen, np.broadcast_to(given, seen.shape), 0.0)
     return w, np.where(seen[:, :, None], points, 0.0)

@@ -67,7 +67,7 @@ class Trajectory:
     @property
     def is_known(self) -> Mask:
         """Samples of which every coordinate is known, (n_t,)."""
-        return np.isfinite(self.values).all(axis=1)
+        return np.asarray(np.isfinite(self.values).all(axis=1))
 
     @property
     def duration_s(self) -> float:
@@ -134,7 +134,7 @@ class Trajectory:
         inside = (self.times_s >= start_s - slack) & (self.times_s <= end_s + slack)
         if not inside.any():
             raise DataError(
-                f"{self.provenance or 'trajectory'}: no sample between {start_s:g} and {end_s:g} s; "
+                f"{self.provenance or 'trajectory'}: no sample from {start_s:g} to {end_s:g} s; "
                 f"it lasts from {self.times_s[0]:g} to {self.times_s[-1]:g} s: correct the window"
             )
         return self.take(inside)
@@ -208,7 +208,7 @@ def _turned_noise(
         return covariances
     columns = np.array([coordinates.index(name) for name in ANGLES])
     angles = values[:, columns]
-    known = np.isfinite(angles).all(axis=1)
+    known = np.asarray(np.isfinite(angles).all(axis=1))
     H = angle_rate_matrix(np.where(known[:, None], angles, 0.0))
     change = np.broadcast_to(np.eye(len(coordinates)), covariances.shape).copy()
     change[:, columns[:, None], columns] = np.linalg.inv(H) if to_angles else H

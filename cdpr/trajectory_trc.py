@@ -147,7 +147,7 @@ def _exact_times(path: Path | str, table: NumberTable, rate: float, lines: list[
     measured = 1.0 / float(np.median(np.diff(times)))
     if abs(measured - rate) > RATE_TOLERANCE * rate:
         raise InputError(
-            f"{path}: line 3: DataRate is {rate:g}, but the Time column steps at {measured:.6g} Hz; "
+            f"{path}: line 3: DataRate {rate:g}, but the Time column steps at {measured:.6g} Hz; "
             "correct the header or export again"
         )
     printed = lines[int(table.lines[-1]) - 1].split("\t")[1].strip().partition(".")[2]
