@@ -1,0 +1,141 @@
+"""The plug-in form: one effect is one file with a name, parameters and its term in the model.
+
+An effect overrides only the hooks that it needs. All hooks work on symbolic expressions of one
+instant; parameters arrive in the order of `parameters(robot)`. Forces are per unit of platform
+mass (m/s^2), torques likewise (m^2/s^2): free motion cannot tell the mass.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+
+from cdpr.body import Expression, along
+from cdpr.pulley import CableState, Geometry
+from cdpr.robot import Robot
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """One unknown of an effect.
+
+    Attributes:
+        name: with its unit as suffix.
+        low: least plausible value.
+        high: greatest plausible value.
+        scale: a typical size, the prior standard deviation about zero (or about `start`).
+        start: where a fit starts.
+        amplitude: True when the effect vanishes where all its amplitude parameters are zero;
+            False for shape parameters (a frequency, a point of application).
+    """
+
+    name: str
+    low: float
+    high: float
+    scale: float
+    start: float = 0.0
+    amplitude: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Instant:
+    """The platform at one instant, as expressions.
+
+    Attributes:
+        time_s: time since the start of the run.
+        zeta: pose coordinates, (6,).
+        rates: zeta_dot, (6,).
+        rotation: R, (3, 3).
+        omega: angular velocity in the base frame, (3,).
+        com: P to centre of mass in the base frame, (3,).
+        cables: lengths and angles, one a cable.
+        tensions: specific tensions tau / m (n,), without the effects that need them.
+    """
+
+    time_s: Expression
+    zeta: Expression
+    rates: Expression
+    rotation: Expression
+    omega: Expression
+    com: Expression
+    cables: tuple[CableState, ...]
+    tensions: Expression | None = None
+
+    @property
+    def velocity(self) -> Expression:
+        """Velocity of P in the base frame, (3,)."""
+        return self.rates[:3]
+
+    def force_at(self, lever: Expression, force: Expression) -> Expression:
+        """Wrench about P, (6,), of a force at the point P + lever."""
+        return ca.vertcat(force, ca.cross(lever, force))
+
+    def torque(self, torque: Expression) -> Expression:
+        """Wrench about P, (6,), of a pure torque."""
+        return ca.vertcat(ca.SX.zeros(3), torque)
+
+    def rate_of(self, quantity: Expression) -> Expression:
+        """Time derivative of a quantity that depends on the pose alone."""
+        return along(quantity, self.zeta, self.rates)
+
+    def against(self, quantity: Expression, effort: Expression) -> Expression:
+        """Generalised force, (6,), conjugate to zeta_dot, of an effort opposing `quantity`."""
+        return -ca.jacobian(quantity, self.zeta).T * effort
+
+
+class Effect:
+    """An effect that leaves everything as it is; subclasses override what they change."""
+
+    name: str = ""
+    summary: str = ""
+    needs_tension: bool = False
+    stage: str = "force"  # "kinematics", "base" (gravity), "force" or "measurement"
+
+    def parameters(self, robot: Robot) -> tuple[Parameter, ...]:
+        """The unknowns, in the order in which hooks receive them."""
+        raise NotImplementedError
+
+    def geometry(self, geometry: Geometry, values: Expression) -> Geometry:
+        """Displaced geometry or gravity."""
+        return geometry
+
+    def length_change(
+        self, robot: Robot, instant: Instant, values: Expression
+    ) -> Expression | None:
+        """How much longer each cable is than it was told to be, (n,); may use tensions."""
+        return None
+
+    def wrench(self, instant: Instant, values: Expression) -> Expression | None:
+        """Specific wrench about P in the base frame, (6,), conjugate to the twist."""
+        return None
+
+    def generalised_force(self, instant: Instant, values: Expression) -> Expression | None:
+        """Specific generalised force, (6,), conjugate to zeta_dot."""
+        return None
+
+    def point_masses(
+        self, robot: Robot, instant: Instant, values: Expression
+    ) -> list[tuple[Expression, Expression, Expression]]:
+        """Rigidly attached masses over the platform's: (lever, inertial mass, heavy mass) each."""
+        return []
+
+    def measured(self, instant: Instant, values: Expression) -> Expression | None:
+        """Change of the measured pose: translation and small base-frame rotation, (6,)."""
+        return None
+
+
+def each(robot: Robot, stem: str, unit: str, low: float, high: float, scale: float):
+    """One parameter a cable, named stem_<cable>_unit."""
+    return tuple(
+        Parameter(f"{stem}_{cable.name}_{unit}", low, high, scale) for cable in robot.cables
+    )
+
+
+def each_axis(robot: Robot, stem: str, axes: str, unit: str, bound: float, scale: float):
+    """One parameter a cable and axis, named stem_<cable>_<axis>_unit, within +- bound."""
+    return tuple(
+        Parameter(f"{stem}_{cable.name}_{axis}_{unit}", -bound, bound, scale)
+        for cable in robot.cables
+        for axis in axes
+    )

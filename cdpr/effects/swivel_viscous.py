@@ -1,0 +1,33 @@
+"""Viscous friction in the swivel bearings of the pulleys."""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from cdpr.body import Expression
+from cdpr.effects.base import Effect, Instant, Parameter
+from cdpr.robot import Robot
+
+
+class SwivelViscous(Effect):
+    """Torque proportional to the swivel rate about every swivel axis."""
+
+    name = "swivel_viscous"
+    summary = "viscous friction in the swivel bearings"
+
+    def parameters(self, robot: Robot) -> tuple[Parameter, ...]:
+        """Specific torque for each rad/s, the same for all pulleys."""
+        return (Parameter("rate_m2_s", 0.0, 1.0, 0.01),)
+
+    def generalised_force(self, instant: Instant, values: Expression) -> Expression:
+        """Sum over the cables of the torque against the swivel rate."""
+        return sum(
+            (
+                instant.against(cable.swivel, values[0] * instant.rate_of(cable.swivel))
+                for cable in instant.cables
+            ),
+            ca.SX.zeros(6),
+        )
+
+
+EFFECT = SwivelViscous()

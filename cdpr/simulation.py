@@ -1,0 +1,227 @@
+"""Free motion of a model from an initial state: collocation with error-controlled segments."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdpr.batch import Bound, evaluate, first_output, with_jacobian
+from cdpr.collocation import Table, interpolation, table
+from cdpr.model import Model
+from cdpr.robot import Array
+
+NODES = 12
+LONGEST_SEGMENT_S = 0.4
+SHORTEST_SEGMENT_S = 5e-4
+SWEEPS = 12
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """A free motion as one polynomial a segment.
+
+    Attributes:
+        model: the equations it obeys.
+        inertia: `INERTIA_NAMES` values, (9,).
+        values: effect values, (k,).
+        starts_s: start of each segment, (s,).
+        steps_s: length of each segment, (s,).
+        zetas: pose coordinates at the segment starts, (s, 6).
+        rates: their rates at the segment starts, (s, 6).
+        accelerations: second derivatives at the Gauss nodes, (s, m, 6).
+    """
+
+    model: Model
+    inertia: Array
+    values: Array
+    starts_s: Array
+    steps_s: Array
+    zetas: Array
+    rates: Array
+    accelerations: Array
+
+    @property
+    def end_s(self) -> float:
+        """Time up to which the motion is known."""
+        return float(self.starts_s[-1] + self.steps_s[-1])
+
+    def at(self, times_s: Array) -> tuple[Array, Array, Array]:
+        """Pose coordinates, rates and accelerations at times (n,), each (n, 6).
+
+        Raises:
+            ValueError: when a time lies outside the motion.
+        """
+        index, fractions = self.locate(times_s)
+        step = self.steps_s[index, None]
+        maps = interpolation(self.accelerations.shape[1], fractions)
+        values, once, twice = (
+            np.einsum("nm,nmc->nc", part, self.accelerations[index]) for part in maps
+        )
+        rates = self.rates[index] + step * once
+        zetas = self.zetas[index] + step * fractions[:, None] * self.rates[index] + step**2 * twice
+        return zetas, rates, values
+
+    def locate(self, times_s: Array) -> tuple[Array, Array]:
+        """Segment index and fraction within it of each time.
+
+        Raises:
+            ValueError: when a time lies outside the motion.
+        """
+        times = np.asarray(times_s, dtype=np.float64)
+        slack = 1e-9
+        if times.size and not (
+            times.min() >= self.starts_s[0] - slack and times.max() <= self.end_s + slack
+        ):
+            raise ValueError(
+                f"times {times.min():.6f} to {times.max():.6f} s lie outside the motion, "
+                f"{self.starts_s[0]:.6f} to {self.end_s:.6f} s"
+            )
+        index = np.clip(np.searchsorted(self.starts_s, times, side="right") - 1, 0, None)
+        fractions = (times - self.starts_s[index]) / self.steps_s[index]
+        return index, np.clip(fractions, 0.0, 1.0)
+
+    def tensions(self, times_s: Array) -> Array:
+        """Specific cable tensions tau / m at times (n,), (n, n_cables) in m/s^2."""
+        zetas, rates, _ = self.at(times_s)
+        arguments = (np.asarray(times_s), zetas, rates, self.inertia, self.values)
+        return evaluate(self.model.acceleration, *arguments)[1]
+
+
+def simulate(
+    model: Model,
+    zeta: Array,
+    rates: Array,
+    span_s: tuple[float, float],
+    inertia: Array,
+    values: Array | None = None,
+    tolerance_m: float = 1e-10,
+    longest_s: float = LONGEST_SEGMENT_S,
+) -> Motion:
+    """Integrate the free motion from a state that obeys the constraints.
+
+    Args:
+        model: the equations.
+        zeta: pose coordinates at the start, (6,).
+        rates: their rates, (6,); see `cdpr.free_motion.admissible_rates`.
+        span_s: start and end time.
+        inertia: `INERTIA_NAMES` values, (9,).
+        values: effect values, (k,); None for those that leave the declared model as it is.
+        tolerance_m: local error bound of a segment, metres and radians.
+        longest_s: longest segment.
+
+    Returns:
+        The motion. Cable lengths keep their value without stabilisation: the constraint is an
+        invariant that the segments' order of accuracy preserves.
+
+    Raises:
+        ValueError: when the motion cannot be followed, with the time at which it fails (a cable
+            reaches its swivel axis, the angles reach theta = 90 degrees, or the constraint
+            Jacobian loses rank).
+    """
+    values = model.start_values if values is None else np.asarray(values, dtype=np.float64)
+    inertia = np.asarray(inertia, dtype=np.float64)
+    stepper = _Stepper(model, inertia, values, tolerance_m)
+    time, end = span_s
+    state = np.asarray(zeta, dtype=np.float64), np.asarray(rates, dtype=np.float64)
+    step, guess = min(0.1, longest_s, end - time), None
+    rows: list[tuple[float, float, Array, Array, Array]] = []
+    while end - time > 1e-12:
+        step = min(step, end - time, longest_s)
+        found, factor = stepper.segment(time, step, *state, guess)
+        if found is None:
+            if step <= SHORTEST_SEGMENT_S:
+                raise ValueError(
+                    f"the free motion cannot be followed beyond {time:.4f} s from pose "
+                    f"{np.array2string(state[0], precision=4)}: the cables or angles reach a "
+                    "singular configuration there"
+                )
+            step, guess = step * factor, None
+            continue
+        rows.append((time, step, *state, found))
+        state = stepper.end(step, *state, found)
+        time += step
+        following = min(step * factor, longest_s, max(end - time, 1e-12))
+        guess = _extrapolated(found, step, following)
+        step = following
+    starts, steps, zetas, speeds, accelerations = (
+        np.array(column) for column in zip(*rows, strict=True)
+    )
+    return Motion(model, inertia, values, starts, steps, zetas, speeds, accelerations)
+
+
+def _extrapolated(accelerations: Array, step: float, following: float) -> Array:
+    """The last segment's low-order polynomial carried on into the next one."""
+    t = table(accelerations.shape[0])
+    keep = 6
+    fractions = 1.0 + t.nodes * following / step
+    coefficients = t.spectrum[:keep] @ accelerations
+    return np.polynomial.legendre.legvander(2 * fractions - 1, keep - 1) @ coefficients
+
+
+class _Stepper:
+    """Solves one segment after another; inputs that do not change are bound once."""
+
+    def __init__(self, model: Model, inertia: Array, values: Array, tolerance: float) -> None:
+        self.tolerance = tolerance
+        self.table: Table = table(NODES)
+        self.force = Bound(first_output(model.acceleration), NODES)
+        self.slope = Bound(with_jacobian(model.acceleration, (1, 2)), 1)
+        for bound in (self.force, self.slope):
+            bound.inputs[3][:] = inertia
+            bound.inputs[4][:] = values
+
+    def segment(
+        self, time: float, step: float, zeta: Array, rates: Array, guess: Array | None
+    ) -> tuple[Array | None, float]:
+        """Node accelerations, or None, and the factor by which to change the step."""
+        t = self.table
+        inverse, value = self._newton_matrix(time, step, zeta, rates)
+        found = np.tile(value, (NODES, 1)) if guess is None else guess
+        force = self.force
+        force.inputs[0][:, 0] = time + step * t.nodes
+        drifted = zeta + step * t.nodes[:, None] * rates
+        twice, once = step**2 * t.twice, step * t.once
+        change = np.inf
+        for _ in range(SWEEPS):
+            np.add(drifted, twice @ found, out=force.inputs[1])
+            np.add(rates, once @ found, out=force.inputs[2])
+            force.run()
+            delta = (inverse @ (force.outputs[0] - found).reshape(-1)).reshape(NODES, 6)
+            found = found + delta
+            last, change = change, step**2 * float(np.abs(delta).max())
+            if not np.isfinite(change) or (change > 1e-3 and change > last):
+                return None, 0.4
+            # The next change would be about change^2 / last: stop when that is negligible.
+            ratio = change / last if np.isfinite(last) else 1.0
+            if change * min(1.0, ratio) < 0.1 * self.tolerance:
+                break
+        else:
+            return None, 0.5
+        tail = step**2 * float(np.abs(t.spectrum[-2:] @ found).max()) / (4 * NODES**2)
+        factor = 0.85 * (self.tolerance / max(tail, 1e-300)) ** (1.0 / NODES)
+        if tail > 4 * self.tolerance and step > SHORTEST_SEGMENT_S:
+            return None, float(np.clip(factor, 0.2, 0.8))
+        return found, float(np.clip(factor, 0.5, 1.6))
+
+    def _newton_matrix(
+        self, time: float, step: float, zeta: Array, rates: Array
+    ) -> tuple[Array, Array]:
+        """Inverse of the collocation equations' Jacobian with mid-segment slopes; a first guess."""
+        slope, t = self.slope, self.table
+        slope.inputs[0][:] = time + step / 2
+        slope.inputs[1][0] = zeta + 0.5 * step * rates
+        slope.inputs[2][0] = rates
+        slope.run()
+        jacobian = slope.outputs[1][0]  # (12, 6): transposed
+        blocks = step**2 * t.twice[:, None, :, None] * jacobian[:6].T[:, None, :]
+        blocks = blocks + step * t.once[:, None, :, None] * jacobian[6:].T[:, None, :]
+        matrix = np.eye(6 * NODES) - blocks.reshape(6 * NODES, 6 * NODES)
+        return np.linalg.inv(matrix), slope.outputs[0][0].copy()
+
+    def end(self, step: float, zeta: Array, rates: Array, found: Array) -> tuple[Array, Array]:
+        """State at the end of a segment."""
+        t = self.table
+        return zeta + step * rates + step**2 * (t.twice_end @ found), rates + step * (
+            t.once_end @ found
+        )
