@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import sys
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
@@ -13,13 +15,13 @@ if TYPE_CHECKING:
 class Console:
     """The two streams of a command.
 
-    Progress is drawn only where stderr is a terminal. With `json` the result file is the only
+    Progress is drawn only where stderr is a terminal. With `as_json` the result file is the only
     thing on stdout; with `quiet` nothing but complaints is printed.
     """
 
-    def __init__(self, *, json: bool = False, quiet: bool = False) -> None:
-        self._summary = not json and not quiet
-        self._json = json
+    def __init__(self, *, as_json: bool = False, quiet: bool = False) -> None:
+        self._summary = not as_json and not quiet
+        self._json = as_json
         self._draws = sys.stderr.isatty() and not quiet
         self._bar: Progress | None = None
         self._tasks: dict[str, TaskID] = {}
@@ -47,6 +49,12 @@ class Console:
         if self._json:
             self._stop_bar()
             sys.stdout.write(path.read_text(encoding="utf-8").rstrip("\n") + "\n")
+
+    def say_json(self, document: Mapping[str, Any]) -> None:
+        """With `--json`: a result that is no file, on stdout."""
+        if self._json:
+            self._stop_bar()
+            sys.stdout.write(json.dumps(document, indent=1, ensure_ascii=False) + "\n")
 
     def progress(self, label: str, fraction: float) -> None:
         """How far a step has come, from 0 to 1."""

@@ -12,7 +12,7 @@ from types import ModuleType
 from freeswing import __version__
 from freeswing.console import Console
 
-COMMANDS = ("report",)
+COMMANDS = ("report", "convert", "home")
 DONE, NO_RESULT, WRONG_INPUT, INTERRUPTED = 0, 1, 2, 130
 
 
@@ -23,7 +23,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         arguments: the words after `freeswing`; those of the process when None.
     """
     options = build_parser().parse_args(arguments)
-    with Console(json=options.json, quiet=options.quiet) as console:
+    with Console(as_json=options.json, quiet=options.quiet) as console:
         try:
             options.run(options, console)
             sys.stdout.flush()
@@ -32,7 +32,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         except KeyboardInterrupt:
             console.complain("interrupted; the results that were there before are untouched")
             return INTERRUPTED
-        except Exception as failure:  # noqa: BLE001 (the program's one exception boundary)
+        except Exception as failure:
             if options.verbose:
                 raise
             console.complain(describe(failure))

@@ -265,11 +265,12 @@ def _read_base_tag(reader: Reader) -> BaseTag | None:
     if not np.isfinite(points).all():
         return None
     sides = np.linalg.norm(points - np.roll(points, -1, axis=0), axis=1)
-    if sides.min() < 0.5 * sides.max():
+    diagonals = np.linalg.norm(points[:2] - points[2:], axis=1)
+    if diagonals.min() <= sides.max():
         reader.add(
             "corners_base_m",
-            f"its sides are {np.round(sides, 4).tolist()} m long, not a square's: "
-            "the order is TL TR BR BL",
+            f"its sides are {np.round(sides, 4).tolist()} m, its diagonals "
+            f"{np.round(diagonals, 4).tolist()} m: no square in the order TL TR BR BL",
         )
     return BaseTag(family, number, points)
 
@@ -329,4 +330,6 @@ def _check_runs(reader: Reader, runs: tuple[Run, ...]) -> None:
     for count, name in enumerate(names):
         if name and name in names[:count]:
             first = names.index(name) + 1
-            reader.add(f"runs[{count + 1}].name", f"{runs[count].name!r} is already runs[{first}]'s")
+            reader.add(
+                f"runs[{count + 1}].name", f"{runs[count].name!r} is already runs[{first}]'s"
+            )

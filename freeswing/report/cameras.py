@@ -20,17 +20,15 @@ class Cameras:
         if not calibration and not tracking:
             return None
         return {
-            "cameras": [_camera(entry) for entry in calibration.get("cameras") or []],
-            "runs": [_run(entry) for entry in tracking.get("runs") or []],
+            "cameras": [_plain_entries(entry) for entry in calibration.get("cameras") or []],
+            "runs": [_plain_entries(entry) for entry in tracking.get("runs") or []],
         }
 
 
-def _camera(entry: Document) -> dict[str, str]:
-    return {key: _shown(value) for key, value in entry.items() if not isinstance(value, list | dict)}
-
-
-def _run(entry: Document) -> dict[str, str]:
-    return {key: _shown(value) for key, value in entry.items() if not isinstance(value, list | dict)}
+def _plain_entries(entry: Document) -> dict[str, str]:
+    return {
+        key: _shown(value) for key, value in entry.items() if not isinstance(value, list | dict)
+    }
 
 
 def _shown(value: object) -> str:

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from typing import Any
 
 import matplotlib as mpl
+import numpy as np
 from markupsafe import Markup, escape
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 INK, FAINT = "#1c2733", "#9aa7b3"
 MEASURED, BEFORE, AFTER = "#1c2733", "#c8641b", "#1769aa"
 SERIES = ("#1769aa", "#c8641b", "#3b8a5a", "#8a4fa3", "#a08a1c", "#5b6b7a")
 MAX_POINTS = 1200
-_STYLE = {
+_STYLE: Any = {
     "svg.fonttype": "none",
     "font.family": "sans-serif",
     "font.size": 9.0,
@@ -24,6 +28,7 @@ _STYLE = {
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.grid": True,
+    "axes.axisbelow": True,
     "grid.color": "#e3e8ec",
     "grid.linewidth": 0.6,
     "text.color": INK,
@@ -52,15 +57,23 @@ def figure(
         buffer = io.StringIO()
         FigureCanvasSVG(sheet).print_svg(buffer, metadata={"Date": None, "Creator": None})
     svg = _unique_ids(_only_svg(buffer.getvalue()), caption)
-    return Markup('<figure role="img" aria-label="{0}">{1}<figcaption>{0}</figcaption></figure>').format(
-        escape(caption), Markup(svg)
-    )
+    return Markup(
+        '<figure role="img" aria-label="{0}">{1}<figcaption>{0}</figcaption></figure>'
+    ).format(escape(caption), Markup(svg))
 
 
-def thin(values: Sequence[float], limit: int = MAX_POINTS) -> Sequence[float]:
+def thin(values: np.ndarray, limit: int = MAX_POINTS) -> np.ndarray:
     """Every k-th value, so that a line has no more than `limit` points."""
     step = -(-len(values) // limit) if len(values) else 1
     return values[::step]
+
+
+def plain_log_axes(axes: Axes) -> None:
+    """Decades as plain numbers, few of them."""
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(LogLocator(numticks=4))
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axis.set_minor_formatter(NullFormatter())
 
 
 def _only_svg(text: str) -> str:

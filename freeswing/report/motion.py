@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from freeswing.report.figures import AFTER, BEFORE, MEASURED, figure, thin
+from freeswing.report.figures import AFTER, BEFORE, MEASURED, figure, plain_log_axes, thin
 from freeswing.report.material import Document, Material
 from freeswing.report.words import plain
 
@@ -47,6 +47,8 @@ def _figure(run: Document) -> object:
             series = {key: scale * values[:, row] for key, values in predictions.items()}
             _draw_row(list(grid[row]), times, scale * measured[:, row], series)
             grid[row][0].set_ylabel(f"{plain(name)} ({unit})")
+        for axes in grid[:, 2]:
+            plain_log_axes(axes)
         for axes, title in zip(grid[0], ("motion", "residual", "its spectrum"), strict=True):
             axes.set_title(title, fontsize=9, loc="left")
         grid[-1][0].set_xlabel("time (s)")

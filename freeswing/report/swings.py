@@ -67,7 +67,11 @@ def _chart(swings: list[Document], entries: list[list[float]]) -> object:
                     label=role,
                 )
             axes.plot(
-                [p[first] for p in entries], [p[second] for p in entries], "k^", ms=5, label="pulley"
+                [p[first] for p in entries],
+                [p[second] for p in entries],
+                "k^",
+                ms=5,
+                label="pulley",
             )
             axes.set_aspect("equal", adjustable="datalim")
             axes.set_xlabel("x (m)")

@@ -1,0 +1,72 @@
+"""A session's recorded swings, loaded as what identification works on."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from cdpr.documents import DataError, InputError
+from cdpr.robot import Robot
+from cdpr.robot_file import read_robot
+from cdpr.target import Target, read_target
+from cdpr.trajectory import Trajectory
+from cdpr.trajectory_files import read_trajectory
+from freeswing.session import Run, Session
+from ident.runs import Payload, SwingRun
+
+
+def load_robot(session: Session) -> Robot:
+    """The session's robot."""
+    return read_robot(session.robot)
+
+
+def load_target(session: Session) -> Target | None:
+    """What is on the platform, None where the session names no target."""
+    return None if session.target is None else read_target(session.target)
+
+
+def trajectory_path(session: Session, run: Run) -> Path:
+    """The file of a run's trajectory: measured, or written by tracking."""
+    return run.trajectory or session.tracks / f"{run.name}.csv"
+
+
+def load_swings(session: Session, robot: Robot, target: Target | None) -> tuple[SwingRun, ...]:
+    """All runs of a session with their trajectories.
+
+    Raises:
+        InputError: naming the run whose file is wrong, or a number of cable lengths that is not
+            the robot's.
+        DataError: where a video has not been tracked yet.
+    """
+    return tuple(load_swing(session, run, robot, target) for run in session.runs)
+
+
+def load_swing(session: Session, run: Run, robot: Robot, target: Target | None) -> SwingRun:
+    """One run with its trajectory; see `load_swings`."""
+    lengths = run.cable_lengths_m
+    if lengths is not None and len(lengths) != robot.n_cables:
+        raise InputError(
+            f"{session.path}: run {run.name}: cable_lengths_m has {len(lengths)} numbers, "
+            f"the robot has {robot.n_cables} cables"
+        )
+    payload = run.payload and Payload(run.payload.mass_kg, run.payload.position_m)
+    return SwingRun(
+        name=run.name,
+        role="identify" if run.role == "identify" else "validate",
+        trajectory=load_trajectory(session, run, robot, target),
+        lengths_m=lengths,
+        lengths_std_m=run.cable_lengths_std_m,
+        window_s=run.window_s,
+        payload=payload,
+    )
+
+
+def load_trajectory(session: Session, run: Run, robot: Robot, target: Target | None) -> Trajectory:
+    """A run's measured or tracked motion."""
+    path = trajectory_path(session, run)
+    if run.trajectory is None and not path.is_file():
+        raise DataError(
+            f"run {run.name}: its video has not been tracked yet; run freeswing track first"
+        )
+    trajectory = read_trajectory(path, robot, target)
+    return replace(trajectory, provenance=trajectory.provenance or path.name)
