@@ -99,7 +99,7 @@ def radius_limit(model: str, params: Array) -> float:
             np.polysub(np.polymul(np.polyder(above), below), np.polymul(above, np.polyder(below))),
         ),
     )
-    return min(_first_positive_root(slope), _first_positive_root(below))
+    return min(_first_positive_root(np.asarray(slope, float)), _first_positive_root(below))
 
 
 def _first_positive_root(polynomial_in_square: Array) -> float:
