@@ -70,7 +70,8 @@ def free_window(
     start, end = times_s[free][0], times_s[free][-1]
     if end - start < LEAST_WINDOW_S:
         raise ValueError(
-            f"free motion lasts only from {start:.2f} to {end:.2f} s, {LEAST_WINDOW_S:g} s are needed"
+            f"free motion lasts only from {start:.2f} to {end:.2f} s, "
+            f"{LEAST_WINDOW_S:g} s are needed"
         )
     return float(start + _MARGIN_S), float(end)
 
