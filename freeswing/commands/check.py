@@ -1,0 +1,33 @@
+"""Look a session over before anything is computed: one line a finding, with what to do."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+
+from freeswing.commands.arguments import add_session, open_session
+from freeswing.console import Console
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """The session."""
+    add_session(parser)
+
+
+def run(options: Namespace, console: Console) -> None:
+    """Examine the session; fails where a finding keeps a command from a result."""
+    from cdpr.documents import DataError, write_json
+    from freeswing.doctor.examine import examine
+
+    session = open_session(options)
+    findings = examine(session, console.progress)
+    result = session.results / "check.json"
+    entries = [finding.entry() for finding in findings]
+    write_json(result, {"format": "freeswing-check/1", "findings": entries})
+    for finding in findings:
+        console.say(finding.line())
+    console.show_file(result)
+    errors = sum(finding.level == "error" for finding in findings)
+    if errors:
+        plural = "" if errors == 1 else "s"
+        raise DataError(f"{session.path}: {errors} finding{plural} to mend before a result")
+    console.say(f"{session.name}: nothing keeps it from a result ({len(findings)} findings)")

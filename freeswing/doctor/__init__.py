@@ -1,0 +1,1 @@
+"""What `freeswing check` looks at: one file a subject, each giving findings."""

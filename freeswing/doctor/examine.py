@@ -1,0 +1,66 @@
+"""A session examined from its files to its swings; every subject is looked at, whatever fails."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Iterator
+from typing import TypeVar
+
+from cdpr.documents import DataError, InputError
+from cdpr.robot import Robot
+from cdpr.target import Target
+from freeswing.doctor.finding import Finding
+from freeswing.doctor.geometry import robot_findings
+from freeswing.doctor.motion import run_findings
+from freeswing.doctor.recordings import calibration_findings, video_findings
+from freeswing.doctor.split import split_findings
+from freeswing.session import Run, Session
+from freeswing.swings import load_robot, load_swing, load_target, trajectory_path
+from ident.runs import SwingRun
+
+Progress = Callable[[str, float], None]
+Loaded = TypeVar("Loaded")
+
+
+def examine(session: Session, progress: Progress | None = None) -> tuple[Finding, ...]:
+    """All findings, errors first."""
+    found = list(_findings(session, progress or (lambda _label, _fraction: None)))
+    order = ("error", "warning", "note")
+    return tuple(sorted(found, key=lambda finding: order.index(finding.level)))
+
+
+def _findings(session: Session, progress: Progress) -> Iterator[Finding]:
+    robot = yield from _tried("robot", lambda: load_robot(session))
+    target = yield from _tried("target", lambda: load_target(session))
+    if robot is not None:
+        yield from robot_findings(robot)
+    yield from calibration_findings(session)
+    swings: list[SwingRun] = []
+    for count, run in enumerate(session.runs):
+        progress("examining the runs", count / len(session.runs))
+        if run.video is not None:
+            yield from video_findings(session, run)
+        if robot is not None:
+            swing = yield from _run(session, run, robot, target)
+            swings += [] if swing is None else [swing]
+    yield from split_findings(session, swings)
+    progress("examining the runs", 1.0)
+
+
+def _run(
+    session: Session, run: Run, robot: Robot, target: Target | None
+) -> Generator[Finding, None, SwingRun | None]:
+    if run.video is not None and not trajectory_path(session, run).is_file():
+        yield Finding("note", f"run {run.name}", "not tracked yet", "run freeswing track")
+        return None
+    swing = yield from _tried(f"run {run.name}", lambda: load_swing(session, run, robot, target))
+    if swing is not None:
+        yield from run_findings(swing, robot, session.frame_rate_hz)
+    return swing
+
+
+def _tried(subject: str, load: Callable[[], Loaded]) -> Generator[Finding, None, Loaded | None]:
+    try:
+        return load()
+    except (InputError, DataError) as failure:
+        yield Finding("error", subject, str(failure).replace("\n", " "))
+        return None

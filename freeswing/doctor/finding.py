@@ -1,0 +1,39 @@
+"""One line that the doctor says about a session."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+Level = Literal["error", "warning", "note"]
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """What was found, where, and what to do.
+
+    Attributes:
+        level: `error` keeps a command from a result, `warning` costs accuracy, `note` is to know.
+        subject: the file, run or camera.
+        text: what was measured, with its number.
+        remedy: what to do, or "".
+    """
+
+    level: Level
+    subject: str
+    text: str
+    remedy: str = ""
+
+    def line(self) -> str:
+        """The finding as one line."""
+        ending = f"; {self.remedy}" if self.remedy else ""
+        return f"{self.level:7} {self.subject}: {self.text}{ending}"
+
+    def entry(self) -> dict[str, str]:
+        """The finding for a result file."""
+        return {
+            "level": self.level,
+            "subject": self.subject,
+            "text": self.text,
+            "remedy": self.remedy,
+        }

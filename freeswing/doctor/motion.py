@@ -1,0 +1,123 @@
+"""One run's samples: time stamps, occlusion, units, taut cables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from cdpr.batch import evaluate
+from cdpr.documents import DataError
+from cdpr.model import build_model
+from cdpr.robot import Robot
+from cdpr.trajectory import Trajectory
+from freeswing.doctor.finding import Finding
+from ident.runs import SwingRun
+
+WORTHWHILE_WINDOW_S = 5.0
+MOST_MISSING = 0.05
+LONGEST_GAP_S = 0.1
+RATE_TOLERANCE = 0.02
+FARTHEST_M = 100.0
+LENGTH_CHANGE_M = 0.003
+LENGTH_DIFFERENCE_M = 0.02
+
+
+def run_findings(run: SwingRun, robot: Robot, frame_rate_hz: float | None) -> Iterator[Finding]:
+    """What stands out in one run, inside its window where it has one."""
+    subject = f"run {run.name}"
+    yield from _stamps(subject, run.trajectory, frame_rate_hz)
+    try:
+        part = run.trajectory.window(*run.window_s) if run.window_s else run.trajectory
+    except DataError as failure:
+        yield Finding("error", subject, str(failure))
+        return
+    if run.window_s is not None:
+        yield from _window(subject, run.trajectory, run.window_s)
+    else:
+        yield Finding("note", subject, "no window_s", "the free motion is looked for")
+    yield from _missing(subject, part)
+    if not part.is_known.any():
+        return
+    yield from _places(subject, part, robot)
+    if part.is_pose:
+        yield from _cables(subject, run, part, robot)
+
+
+def _stamps(subject: str, trajectory: Trajectory, rate_hz: float | None) -> Iterator[Finding]:
+    if len(trajectory) < 8:
+        yield Finding("error", subject, f"{len(trajectory)} samples, at least 8 are needed")
+        return
+    found = trajectory.sample_rate_hz
+    if rate_hz is not None and abs(found / rate_hz - 1.0) > RATE_TOLERANCE:
+        text = f"samples come at {found:.2f} Hz, the session says {rate_hz:g} Hz"
+        yield Finding("warning", subject, text, "check frame_rate_hz and the time stamps")
+    steps = np.diff(trajectory.times_s)
+    skipped = int((steps > 1.5 * np.median(steps)).sum())
+    if skipped:
+        text = f"time stamps jump {skipped} times, at most by {steps.max():.3f} s"
+        yield Finding("note", subject, text, "dropped frames are bridged or left out")
+
+
+def _window(
+    subject: str, trajectory: Trajectory, window_s: tuple[float, float]
+) -> Iterator[Finding]:
+    first, last = float(trajectory.times_s[0]), float(trajectory.times_s[-1])
+    step = 1.0 / trajectory.sample_rate_hz
+    if window_s[0] < first - step or window_s[1] > last + step:
+        text = f"window_s {list(window_s)} reaches beyond the samples, {first:g} to {last:g} s"
+        yield Finding("warning", subject, text, "correct window_s")
+    if window_s[1] - window_s[0] < WORTHWHILE_WINDOW_S:
+        text = f"{window_s[1] - window_s[0]:g} s of free motion"
+        yield Finding("warning", subject, text, f"{WORTHWHILE_WINDOW_S:g} s or more tell far more")
+
+
+def _missing(subject: str, part: Trajectory) -> Iterator[Finding]:
+    known = part.is_known
+    share = 1.0 - known.mean()
+    if not known.any():
+        yield Finding("error", subject, "every sample of the window is missing", "drop the run")
+        return
+    times = part.times_s[known]
+    gap = float(np.diff(times).max(initial=0.0))
+    if share > MOST_MISSING or gap > LONGEST_GAP_S:
+        text = f"{100 * share:.1f} % of the samples are missing, the longest gap is {gap:.2f} s"
+        yield Finding("warning", subject, text, "markers or tags were hidden there")
+
+
+def _places(subject: str, part: Trajectory, robot: Robot) -> Iterator[Finding]:
+    lengths = [k for k, name in enumerate(part.coordinates) if name in ("x", "y", "z")]
+    if not lengths:
+        return
+    farthest = float(np.nanmax(np.abs(part.values[:, lengths])))
+    reach = float(np.abs(robot.entries_m).max())
+    if farthest > max(FARTHEST_M, 20.0 * reach):
+        text = f"the platform is {farthest:g} m from the origin, the pulleys within {reach:g} m"
+        yield Finding("error", subject, text, "the unit is metres")
+    still = float(np.nanmax(np.nanstd(part.values[:, lengths], axis=0)))
+    if still < 1e-4:
+        text = f"the platform hardly moves (std {1e3 * still:.3f} mm)"
+        yield Finding("warning", subject, text, "set it swinging, or correct window_s")
+
+
+def _cables(subject: str, run: SwingRun, part: Trajectory, robot: Robot) -> Iterator[Finding]:
+    model = build_model(robot)
+    poses = part.values[part.is_known]
+    lengths = evaluate(model.lengths, poses, model.start_values)[0].reshape(len(poses), -1)
+    if not np.isfinite(lengths).all():
+        text = "the poses put a cable inside its pulley or on its swivel axis"
+        yield Finding("error", subject, text, "check the base frame of the poses and entry_m")
+        return
+    for cable, column in zip(robot.cables, lengths.T, strict=True):
+        spread = float(np.ptp(np.percentile(column, [1.0, 99.0])))
+        if spread > LENGTH_CHANGE_M:
+            text = f"cable {cable.name}'s length changes by {1e3 * spread:.1f} mm along the run"
+            remedy = "it went slack, slipped on its drum, or the geometry is wrong"
+            yield Finding("warning", subject, text, remedy)
+    if run.lengths_m is not None:
+        off = lengths.mean(axis=0) - run.lengths_m
+        for cable, difference in zip(robot.cables, off, strict=True):
+            if abs(difference) > LENGTH_DIFFERENCE_M:
+                text = f"cable {cable.name} is {1e3 * difference:+.0f} mm from its cable_lengths_m"
+                remedy = "lengths count from D over the pulley: l = |rho| + r (pi - psi)"
+                yield Finding("warning", subject, text, remedy)

@@ -1,0 +1,83 @@
+"""Footage: which camera files are there, and whether their frames and stamps fit together."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from cdpr.documents import InputError
+from freeswing.doctor.finding import Finding
+from freeswing.session import Run, Session
+
+VIDEO_SUFFIXES = (".mkv", ".avi", ".mp4", ".mov")
+IMAGE_SUFFIXES = (".png", ".bmp", ".tif", ".tiff", ".pgm", ".jpg", ".jpeg")
+
+
+def calibration_findings(session: Session) -> Iterator[Finding]:
+    """Cameras that are known, or can be calibrated."""
+    if not session.video_runs:
+        return
+    has_cameras = session.cameras is not None and session.cameras.is_file()
+    source = session.calibration
+    if has_cameras:
+        yield from _camera_file(session)
+    elif source is None or source.recordings is None:
+        text = "there are videos, but neither cameras.toml nor calibration recordings"
+        yield Finding("error", "cameras", text, "add one of them")
+    else:
+        yield Finding("note", "cameras", "not calibrated yet", "run freeswing calibrate")
+    if source is not None and source.recordings is not None:
+        if not camera_names(source.recordings):
+            text = f"{source.recordings} holds no <camera>.mkv and no <camera>/*.png"
+            yield Finding("error", "calibration", text, "correct calibration.recordings")
+        if not source.base_tags:
+            text = "no base_tags: nothing ties the cameras to the base frame"
+            yield Finding("warning", "calibration", text, "survey a tag on the frame")
+    if session.target is None:
+        yield Finding("error", "target", "videos need a target.toml", "name the tags or markers")
+
+
+def video_findings(session: Session, run: Run) -> Iterator[Finding]:
+    """Every camera of the session has a recording of the run."""
+    subject = f"run {run.name}"
+    folder = run.video or Path()
+    found = camera_names(folder)
+    if not found:
+        text = f"{folder} holds no <camera>.mkv and no <camera>/*.png"
+        yield Finding("error", subject, text, "correct video")
+        return
+    if session.cameras is not None and session.cameras.is_file():
+        from calib.cameras_file import read_cameras
+
+        try:
+            known = {camera.name for camera in read_cameras(session.cameras)}
+        except InputError:
+            return
+        for name in sorted(known - found):
+            yield Finding("warning", subject, f"camera {name} has no recording")
+        for name in sorted(found - known):
+            text = f"camera {name} is not in {session.cameras.name}"
+            yield Finding("warning", subject, text, "its recording is not used")
+
+
+def camera_names(folder: Path) -> set[str]:
+    """Names of the cameras that have a video or a folder of images here."""
+    if not folder.is_dir():
+        return set()
+    places = list(folder.iterdir())
+    videos = {p.stem for p in places if p.is_file() and p.suffix.lower() in VIDEO_SUFFIXES}
+    images = {p.name for p in places if p.is_dir() and _has_image(p)}
+    return videos | images
+
+
+def _has_image(folder: Path) -> bool:
+    return any(file.suffix.lower() in IMAGE_SUFFIXES for file in folder.iterdir())
+
+
+def _camera_file(session: Session) -> Iterator[Finding]:
+    from calib.cameras_file import read_cameras
+
+    try:
+        read_cameras(session.cameras or Path())
+    except InputError as failure:
+        yield Finding("error", "cameras", str(failure).replace("\n", " "))
