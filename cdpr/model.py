@@ -32,7 +32,7 @@ class Model:
         lengths: (zeta, values) -> l (n,).
         cables: (zeta, values) -> l, sigma, psi (n,) each and their Jacobians by zeta (n, 6).
         cable_rates: (zeta, rates, values) -> d/dt of these three Jacobians (n, 6).
-        twist: (zeta, rates, accelerations) -> v (6,), dv/dt (6,) in the base frame.
+        twist_map: (zeta, rates) -> D (6, 6) with twist v = D zeta_dot (eq. 2), and dD/dt (6, 6).
         acceleration: (t, zeta, rates, inertia, values) -> zeta_ddot (6,), tau / m (n,).
         told: (t, zeta, rates, inertia, values) -> the lengths a winch would tell (n,).
         told_rate: (t, zeta, rates, inertia, values) -> dl/dt that the effects impose (n,).
@@ -49,7 +49,7 @@ class Model:
     lengths: Function
     cables: Function
     cable_rates: Function
-    twist: Function
+    twist_map: Function
     acceleration: Function
     told: Function
     told_rate: Function
@@ -161,9 +161,8 @@ def _functions(robot: Robot, s: _Symbols, geometry: Geometry, owned: Owned) -> d
         if change is not None:
             turn_back = ca.solve(spin, change[3:])
             measured = measured + ca.vertcat(change[:3], turn_back)
-    accelerations = ca.SX.sym("accelerations", 6)
-    twist = ca.vertcat(s.rates[:3], instant.omega)
-    twist_rate = along(twist, s.zeta, s.rates) + along(twist, s.rates, accelerations)
+    twist_map = ca.diagcat(ca.SX.eye(3), spin)
+    twist_map_rate = along(twist_map, s.zeta, s.rates)
     rated = [along(j, s.zeta, s.rates) for j in jacobians]
 
     def function(
@@ -191,10 +190,10 @@ def _functions(robot: Robot, s: _Symbols, geometry: Geometry, owned: Owned) -> d
         "lengths": function("lengths", pose, {"lengths": lengths}),
         "cables": function("cables", pose, columns | dict(zip(matrices, jacobians, strict=True))),
         "cable_rates": function("cable_rates", moving, dict(zip(matrices, rated, strict=True))),
-        "twist": function(
-            "twist",
-            {"zeta": s.zeta, "rates": s.rates, "accelerations": accelerations},
-            {"twist": twist, "twist_rate": twist_rate},
+        "twist_map": function(
+            "twist_map",
+            {"zeta": s.zeta, "rates": s.rates},
+            {"matrix_map": twist_map, "matrix_rate": twist_map_rate},
         ),
         "acceleration": function("acceleration", everything, held),
         "told": function("told", everything, {"told": lengths - motion.change}),

@@ -194,7 +194,7 @@ class _Stepper:
                 return None, 0.4
             # The next change would be about change^2 / last: stop when that is negligible.
             ratio = change / last if np.isfinite(last) else 1.0
-            if change * min(1.0, ratio) < 0.1 * self.tolerance:
+            if change * min(1.0, ratio) < 1e-3 * self.tolerance:
                 break
         else:
             return None, 0.5
