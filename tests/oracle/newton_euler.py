@@ -16,6 +16,7 @@ from numba import njit
 
 from tests.oracle.forces import add_force, applied_wrench, bob_at_rest, bob_force, friction_force
 from tests.oracle.geometry import (
+    add,
     cable,
     cross,
     dot,
@@ -23,7 +24,9 @@ from tests.oracle.geometry import (
     length_acceleration,
     quaternion_rate,
     rotate,
+    rotate_back,
     rotation_of,
+    scaled,
     solve_factored,
     turn,
 )
@@ -31,7 +34,7 @@ from tests.oracle.world import Array, World
 
 STATE_SIZE = 19
 RIGID_STEP_S = 5e-4
-ELASTIC_STEP_S = 1e-4
+ELASTIC_STEP_S = 2.5e-4
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,10 +173,11 @@ def _bob(state, p, R, v, omega, world, wrench, out):
     if world.bob_mass <= 0.0:
         return
     arm = rotate(R, world.bob_pivot)
-    pull = bob_force(p + arm, v + cross(omega, arm), state[13:16], state[16:19], world)
+    pull = bob_force(add(p, arm), add(v, cross(omega, arm)), state[13:16], state[16:19], world)
     add_force(wrench, pull, arm)
     out[13:16] = state[16:19]
-    out[16:19] = world.gravity - pull / world.bob_mass
+    for k in range(3):
+        out[16 + k] = world.gravity[k] - pull[k] / world.bob_mass
 
 
 @njit(cache=True)
@@ -212,11 +216,7 @@ def _inertial_bias(R, omega, world, wrench):
     """Takes the centripetal and gyroscopic terms from the wrench."""
     s = rotate(R, world.com)
     centripetal = cross(omega, cross(omega, s))
-    local = np.zeros(3)
-    for i in range(3):
-        for j in range(3):
-            local[i] += R[j, i] * omega[j]
-    momentum = rotate(R, rotate(world.inertia, local))
+    momentum = rotate(R, rotate(world.inertia, rotate_back(R, omega)))
     gyro = cross(omega, momentum)
     for k in range(3):
         wrench[k] -= world.mass * centripetal[k]
@@ -238,9 +238,9 @@ def constraint_rows(p, R, v, omega, world):
         arm = rotate(R, world.attach[i])
         t, n, w = frames[i, 0], frames[i, 1], frames[i, 2]
         length, rho, psi, s = cable(
-            world.entry[i], world.radius[i], world.swivel[i], p + arm, t, n, w
+            world.entry[i], world.radius[i], world.swivel[i], add(p, arm), t, n, w
         )
-        velocity = v + cross(omega, arm)
+        velocity = add(v, cross(omega, arm))
         gamma[i] = length_acceleration(world.radius[i], t, n, w, rho, psi, s, velocity)
         gamma[i] += dot(t, cross(omega, cross(omega, arm)))
         moment = cross(arm, t)
@@ -261,10 +261,10 @@ def _cable_weight(R, omega, arms, scalars, world, mass, wrench):
         return
     for i in range(arms.shape[0]):
         hanging = world.density * scalars[i, 1]
-        add_force(wrench, 0.5 * hanging * world.gravity, arms[i])
+        add_force(wrench, scaled(0.5 * hanging, world.gravity), arms[i])
         moving = hanging / 3.0
         centripetal = cross(omega, cross(omega, arms[i]))
-        add_force(wrench, -moving * centripetal, arms[i])
+        add_force(wrench, scaled(-moving, centripetal), arms[i])
         for k in range(3):
             mass[k, k] += moving
         _add_skew(mass, moving, arms[i])
@@ -319,7 +319,7 @@ def _solve_tensions(time, v, omega, world, mass, wrench, J, gamma, arms, frames,
 @njit(cache=True)
 def _friction(v, omega, world, arms, frames, scalars, tension, wrench):
     for i in range(arms.shape[0]):
-        velocity = v + cross(omega, arms[i])
+        velocity = add(v, cross(omega, arms[i]))
         force = friction_force(
             i, world, tension[i], velocity, frames[i, 1], frames[i, 2], scalars[i, 1], scalars[i, 3]
         )
@@ -418,8 +418,9 @@ def energy(time, state, world, tension_energy):
     for i in range(6):
         for j in range(6):
             total += 0.5 * state[7 + i] * mass[i, j] * state[7 + j]
-    total -= world.mass * dot(world.gravity, p + rotate(R, world.com))
-    line = world.tether_anchor - p - rotate(R, world.tether_point)
+    total -= world.mass * dot(world.gravity, add(p, rotate(R, world.com)))
+    end = add(p, rotate(R, world.tether_point))
+    line = add(world.tether_anchor, scaled(-1.0, end))
     distance = math.sqrt(dot(line, line))
     total += 0.5 * world.tether_stiffness * max(0.0, distance - world.tether_rest) ** 2
     total += 0.5 * world.torsion * (math.atan2(R[1, 0], R[0, 0]) - world.torsion_yaw) ** 2

@@ -44,7 +44,7 @@ def nominal_body(name: str) -> Body:
 
 
 def true_body(name: str, rng: np.random.Generator) -> Body:
-    """A body a few percent off the CAD values: mass, centre of mass, principal inertias and axes."""
+    """A body a few percent off the CAD values: mass, centre, principal inertias, axes."""
     com = np.array([0.0, 0.0, _COM_HEIGHT_M[name]]) + rng.normal(0.0, [0.004, 0.004, 0.005])
     principal = np.array(_COM_INERTIA[name]) * (1.0 + rng.uniform(-0.05, 0.05, 3))
     axes = np.linalg.qr(np.eye(3) + rng.normal(0.0, 0.04, (3, 3)))[0]
