@@ -1,0 +1,105 @@
+"""What really happened in the demonstration: robot, body, an undeclared effect, the swings.
+
+The robot and the cable lengths of the swings are those of Ida, Briot, Carricato 2022 (Tables 1
+and 2, eq. 43; columns 1, 2 and 5 are left out: near-singular in x, y).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdpr.batch import evaluate
+from cdpr.model import Model, build_model
+from cdpr.robot import Array, Cable, Platform, Robot
+from cdpr.simulation import Motion, simulate
+from cdpr.statics import Equilibrium, equilibrium_at_lengths, modes
+
+EFFECT = "translational_drag"
+EFFECT_VALUES = (0.05, 0.6)
+NOMINAL_COM_M = (0.0, 0.0, 0.19)
+NOMINAL_INERTIA_M2 = (0.051, 0.069, 0.037, 0.0, 0.0, 0.0)
+TRUE_INERTIA = np.array([0.0016, -0.0025, 0.196, 0.0538, 0.0661, 0.0352, 2e-4, -9e-4, 7e-4])
+SWINGS = (
+    ("swing-01", "identify", (1.30, 1.26, 1.57, 1.56)),
+    ("swing-02", "identify", (1.52, 1.26, 1.27, 1.50)),
+    ("swing-03", "identify", (1.38, 1.39, 1.36, 1.32)),
+    ("swing-04", "identify", (1.19, 1.15, 1.65, 1.65)),
+    ("swing-05", "identify", (1.43, 1.37, 1.27, 1.30)),
+    ("swing-06", "identify", (1.35, 1.45, 1.42, 1.28)),
+    ("check-01", "validate", (1.16, 1.17, 1.63, 1.59)),
+    ("check-02", "validate", (1.46, 1.16, 1.24, 1.50)),
+    ("check-03", "validate", (1.52, 1.12, 1.17, 1.54)),
+)
+SWING_AMPLITUDE_M = 0.035
+
+
+@dataclass(frozen=True, slots=True)
+class Swing:
+    """One swing as it was.
+
+    Attributes:
+        name: of the run.
+        role: identify or validate.
+        lengths_m: of the locked cables, (n,).
+        motion: from the release on, starting at 0 s.
+    """
+
+    name: str
+    role: str
+    lengths_m: Array
+    motion: Motion
+
+
+def demo_robot() -> Robot:
+    """The robot as its files declare it."""
+    x, y, z = np.eye(3)
+    rows = (
+        ((0.219, -1.316, 0.527), (-0.144, -0.219, 0.264), y, -x),
+        ((2.295, -1.158, 0.521), (0.115, -0.233, 0.270), -x, -y),
+        ((2.153, 0.973, 0.560), (0.142, 0.220, 0.266), -y, x),
+        ((0.0532, 0.796, 0.532), (-0.120, 0.236, 0.266), x, y),
+    )
+    cables = tuple(
+        Cable(str(k), np.array(entry), 0.025, np.array(attachment), swivel_x, -z, swivel_z)
+        for k, (entry, attachment, swivel_x, swivel_z) in enumerate(rows, start=1)
+    )
+    platform = Platform(8.0, np.array(NOMINAL_COM_M), np.array(NOMINAL_INERTIA_M2))
+    return Robot("demo-4", cables, free_coordinates=("x", "y"), platform=platform)
+
+
+def demo_swings(generator: np.random.Generator, duration_s: float) -> tuple[Swing, ...]:
+    """The swings, each released at rest beside an equilibrium of its own."""
+    model = build_model(demo_robot(), (EFFECT,))
+    values = np.array(EFFECT_VALUES)
+    swings = []
+    for name, role, lengths in SWINGS:
+        held = np.array(lengths)
+        rest = _rest(model, held, values)
+        zeta = _release(model, rest, held, values, generator)
+        span = (0.0, duration_s)
+        motion = simulate(model, zeta, np.zeros(6), span, TRUE_INERTIA, values)
+        swings.append(Swing(name, role, held, motion))
+    return tuple(swings)
+
+
+def _rest(model: Model, lengths_m: Array, values: Array) -> Equilibrium:
+    start = np.array([1.2, -0.2, -0.6, 0.0, 0.0, 0.0])
+    rest = equilibrium_at_lengths(model, lengths_m, start, TRUE_INERTIA, values)
+    if rest is None or not (rest.stable and rest.taut):
+        raise ValueError(f"no stable equilibrium with taut cables at lengths {lengths_m} m")
+    return rest
+
+
+def _release(
+    model: Model, rest: Equilibrium, lengths_m: Array, values: Array, generator: np.random.Generator
+) -> Array:
+    """A pose beside the equilibrium, on the held lengths, reached along its modes."""
+    shapes = modes(model, rest, TRUE_INERTIA, values).shapes
+    heading = shapes @ (generator.uniform(0.5, 1.0, shapes.shape[1]) * generator.choice([-1, 1]))
+    zeta = rest.zeta + heading * SWING_AMPLITUDE_M / np.linalg.norm(heading[:3])
+    for _ in range(20):
+        outputs = evaluate(model.cables, zeta, values)
+        zeta = zeta - np.linalg.pinv(outputs[3]) @ (outputs[0] - lengths_m)
+    return zeta
