@@ -130,21 +130,30 @@ def choose_free_coordinates(
     return choices[best], worst[best]
 
 
-def admissible_rates(model: Model, zeta: Array, rates: Array, length_rates: Array, values: Array):
-    """The rates closest to `rates` under which the cables lengthen at `length_rates`.
+def admissible_rates(
+    model: Model,
+    zeta: Array,
+    rates: Array,
+    inertia: Array,
+    values: Array | None = None,
+    time_s: float = 0.0,
+) -> Array:
+    """The rates closest to `rates`, (6,), that the locked (or, by an effect, creeping) cables allow.
 
     Args:
         model: the robot.
         zeta: pose, (6,).
         rates: wished rates, (6,).
-        length_rates: dl/dt, (n,).
+        inertia: `INERTIA_NAMES` values, (9,).
         values: effect values, (k,).
-
-    Returns:
-        Rates, (6,).
+        time_s: time since the start of the run.
     """
+    values = model.start_values if values is None else values
     jacobian = evaluate(model.cables, zeta, values)[3]
-    return rates + np.linalg.pinv(jacobian) @ (length_rates - jacobian @ rates)
+    for _ in range(3):
+        slip = evaluate(model.slip, time_s, zeta, rates, inertia, values)[0]
+        rates = rates - np.linalg.pinv(jacobian) @ slip
+    return rates
 
 
 @dataclass(frozen=True, slots=True)

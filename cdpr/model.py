@@ -35,7 +35,8 @@ class Model:
         twist_map: (zeta, rates) -> D (6, 6) with twist v = D zeta_dot (eq. 2), and dD/dt (6, 6).
         acceleration: (t, zeta, rates, inertia, values) -> zeta_ddot (6,), tau / m (n,).
         told: (t, zeta, rates, inertia, values) -> the lengths a winch would tell (n,).
-        told_rate: (t, zeta, rates, inertia, values) -> dl/dt that the effects impose (n,).
+        slip: (t, zeta, rates, inertia, values) -> dl/dt of the pose less what the effects impose
+            (n,): zero for a state that the cables allow.
         measured: (t, zeta, rates, inertia, values) -> what is measured of the pose (6,).
         lagrangian: (zeta, multipliers, inertia, values) -> potential + multipliers . lengths,
             its gradient (6,) and Hessian (6, 6).
@@ -52,7 +53,7 @@ class Model:
     twist_map: Function
     acceleration: Function
     told: Function
-    told_rate: Function
+    slip: Function
     measured: Function
     lagrangian: Function
     mass_matrix: Function
@@ -197,7 +198,7 @@ def _functions(robot: Robot, s: _Symbols, geometry: Geometry, owned: Owned) -> d
         ),
         "acceleration": function("acceleration", everything, held),
         "told": function("told", everything, {"told": lengths - motion.change}),
-        "told_rate": function("told_rate", everything, {"told_rate": motion.change_rate}),
+        "slip": function("slip", everything, {"slip": jacobians[0] @ s.rates - motion.change_rate}),
         "measured": function("measured", everything, {"measured": measured}),
         "lagrangian": function(
             "lagrangian",
