@@ -269,7 +269,9 @@ def _all_residuals(scene: Scene, problem: Problem) -> tuple[Array, Array]:
         views = problem.views.select(own)
         board[own] = board_residuals(scene, problem.board_points_m, views, index)
     fixed = problem.fixed
-    return board, np.zeros((0, 2)) if fixed is None else fixed_residuals(scene, fixed)
+    if fixed is None:
+        return board, np.zeros((0, 2))
+    return board, fixed_residuals(scene, fixed)
 
 
 def _cost(scene: Scene, problem: Problem, sigma: Array) -> float:
