@@ -138,7 +138,7 @@ def admissible_rates(
     values: Array | None = None,
     time_s: float = 0.0,
 ) -> Array:
-    """The rates closest to `rates`, (6,), that the locked (or, by an effect, creeping) cables allow.
+    """The rates closest to `rates`, (6,), that the cables allow, creeping ones included.
 
     Args:
         model: the robot.
