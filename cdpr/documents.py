@@ -32,9 +32,9 @@ __all__ = [
     "write_json",
 ]
 
-MOST_TOML_BYTES = 16 * 2**20
+MOST_TOML_BYTES = 4 * 2**20
 FORMAT_NUMBER = 1
-MOST_REPEATED_KEYS = 40
+MOST_REPEATED_KEYS = 20
 
 
 def read_bytes(path: Path | str, most_bytes: int) -> bytes:
@@ -114,7 +114,7 @@ def replace_file(path: Path | str, data: bytes) -> None:
         InputError: when the file cannot be written.
     """
     path = Path(path)
-    draft = path.with_name(f".{path.name[:100]}.{secrets.token_hex(6)}.part")
+    draft = path.with_name(f".{secrets.token_hex(8)}.part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with draft.open("xb") as file:
@@ -161,7 +161,9 @@ def _parse(path: Path, text: str, repeated: Problems) -> dict[str, object]:
             line = lines[number - 1].strip()
             is_repeat = "Cannot overwrite a value" in str(error)
             if not is_repeat or not re.match(r"[\w.\"' -]+=", line):
-                raise InputError(f"{path}: not TOML: {error}: {line[:80]!r}") from error
+                raise InputError(
+                    f"{path}: line {number}: not TOML: {error}: {line[:80]!r}"
+                ) from error
             key = line.partition("=")[0].strip()
             repeated.add(f"line {number}: {key}", "this key is already given above")
             lines[number - 1] = ""

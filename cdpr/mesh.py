@@ -67,7 +67,7 @@ def _load(path: Path):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             mesh = trimesh.load_mesh(io.BytesIO(data), file_type=path.suffix.lower()[1:])
-    except Exception as error:
+    except Exception as error:  # a damaged mesh can raise anything in its parser
         raise InputError(
             f"{path}: not a readable mesh ({type(error).__name__}: {error})"
         ) from error

@@ -15,6 +15,7 @@ from cdpr.problems import InputError
 Array = NDArray[np.float64]
 
 MOST_TEXT_BYTES = 128 * 2**20
+LARGEST_NUMBER = 1e12
 MISSING = ("", "nan", "-nan", "+nan", "na", "n/a", "null")
 
 
@@ -120,9 +121,10 @@ def _number(path: Path | str, number: int, cell: str, column: str) -> float:
 
 
 def _check_finite(path: Path | str, table: NumberTable, columns: tuple[str, ...]) -> None:
-    rows, cells = np.nonzero(np.isinf(table.values))
+    rows, cells = np.nonzero(np.abs(table.values) > LARGEST_NUMBER)
     if len(rows):
         raise InputError(
-            f"{path}: line {table.lines[rows[0]]}: {columns[cells[0]]} is infinite "
-            "(leave the cell empty for a missing sample)"
+            f"{path}: line {table.lines[rows[0]]}: {columns[cells[0]]} is "
+            f"{table.values[rows[0], cells[0]]:.4g}, beyond {LARGEST_NUMBER:g}: check the unit; "
+            "leave the cell empty for a missing sample"
         )

@@ -14,6 +14,7 @@ Array = NDArray[np.float64]
 
 FEWEST_POINTS = 3
 LEAST_SPREAD = 0.02
+LEAST_SIZE_M = 1e-6
 LAYOUT_ROUNDS = 20
 LAYOUT_TOLERANCE_M = 1e-9
 
@@ -117,7 +118,7 @@ def is_planar_or_better(layout: ArrayLike) -> bool:
     if len(points) < FEWEST_POINTS:
         return False
     spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-    return bool(spread[1] > LEAST_SPREAD * spread[0])
+    return bool(spread[1] > max(LEAST_SPREAD * spread[0], LEAST_SIZE_M))
 
 
 def _usable(points: Array, weights: ArrayLike | None) -> tuple[Array, Array]:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from cdpr.documents import InputError, read_bytes, replace_file
 from cdpr.marker_recording import MarkerRecording
+from cdpr.number_table import LARGEST_NUMBER
 
 Array = NDArray[np.float64]
 
@@ -24,6 +25,8 @@ BYTE_ORDERS = {84: "<", 86: ">"}
 METRES_PER_UNIT = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 ITEM_TYPES = {-1: "S1", 1: "i1", 2: "i2", 4: "f4"}
 FULL_COUNT = 0xFFFF
+LEAST_RATE_HZ = 0.01
+MOST_RATE_HZ = 1e6
 
 
 def read_c3d(path: Path | str) -> MarkerRecording:
@@ -37,7 +40,9 @@ def read_c3d(path: Path | str) -> MarkerRecording:
     data = read_bytes(path, MOST_C3D_BYTES)
     try:
         return _read(Path(path), data)
-    except (IndexError, KeyError, UnicodeDecodeError) as error:
+    except InputError:
+        raise
+    except (IndexError, KeyError, ValueError, OverflowError) as error:
         raise InputError(f"{path}: a damaged C3D file ({error}); export it again") from error
 
 
@@ -86,7 +91,7 @@ class _Parameter:
             raise KeyError("a number stands where a text must be")
         width = self.dimensions[0]
         cells = [self.data[i : i + width] for i in range(0, len(self.data), max(width, 1))]
-        return [cell.decode("utf-8").strip(" \0") for cell in cells]
+        return [cell.decode("utf-8", "replace").strip(" \0") for cell in cells]
 
 
 def _read(path: Path, data: bytes) -> MarkerRecording:
@@ -102,8 +107,10 @@ def _read(path: Path, data: bytes) -> MarkerRecording:
     parameters = _parameters(data, start, order)
     header = np.frombuffer(data[:BLOCK], f"{order}u2")
     rate = parameters["POINT", "RATE"].numbers(order)[0]
-    if not 0.0 < rate < 1e6:
-        raise InputError(f"{path}: POINT:RATE is {rate}, must be above 0")
+    if not LEAST_RATE_HZ <= rate <= MOST_RATE_HZ:
+        raise InputError(
+            f"{path}: POINT:RATE is {rate} Hz, must be {LEAST_RATE_HZ:g} to {MOST_RATE_HZ:g}"
+        )
     first, n_frames = _frames(header, parameters, order)
     names = _names(path, parameters, order)
     positions = _points(path, data, header, parameters, order, n_frames, len(names))
@@ -213,9 +220,12 @@ def _points(
             f"on, the file has {len(data)}: it is cut short or damaged; export it again"
         )
     rows = np.frombuffer(data, item, n_frames * n_items, start).reshape(n_frames, n_items)
-    raw = rows[:, : 4 * n_points].reshape(n_frames, n_points, 4).astype(np.float64)
+    with np.errstate(invalid="ignore"):  # signalling NaNs of damaged files
+        raw = rows[:, : 4 * n_points].reshape(n_frames, n_points, 4).astype(np.float64)
     positions = raw[..., :3] * (1.0 if scale < 0.0 else scale)
     seen = (raw[..., 3] >= 0.0) & np.isfinite(positions).all(axis=2)
+    if np.abs(positions[seen]).max(initial=0.0) > LARGEST_NUMBER:
+        raise InputError(f"{path}: a coordinate is beyond {LARGEST_NUMBER:g}: the file is damaged")
     return np.where(seen[..., None], positions, np.nan)
 
 

@@ -144,7 +144,9 @@ def _exact_times(path: Path | str, table: NumberTable, rate: float, lines: list[
     frames, times = table.values[:, 0], table.values[:, 1]
     if len(times) < 2:
         return times
-    measured = 1.0 / float(np.median(np.diff(times)))
+    n_steps = frames[-1] - frames[0]
+    n_steps = float(n_steps) if n_steps > 0 else len(times) - 1.0
+    measured = n_steps / float(times[-1] - times[0])
     if abs(measured - rate) > RATE_TOLERANCE * rate:
         raise InputError(
             f"{path}: line 3: DataRate {rate:g}, but the Time column steps at {measured:.6g} Hz; "
