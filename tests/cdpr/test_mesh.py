@@ -110,8 +110,8 @@ def test_a_robot_file_takes_its_platform_from_a_mesh(tmp_path):
     platform = read_robot(path).platform
     assert platform.mass_kg == pytest.approx(500.0 * VOLUME, rel=1e-5)
     assert np.allclose(platform.specific_inertia_m2, box_inertia(), atol=1e-7)
-    path.write_text(ROBOT.format(more="com_m = [0.0, 0.0, 0.2]"))
-    assert read_robot(path).platform.com_m.tolist() == [0.0, 0.0, 0.2]
+    path.write_text(ROBOT.format(more="com_m = [0.021, -0.05, 0.2]"))
+    assert read_robot(path).platform.com_m.tolist() == [0.021, -0.05, 0.2]
 
 
 def test_a_robot_file_names_its_mesh_problem(tmp_path):

@@ -37,7 +37,7 @@ def test_corners_run_from_top_left_clockwise_seen_from_the_front(tmp_path):
     target = read_target(written(tmp_path, TEXT))
     front, back = target.tags
     offsets = np.array([[-1, 1, 0], [1, 1, 0], [1, -1, 0], [-1, -1, 0]]) * 0.04
-    assert np.allclose(front.corners_platform_m, offsets + [0.1, 0.2, 0.3], atol=1e-15)
+    assert np.allclose(front.corners_platform_m, offsets + np.array([0.1, 0.2, 0.3]), atol=1e-15)
     assert np.allclose(back.corners_platform_m, offsets * [1, -1, 1], atol=1e-15)
     top, side = front.corners_platform_m[1] - front.corners_platform_m[0], [0, -0.08, 0]
     assert np.cross(top, side)[2] < 0.0, "clockwise about the outward normal"

@@ -59,7 +59,7 @@ def test_a_window_holds_its_ends():
     assert window.times_s[[0, -1]].tolist() == [0.5, 1.0]
     assert len(window) == 51
     assert window.covariances.shape == (51, 6, 6)
-    with pytest.raises(DataError, match="no sample from 5 to 6 s; it lasts from 0 to 1.99 s"):
+    with pytest.raises(DataError, match=r"no sample from 5 to 6 s; it lasts from 0 to 1\.99 s"):
         swing().window(5.0, 6.0)
 
 

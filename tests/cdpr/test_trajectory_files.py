@@ -101,7 +101,7 @@ def test_csv_follows_the_robot(tmp_path):
     text = "t_s,z_m,y_m,x_m\n0,3,2,1\n"
     assert read(tmp_path, text, free=("x", "y")).values.tolist() == [[1.0, 2.0]]
     assert read(tmp_path, text).coordinates == ("z", "y", "x")
-    with pytest.raises(InputError, match="phi_rad missing; .* header t_s,x_m,phi_rad"):
+    with pytest.raises(InputError, match=r"phi_rad missing; .* header t_s,x_m,phi_rad"):
         read(tmp_path, text, free=("x", "phi"))
     six = "t_s,chi_rad,theta_rad,phi_rad,z_m,y_m,x_m\n0,6,5,4,3,2,1\n"
     assert read(tmp_path, six, free=("x", "y")).values.tolist() == [[1, 2, 3, 4, 5, 6]]
@@ -157,8 +157,8 @@ def test_tum_round_trip_without_missing_samples(tmp_path_factory, seed):
 
 
 def test_tum_order_is_x_y_z_w(tmp_path):
-    found = read(tmp_path, "# t x y z qx qy qz qw\n1.5 1 2 3 1 0 0 0\n", "a.tum")
-    assert found.values[0] == pytest.approx([1, 2, 3, np.pi, 0, 0])
+    found = read(tmp_path, "# t x y z qx qy qz qw\n1.5 1 2 3 0.6 0 0 0.8\n", "a.tum")
+    assert found.values[0] == pytest.approx([1, 2, 3, 2 * np.arcsin(0.6), 0, 0])
 
 
 def recording(seed=0, n=40, n_markers=5, first=0):
