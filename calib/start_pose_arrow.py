@@ -1,0 +1,239 @@
+"""Least squares with an arrow for a normal matrix: a small block a pose and one border for all.
+
+Levenberg-Marquardt with the poses eliminated (Schur complement), so that time and memory grow with
+the number of poses and not with its cube. Marquardt's scaling, Nielsen's rule for the damping.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+_RANK_LIMIT = 1e-13
+_SETTLED = 1e-11
+
+
+@dataclass(frozen=True, slots=True)
+class Linearization:
+    """Whitened residuals and their derivatives.
+
+    Attributes:
+        residuals: (N, m).
+        by_block: derivatives by the unknowns of each pose, (N, m, p).
+        by_border: derivatives by the shared unknowns, (N, m, b).
+        prior: whitened departures of the border from what was known before, (b,).
+        prior_weight: one over the prior's standard deviations, (b,); 0 where nothing was known.
+    """
+
+    residuals: Array
+    by_block: Array
+    by_border: Array
+    prior: Array
+    prior_weight: Array
+
+
+Linearize = Callable[[Array, Array], Linearization]
+
+
+@dataclass(frozen=True, slots=True)
+class ArrowSolution:
+    """Where the iteration stopped.
+
+    Attributes:
+        blocks: unknowns of each pose, (N, p).
+        border: shared unknowns, (b,).
+        linearization: at the solution, without the robust weights.
+        weights: robust weights at the solution, (N, m), 1 for an ordinary residual.
+        cost: half the robust sum of squares.
+        iterations: linearizations used.
+        stop: a sentence.
+        converged: False when the iterations ran out.
+    """
+
+    blocks: Array
+    border: Array
+    linearization: Linearization
+    weights: Array
+    cost: float
+    iterations: int
+    stop: str
+    converged: bool
+
+
+@dataclass(frozen=True, slots=True)
+class ArrowCovariance:
+    """Covariance of an arrow's unknowns, never formed as a whole.
+
+    Attributes:
+        border: (b, b); NaN when the rank is short.
+        gain: A^-1 B of each pose, (N, p, b).
+        block_inverse: A^-1 of each pose, (N, p, p).
+        singular_values: of the border's reduced Jacobian, in the border's own units, falling, (b,).
+        rank: how many of them the readings determine.
+    """
+
+    border: Array
+    gain: Array
+    block_inverse: Array
+    singular_values: Array
+    rank: int
+
+    @property
+    def conditioning(self) -> float:
+        """Largest over smallest singular value of the border's reduced Jacobian."""
+        return float(self.singular_values[0] / self.singular_values[-1])
+
+    def blocks(self) -> Array:
+        """Covariance of each pose, (N, p, p)."""
+        return self.block_inverse + self.gain @ self.border @ self.gain.swapaxes(1, 2)
+
+    def block(self, index: int) -> Array:
+        """Covariance of one pose, (p, p)."""
+        gain = self.gain[index]
+        return self.block_inverse[index] + gain @ self.border @ gain.T
+
+    def predicted(self, by_block: Array, by_border: Array) -> Array:
+        """Variance of each fitted residual, (N, m), from the derivatives of `Linearization`."""
+        through = by_border - by_block @ self.gain
+        own = np.einsum("nmp,npq,nmq->nm", by_block, self.block_inverse, by_block, optimize=True)
+        return own + np.einsum("nmb,bc,nmc->nm", through, self.border, through, optimize=True)
+
+
+def huber_weights(residuals: Array, limit: float) -> Array:
+    """Weights of Huber's loss: 1 up to `limit` standard deviations, then limit / |residual|."""
+    return limit / np.maximum(np.abs(residuals), limit) if np.isfinite(limit) else residuals * 0 + 1
+
+
+def solve_arrow(
+    linearize: Linearize,
+    blocks: Array,
+    border: Array,
+    *,
+    loss_limit: float = np.inf,
+    tolerance: float = 1e-12,
+    max_iterations: int = 100,
+) -> ArrowSolution:
+    """Minimise the (Huber) sum of squares over blocks (N, p) and border (b,).
+
+    A step is final when it changes no unknown by more than `tolerance`, or when the cost has
+    settled or cannot fall any more in double precision.
+    """
+    current = linearize(blocks, border)
+    cost = _robust_cost(current, loss_limit)
+    damping, growth = 1e-4, 2.0
+    normal = _normal_equations(current, loss_limit)
+    for iteration in range(1, max_iterations + 1):
+        step_blocks, step_border, predicted = _damped_step(normal, damping)
+        size = max(np.abs(step_blocks).max(), np.abs(step_border).max())
+        trial = linearize(blocks + step_blocks, border + step_border)
+        trial_cost = _robust_cost(trial, loss_limit)
+        if np.isfinite(trial_cost) and trial_cost < cost:
+            ratio = (cost - trial_cost) / max(predicted, 1e-300)
+            blocks, border = blocks + step_blocks, border + step_border
+            before, current, cost = cost, trial, trial_cost
+            damping *= max(1 / 30, 1 - (2 * ratio - 1) ** 3)
+            damping, growth = max(damping, 1e-15), 2.0
+            if size < tolerance:
+                return _finish(blocks, border, current, loss_limit, cost, iteration, "small step")
+            if before - cost < _SETTLED * cost:
+                return _finish(blocks, border, current, loss_limit, cost, iteration, "cost settled")
+            normal = _normal_equations(current, loss_limit)
+            continue
+        if size < tolerance or predicted <= 1e-14 * cost:
+            return _finish(
+                blocks, border, current, loss_limit, cost, iteration, "cost at its floor"
+            )
+        damping, growth = damping * growth, growth * 2
+    text = f"no convergence after {max_iterations} iterations"
+    return _finish(blocks, border, current, loss_limit, cost, max_iterations, text, False)
+
+
+def covariance(linearization: Linearization, weights: Array) -> ArrowCovariance:
+    """Covariance for whitened residuals, with the rank of the border.
+
+    The border's covariance is NaN where `rank` falls short of its size.
+    """
+    block, mixed, border, _, _ = _weighted(linearization, weights)
+    inverse: Array = np.linalg.inv(block).astype(np.float64)
+    gain = inverse @ mixed
+    reduced = border - np.einsum("npb,npc->bc", mixed, gain)
+    reduced = (reduced + reduced.T) / 2
+    scale = 1 / np.sqrt(np.maximum(np.diag(border), 1e-300))
+    share = np.linalg.eigvalsh(reduced * np.outer(scale, scale))
+    rank = int((share > _RANK_LIMIT * len(weights)).sum())
+    values = np.sqrt(np.maximum(np.linalg.eigvalsh(reduced)[::-1], 1e-300))
+    known = rank == len(border)
+    result = np.linalg.inv(reduced) if known else np.full_like(reduced, np.nan)
+    return ArrowCovariance(result, gain, inverse, values, rank)
+
+
+def _robust_cost(linearization: Linearization, limit: float) -> float:
+    size = np.abs(linearization.residuals)
+    inside = np.minimum(size, limit)
+    beyond = 0.0 if np.isinf(limit) else limit * (size - inside).sum()
+    return float(0.5 * (inside**2).sum() + beyond + 0.5 * (linearization.prior**2).sum())
+
+
+def _weighted(
+    linearization: Linearization, weights: Array
+) -> tuple[Array, Array, Array, Array, Array]:
+    """Blocks, mixed part and border of the normal matrix, and both gradients."""
+    by_block = linearization.by_block
+    turned = (by_block * weights[..., None]).swapaxes(1, 2)
+    flat = linearization.by_border.reshape(-1, linearization.by_border.shape[-1])
+    heavy = flat * weights.reshape(-1, 1)
+    residuals = linearization.residuals
+    return (
+        turned @ by_block,
+        turned @ linearization.by_border,
+        flat.T @ heavy + np.diag(linearization.prior_weight**2),
+        (turned @ residuals[..., None])[..., 0],
+        heavy.T @ residuals.ravel() + linearization.prior_weight * linearization.prior,
+    )
+
+
+def _normal_equations(
+    linearization: Linearization, limit: float
+) -> tuple[Array, Array, Array, Array, Array]:
+    return _weighted(linearization, huber_weights(linearization.residuals, limit))
+
+
+def _damped_step(
+    normal: tuple[Array, Array, Array, Array, Array], damping: float
+) -> tuple[Array, Array, float]:
+    """Steps of the blocks and the border, and the fall of cost that the linear model promises."""
+    block, mixed, border, slope_block, slope_border = normal
+    diagonal = np.einsum("npp->np", block)
+    damped = block.copy()
+    np.einsum("npp->np", damped)[...] += damping * diagonal + 1e-300
+    solved = np.linalg.solve(damped, np.concatenate([mixed, slope_block[..., None]], axis=-1))
+    gain, shift = solved[..., :-1], solved[..., -1]
+    reduced = border - np.einsum("npb,npc->bc", mixed, gain, optimize=True)
+    np.einsum("bb->b", reduced)[...] += damping * np.diag(border) + 1e-300
+    right = slope_border - np.einsum("npb,np->b", mixed, shift, optimize=True)
+    step_border = -np.linalg.solve(reduced, right)
+    step_blocks = -(shift + gain @ step_border)
+    linear = -(slope_block * step_blocks).sum() - slope_border @ step_border
+    quadratic = (damping * diagonal * step_blocks**2).sum() + damping * (
+        np.diag(border) @ step_border**2
+    )
+    return step_blocks, step_border, float(0.5 * (linear + quadratic))
+
+
+def _finish(
+    blocks: Array,
+    border: Array,
+    linearization: Linearization,
+    limit: float,
+    cost: float,
+    iterations: int,
+    stop: str,
+    converged: bool = True,
+) -> ArrowSolution:
+    weights = huber_weights(linearization.residuals, limit)
+    return ArrowSolution(blocks, border, linearization, weights, cost, iterations, stop, converged)
