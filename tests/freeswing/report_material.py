@@ -1,0 +1,133 @@
+"""Result documents as the commands write them, for the report's tests."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from cdpr.robot import INERTIA_NAMES
+from freeswing.report.material import Material
+
+VALUES = (0.0016, -0.0025, 0.2, 0.0563, 0.0627, 0.0322, 1e-4, -3e-4, 2e-4)
+HOSTILE = "<script>alert('x')</script> & \"quotes\""
+
+
+def whole_material(title: str = "lab-day-1") -> Material:
+    """Every result that a session can have."""
+    rng = np.random.default_rng(0)
+    kinds = {"fidim_free": 2.0, "fidim_full": 1.5, "ml_free": 0.2, "ml_full": 0.1}
+    return Material(
+        title,
+        calibration={"format": "freeswing-calibration/1"},
+        tracking={"format": "freeswing-tracking/1"},
+        identification={
+            "format": "freeswing-identification/1",
+            "estimates": {name: _estimate(spread, rng) for name, spread in kinds.items()},
+            "comparison": {
+                kind: [{"name": n, "difference_percent": 1.2, "z": 0.4} for n in INERTIA_NAMES]
+                for kind in ("fidim", "ml")
+            },
+            "validation": [_validation(f"check-{k:02d}", rng) for k in range(8)],
+            "swings": [_swing(k, rng) for k in range(12)],
+            "entries_m": [[0.2, -1.3, 0.5], [2.3, -1.2, 0.5], [2.2, 1.0, 0.6], [0.1, 0.8, 0.5]],
+            "provenance": {
+                "versions": {"freeswing": "0.1.0"},
+                "settings": {},
+                "inputs": {"robot.toml": "ab" * 32},
+            },
+        },
+        diagnosis=_diagnosis(),
+        motion={"format": "freeswing-motion/1", "runs": [_motion(k, rng) for k in range(5)]},
+        notes=("warning run swing-03: 12 % of the samples are missing",),
+    )
+
+
+def _estimate(spread: float, rng: np.random.Generator) -> dict[str, Any]:
+    return {
+        "parameters": [
+            {
+                "name": name,
+                "value": value + spread * abs(value) * 0.02 * rng.normal(),
+                "std": spread * abs(value) * 0.02,
+                "std_percent": 2 * spread,
+                "essential": abs(value) > 1e-3,
+            }
+            for name, value in zip(INERTIA_NAMES, VALUES, strict=True)
+        ],
+        "sigma_W": 0.1,
+        "cost_C": 8.4,
+        "samples": 15000,
+        "dropped_runs": [{"run": "swing-03", "why": f"12 % of the samples are missing {HOSTILE}"}],
+    }
+
+
+def _validation(run: str, rng: np.random.Generator) -> dict[str, Any]:
+    sigma = 0.2 + 0.1 * rng.random()
+    return {
+        "run": run,
+        "sigma_perp": sigma,
+        "prediction_rmse_m": 0.004,
+        "noise_floor_m": 0.0001,
+    }
+
+
+def _swing(k: int, rng: np.random.Generator) -> dict[str, Any]:
+    place = [1.0 + 0.5 * rng.random(), rng.random() - 0.5, -0.9]
+    return {
+        "run": f"swing-{k:02d}",
+        "role": "identify" if k % 3 else "validate",
+        "equilibrium": {"position_m": place, "angles_rad": [0.01, 0.02, 0.3]},
+        "frequencies_hz": [0.61, 0.77],
+        "conditioning": 3.2,
+    }
+
+
+def _candidate(effect: str, verdict: str, gain: float | None, others: list[str]) -> dict[str, Any]:
+    bic = None if gain is None else -800.0 * gain
+    return {
+        "effect": effect,
+        "verdict": verdict,
+        "delta_bic": bic,
+        "held_out_gain": gain,
+        "confounded_with": others,
+    }
+
+
+def _diagnosis() -> dict[str, Any]:
+    drag = {"name": "rate_1_s", "value": 0.05, "std": 0.001}
+    return {
+        "format": "freeswing-diagnosis/1",
+        "before": {"sigma_perp": 0.9, "prediction_rmse_m": 0.011, "noise_floor_m": 1e-4},
+        "after": {"sigma_perp": 0.11, "prediction_rmse_m": 2e-4, "noise_floor_m": 1e-4},
+        "candidates": [
+            _candidate("translational_drag", "accepted", 0.93, []),
+            _candidate("quadratic_drag", "confounded", 0.4, ["translational_drag"]),
+            _candidate("tether", "rejected", -0.01, []),
+            _candidate("winch_creep", "not_identifiable", None, []),
+        ],
+        "accepted": [{"effect": "translational_drag", "parameters": [drag]}],
+        "parameters_before": [],
+        "parameters_after": [],
+        "unexplained": {
+            "present": True,
+            "signature": f"chi swings by 0.4 mrad at 7.3 Hz {HOSTILE}",
+            "evidence": {"frequency_hz": 7.3, "coordinate": "chi"},
+        },
+    }
+
+
+def _motion(k: int, rng: np.random.Generator) -> dict[str, Any]:
+    times = np.arange(0.0, 10.0, 0.01)
+    exact = np.stack([0.1 * np.sin(4 * times), 0.08 * np.cos(3.3 * times)], axis=1)
+    measured = (exact + 1e-4 * rng.normal(size=exact.shape)).tolist()
+    measured[100] = [None, None]
+    return {
+        "run": f"check-{k:02d}",
+        "role": "validate",
+        "times_s": times.tolist(),
+        "coordinates": ["x", "y"],
+        "measured": measured,
+        "before": (exact * (1 + 0.02 * times[:, None])).tolist(),
+        "after": exact.tolist(),
+    }
