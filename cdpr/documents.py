@@ -32,7 +32,7 @@ __all__ = [
     "write_json",
 ]
 
-MOST_TOML_BYTES = 4 * 2**20
+MOST_TOML_BYTES = 2 * 2**20
 FORMAT_NUMBER = 1
 MOST_REPEATED_KEYS = 20
 

@@ -10,11 +10,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from cdpr.documents import read_text
 from cdpr.problems import InputError
 
 Array = NDArray[np.float64]
 
-MOST_TEXT_BYTES = 128 * 2**20
+MOST_TEXT_BYTES = 64 * 2**20
+MOST_ROWS = 2_000_000
+MOST_COLUMNS = 4000
 LARGEST_NUMBER = 1e12
 MISSING = ("", "nan", "-nan", "+nan", "na", "n/a", "null")
 
@@ -27,9 +30,30 @@ class NumberTable:
     lines: NDArray[np.intp]
 
 
-def text_lines(text: str) -> list[str]:
-    """Lines of a text whatever its line ends; the first one has index 0."""
-    return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+def read_lines(path: Path | str) -> list[str]:
+    """Lines of a text file whatever its line ends; the first one has index 0.
+
+    Raises:
+        InputError: when it cannot be read, is not UTF-8 text or is larger than the limits.
+    """
+    text = read_text(path, MOST_TEXT_BYTES).replace("\r\n", "\n").replace("\r", "\n")
+    n_rows = text.count("\n")
+    if n_rows > MOST_ROWS:
+        raise InputError(f"{path}: {n_rows} lines, more than the {MOST_ROWS} read here: cut it")
+    return text.split("\n")
+
+
+def check_width(path: Path | str, number: int, line: str, separator: str) -> None:
+    """Refuse a header of more columns than any recording has.
+
+    Raises:
+        InputError: naming the line.
+    """
+    n_columns = line.count(separator) + 1
+    if n_columns > MOST_COLUMNS:
+        raise InputError(
+            f"{path}: line {number}: {n_columns} columns, more than the {MOST_COLUMNS} read here"
+        )
 
 
 def read_numbers(
@@ -51,7 +75,7 @@ def read_numbers(
     for number, line in lines:
         if not line.strip():
             continue
-        cells = line.split(separator)
+        cells = line.split(separator, MOST_COLUMNS)
         if len(cells) != len(columns):
             cells = _of_right_number(path, number, cells, columns, decimal_comma=decimal_comma)
         if decimal_comma:

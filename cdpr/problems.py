@@ -19,13 +19,11 @@ class Problems:
     """Everything that is wrong with a file, so that the user sees it at once."""
 
     def __init__(self) -> None:
-        self._lines: list[str] = []
+        self._lines: dict[str, None] = {}
 
     def add(self, key: str, text: str) -> None:
         """Record that `key` is wrong and why; a repeated line is kept once."""
-        line = f"{key}: {text}"
-        if line not in self._lines:
-            self._lines.append(line)
+        self._lines[f"{key}: {text}"] = None
 
     @property
     def lines(self) -> tuple[str, ...]:
@@ -33,13 +31,13 @@ class Problems:
         return tuple(self._lines)
 
     def __bool__(self) -> bool:
-        return bool(self._lines)
+        return len(self._lines) > 0
 
     def raise_if_any(self, path: Path | str) -> None:
         """Raise one InputError naming the file and every problem, if there is any."""
         if not self._lines:
             return
-        shown = self._lines[:MOST_LINES]
+        shown = list(self._lines)[:MOST_LINES]
         more = len(self._lines) - len(shown)
         tail = [f"... and {more} more"] if more else []
         count = f"{len(self._lines)} problem{'s' if len(self._lines) > 1 else ''}"

@@ -128,6 +128,7 @@ def _read_swivel(reader: Reader, *, is_eyelet: bool) -> tuple[Array, Array, Arra
 def _check_cables(reader: Reader, cables: list[CableValues]) -> None:
     if len(cables) > MOST_CABLES or ("cables" in reader and not cables):
         reader.add("cables", f"{len(cables)} cables, must be 1 to {MOST_CABLES}")
+        return
     names = [values[0] for values in cables]
     for count, name in enumerate(names):
         if name and name in names[:count]:

@@ -13,6 +13,7 @@ from cdpr.problems import Problems
 Array = NDArray[np.float64]
 
 UNIT_TOLERANCE = 1e-6
+MOST_TABLES = 10_000
 
 
 class Reader:
@@ -143,6 +144,9 @@ class Reader:
             return ()
         if not isinstance(value, list) or not all(isinstance(entry, dict) for entry in value):
             self.add(key, f"must be tables, each headed [[{self.name(key)}]]")
+            return ()
+        if len(value) > MOST_TABLES:
+            self.add(key, f"{len(value)} tables, more than the {MOST_TABLES} read here")
             return ()
         return tuple(
             Reader(entry, self.problems, f"{self.name(key)}[{count}]")

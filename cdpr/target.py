@@ -158,7 +158,7 @@ def _read_marker_values(reader: Reader) -> tuple[str, Array, float | None]:
 
 
 def _add_repeats(problems: Problems, key: str, names: list[str]) -> None:
-    for count, name in enumerate(names):
-        if name and name in names[:count]:
-            first = names.index(name) + 1
-            problems.add(f"{key}[{count + 1}]", f"{name!r} is already {key}[{first}]")
+    first: dict[str, int] = {}
+    for count, name in enumerate(names, start=1):
+        if first.setdefault(name, count) < count and name:
+            problems.add(f"{key}[{count}]", f"{name!r} is already {key}[{first[name]}]")

@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from cdpr.documents import InputError, Problems, read_text, replace_file
-from cdpr.number_table import MOST_TEXT_BYTES, NumberTable, check_times, read_numbers, text_lines
+from cdpr.documents import InputError, Problems, replace_file
+from cdpr.number_table import NumberTable, check_times, check_width, read_lines, read_numbers
 from cdpr.robot import POSE_COORDINATES
 from cdpr.rotation import angles_from_matrix, matrix_from_quaternion, quaternion_from_matrix
 from cdpr.trajectory import Trajectory, angle_noise, rotation_noise, unwrapped
@@ -39,8 +39,9 @@ def read_csv(path: Path | str, free_coordinates: tuple[str, ...] | None = None) 
     Raises:
         InputError: naming file, line, column and remedy.
     """
-    lines = text_lines(read_text(path, MOST_TEXT_BYTES))
+    lines = read_lines(path)
     separator = ";" if ";" in lines[0] else ","
+    check_width(path, 1, lines[0], separator)
     header = tuple(cell.strip().strip("\"'") for cell in lines[0].split(separator))
     while header and not header[-1]:
         header = header[:-1]

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from cdpr.documents import InputError, Problems, read_text, replace_file
+from cdpr.documents import InputError, Problems, replace_file
 from cdpr.marker_recording import MarkerRecording
-from cdpr.number_table import MOST_TEXT_BYTES, NumberTable, check_times, read_numbers, text_lines
+from cdpr.number_table import NumberTable, check_times, check_width, read_lines, read_numbers
 
 Array = NDArray[np.float64]
 
@@ -25,9 +25,11 @@ def read_trc(path: Path | str) -> MarkerRecording:
     Raises:
         InputError: naming file, line and remedy, also where header and rows disagree.
     """
-    lines = text_lines(read_text(path, MOST_TEXT_BYTES))
+    lines = read_lines(path)
     if len(lines) <= HEADER_LINES or not lines[0].lstrip().startswith("PathFileType"):
         raise InputError(f"{path}: line 1: not a TRC file (must start with PathFileType)")
+    for number in (2, 3, 4):
+        check_width(path, number, lines[number - 1], "\t")
     rate, n_frames, n_markers, scale = _read_header(path, lines)
     names = _read_names(path, lines[3], n_markers)
     columns = ("Frame#", "Time", *(f"{name} {axis}" for name in names for axis in "XYZ"))

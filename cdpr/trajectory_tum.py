@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from cdpr.documents import InputError, read_text, replace_file
-from cdpr.number_table import MOST_TEXT_BYTES, check_times, read_numbers, text_lines
+from cdpr.documents import InputError, replace_file
+from cdpr.number_table import check_times, read_lines, read_numbers
 from cdpr.rotation import matrix_from_quaternion, quaternion_from_matrix
 from cdpr.trajectory import Trajectory
 
@@ -21,7 +21,7 @@ def read_tum(path: Path | str) -> Trajectory:
     Raises:
         InputError: naming file, line, column and remedy.
     """
-    lines = enumerate(text_lines(read_text(path, MOST_TEXT_BYTES)), start=1)
+    lines = enumerate(read_lines(path), start=1)
     rows = ((number, line) for number, line in lines if not line.lstrip().startswith("#"))
     table = read_numbers(path, rows, None, TUM_COLUMNS)
     check_times(path, table, 0, "t")
