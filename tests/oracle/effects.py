@@ -214,7 +214,7 @@ def _torsion_spring(scene: Scene, stiffness: float, rng: np.random.Generator):
 
 def _constant_force(scene: Scene, size: float, rng: np.random.Generator):
     force = size * random_direction(rng, flat=True)
-    return changed(scene, force=force), {"force_n": force, "at": "P"}
+    return changed(scene, force=force), {"force_vector_n": force, "at": "P"}
 
 
 def _harmonic_force(scene: Scene, amplitude: float, rng: np.random.Generator):

@@ -1,4 +1,4 @@
-"""MuJoCo's free motion of an eyelet robot: spatial tendons held at their length by equalities."""
+"""MuJoCo's free motion of an eyelet robot: spatial tendons held at their length, or springs."""
 
 from __future__ import annotations
 
@@ -20,19 +20,27 @@ def mujoco_swing(
     duration_s: float,
     twist: Array | None = None,
     rate_hz: float = 100.0,
+    stiffness_ea_n: float = 0.0,
+    unstretched_m: Array | None = None,
 ) -> Motion:
     """The swing from a pose (P, quaternion w x y z) and a twist (base frame, about P).
 
     Cables keep the lengths that they have at the start. RK4 at 0.1 ms with `solref 0.0002 1`
     holds them to well under a micrometre; `Motion.drift_m` is the largest departure at a sample.
     The soft constraint's force chatters from step to step, so `tensions_n` is NaN.
+    With `stiffness_ea_n` above 0 the cables are undamped springs of EA over `unstretched_m` (n,),
+    and the drift is their stretch.
 
     Raises:
         ValueError: when a pulley has a radius (MuJoCo's own pulley is a drum that does not swivel).
     """
     if np.any(robot.radii_m > 0.0):
         raise ValueError(f"pulley radii {robot.radii_m} m: MuJoCo knows eyelets (radius 0) alone")
-    model = mujoco.MjModel.from_xml_string(_xml(robot, body, position_m, quaternion))
+    cables = _held(robot.n_cables)
+    if stiffness_ea_n > 0.0:
+        rest = np.ones(robot.n_cables) if unstretched_m is None else unstretched_m
+        cables = _springs(stiffness_ea_n, rest)
+    model = mujoco.MjModel.from_xml_string(_xml(robot, body, position_m, quaternion, cables))
     data = mujoco.MjData(model)
     _set_twist(data, quaternion, np.zeros(6) if twist is None else np.asarray(twist))
     substeps = round(1.0 / (rate_hz * TIME_STEP_S))
@@ -66,7 +74,7 @@ def _base_twist(data: mujoco.MjData) -> Array:
     return np.concatenate([data.qvel[:3], rotation.reshape(3, 3) @ data.qvel[3:]])
 
 
-def _xml(robot: Robot, body: Body, position_m: Array, quaternion: Array) -> str:
+def _xml(robot: Robot, body: Body, position_m: Array, quaternion: Array, cables: str) -> str:
     """The MJCF model; MuJoCo takes the inertia tensor about the centre of mass, body axes."""
     moment = body.inertia_com
     full = _row(moment[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]])
@@ -76,11 +84,6 @@ def _xml(robot: Robot, body: Body, position_m: Array, quaternion: Array) -> str:
     ends = "".join(
         f'<site name="a{k}" pos="{_row(c.attachment_m)}"/>' for k, c in enumerate(robot.cables)
     )
-    n = range(robot.n_cables)
-    tendons = "".join(
-        f'<spatial name="c{k}"><site site="d{k}"/><site site="a{k}"/></spatial>' for k in n
-    )
-    holds = "".join(f'<tendon tendon1="c{k}" polycoef="0 0 0 0 0" solref="0.0002 1"/>' for k in n)
     return f"""
 <mujoco>
   <compiler angle="radian"/>
@@ -94,9 +97,29 @@ def _xml(robot: Robot, body: Body, position_m: Array, quaternion: Array) -> str:
       {ends}
     </body>
   </worldbody>
-  <tendon>{tendons}</tendon>
-  <equality>{holds}</equality>
+  {cables}
 </mujoco>"""
+
+
+def _held(n: int) -> str:
+    tendons = "".join(f'<spatial name="c{k}">{_line(k)}</spatial>' for k in range(n))
+    holds = "".join(
+        f'<tendon tendon1="c{k}" polycoef="0 0 0 0 0" solref="0.0002 1"/>' for k in range(n)
+    )
+    return f"<tendon>{tendons}</tendon><equality>{holds}</equality>"
+
+
+def _springs(stiffness_ea_n: float, unstretched_m: Array) -> str:
+    springs = "".join(
+        f'<spatial stiffness="{stiffness_ea_n / rest!r}" springlength="0 {rest!r}">'
+        f"{_line(k)}</spatial>"
+        for k, rest in enumerate(map(float, unstretched_m))
+    )
+    return f"<tendon>{springs}</tendon>"
+
+
+def _line(k: int) -> str:
+    return f'<site site="d{k}"/><site site="a{k}"/>'
 
 
 def _row(values: Array) -> str:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from cdpr.robot import POSE_COORDINATES
+from cdpr.robot import POSE_COORDINATES, Robot
 from tests.oracle import session_files as files
 from tests.oracle.effects import EFFECTS, Scene, add_effect
 from tests.oracle.geometry import rotation_of, turn
@@ -77,7 +77,7 @@ def make_session(
     rng = np.random.default_rng(seed)
     declared = declared_robot(robot)
     body = true_body(robot, rng)
-    scene = _scene(declared, body, effects or {}, rng)
+    scene = make_scene(declared, body, effects or {}, rng)
     free = declared.free_coordinates or ()
     rows = None if pose else tuple(POSE_COORDINATES.index(name) for name in free)
     folder = Path(folder)
@@ -103,7 +103,14 @@ def make_session(
     return SessionTruth(folder, body, scene, tuple(runs))
 
 
-def _scene(declared, body: Body, effects: Mapping[str, object], rng: np.random.Generator) -> Scene:
+def make_scene(
+    declared: Robot, body: Body, effects: Mapping[str, object], rng: np.random.Generator
+) -> Scene:
+    """The truth of a session: the declared robot, the true body and the effects, drawn in order.
+
+    Raises:
+        ValueError: unknown effect or size.
+    """
     low, high, heading, _ = workspace(declared.n_cables)
     world = plain_world(declared, body)
     scene = Scene(world, 0.5 * (low + high), heading, length_bias_m=np.zeros(declared.n_cables))

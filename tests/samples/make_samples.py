@@ -20,7 +20,7 @@ from tests.oracle.geometry import turn
 from tests.oracle.newton_euler import Motion, simulate
 from tests.oracle.robots import about_p, declared_robot, true_body
 from tests.oracle.runs import draw_run
-from tests.oracle.sessions import _scene, make_session
+from tests.oracle.sessions import make_scene, make_session
 from tests.oracle.world import Body, plain_world
 
 SAMPLES = Path(__file__).parents[2] / "samples"
@@ -64,7 +64,7 @@ def make_mocap(folder: Path) -> None:
     rng = np.random.default_rng(23)
     robot = declared_robot("bologna-4")
     body = true_body("bologna-4", rng)
-    scene = _scene(robot, body, {}, rng)
+    scene = make_scene(robot, body, {}, rng)
     target = Target(markers=tuple(Marker(n, np.array(p)) for n, p in MARKERS_M.items()))
     runs = []
     for name, role in zip(_names(), ROLES, strict=True):
