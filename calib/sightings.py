@@ -1,0 +1,195 @@
+"""Runs the detectors over calibration recordings and lines the cameras' frames up in time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+
+from calib.board_detection import BoardDetector
+from calib.boards import Board
+from calib.camera_models import Array
+from calib.recordings import Recording, read_frames, stamps_of
+from calib.views import Views, make_views
+
+Progress = Callable[[str, float], None]
+
+MOST_FRAMES = 600
+BURST = 5
+_WORKERS = 2
+
+
+@dataclass(frozen=True, slots=True)
+class Sightings:
+    """The board in one camera's recording.
+
+    Attributes:
+        name: the camera.
+        size_px: width and height.
+        n_frames: frames in the recording.
+        numbers: frames with the board, (n,).
+        stamps_s: their stamps by the camera's own clock, NaN when unknown, (n,).
+        labels: how a person finds them, (n,).
+        pixels: corners, NaN where unseen, (n, n_points, 2).
+        still_frames: a few images spread over the recording, for what does not move.
+    """
+
+    name: str
+    size_px: tuple[int, int]
+    n_frames: int
+    numbers: np.ndarray
+    stamps_s: Array
+    labels: tuple[str, ...]
+    pixels: Array
+    still_frames: tuple[np.ndarray, ...] = ()
+
+
+def see_boards(
+    recordings: Iterable[Recording],
+    board: Board,
+    frame_rate_hz: float | None,
+    n_still: int = 0,
+    progress: Progress | None = None,
+) -> tuple[Sightings, ...]:
+    """Detect the board in every recording, cameras side by side.
+
+    Recordings of more than `MOST_FRAMES` frames are searched in bursts of `BURST` frames spread
+    evenly, so that image velocities stay available.
+    """
+    recordings = tuple(recordings)
+    done = [0]
+
+    def run(recording: Recording) -> Sightings:
+        result = _see_board(recording, board, frame_rate_hz, n_still)
+        done[0] += 1
+        if progress is not None:
+            progress(f"board in {recording.name}", done[0] / len(recordings))
+        return result
+
+    with ThreadPoolExecutor(_WORKERS) as pool:
+        return tuple(pool.map(run, recordings))
+
+
+def _see_board(
+    recording: Recording, board: Board, frame_rate_hz: float | None, n_still: int
+) -> Sightings:
+    count = len(recording.images) or _count_frames(recording)
+    wanted = _wanted(count)
+    still_at = set(np.linspace(0, count - 1, n_still).round().astype(int)) if n_still else set()
+    detector = BoardDetector(board)
+    numbers, labels, pixels, stills, size = [], [], [], [], (0, 0)
+    for position, (number, label, image) in enumerate(read_frames(recording)):
+        size = (image.shape[1], image.shape[0])
+        if position in still_at:
+            stills.append(image)
+        if position not in wanted:
+            continue
+        corners = detector.detect(image)
+        if corners is not None:
+            numbers.append(number)
+            labels.append(label)
+            pixels.append(corners)
+    found = np.array(numbers, dtype=int)
+    stack = np.array(pixels) if pixels else np.zeros((0, len(board.points_m), 2))
+    stamps = stamps_of(recording, found, frame_rate_hz)
+    return Sightings(
+        recording.name, size, count, found, stamps, tuple(labels), stack, tuple(stills)
+    )
+
+
+def _count_frames(recording: Recording) -> int:
+    """Frames of a video: from its header where it is believable, else by decoding it."""
+    import av
+
+    with av.open(str(recording.path)) as container:
+        return sum(1 for packet in container.demux(video=0) if packet.size)
+
+
+def _wanted(count: int) -> set[int]:
+    if count <= MOST_FRAMES:
+        return set(range(count))
+    starts = np.linspace(0, count - BURST, MOST_FRAMES // BURST).round().astype(int)
+    return {int(start + k) for start in starts for k in range(BURST)}
+
+
+def velocities(sightings: Sightings) -> Array:
+    """Image velocity of every corner in px/s, NaN where the frames around do not tell.
+
+    Five-point stencil where four neighbours exist, else the central difference; a neighbour that
+    does not continue the motion (a cut, a new pose) gives no velocity. (n, n_points, 2).
+    """
+    at = {int(number): row for row, number in enumerate(sightings.numbers)}
+    pixels, stamps = sightings.pixels, sightings.stamps_s
+    result = np.full(pixels.shape, np.nan)
+    for number, row in at.items():
+        before, after = at.get(number - 1), at.get(number + 1)
+        if before is None or after is None:
+            continue
+        span = stamps[after] - stamps[before]
+        ahead, behind = pixels[after] - pixels[row], pixels[row] - pixels[before]
+        if not (span > 0.0 and _continues(ahead, behind)):
+            continue
+        result[row] = (pixels[after] - pixels[before]) / span
+        two_before, two_after = at.get(number - 2), at.get(number + 2)
+        if two_before is None or two_after is None:
+            continue
+        wide = (pixels[two_after] - pixels[two_before]) / (stamps[two_after] - stamps[two_before])
+        near = (pixels[after] - pixels[before]) / span
+        finer = (4.0 * near - wide) / 3.0
+        smooth = np.isfinite(finer) & (np.abs(wide - near) < 0.3 * np.abs(near) + 3.0 / span)
+        result[row] = np.where(smooth, finer, result[row])
+    return result
+
+
+def _continues(ahead: Array, behind: Array) -> bool:
+    """Whether three frames show one smooth motion: the bend is small beside the step."""
+    bend = np.linalg.norm(ahead - behind, axis=-1)
+    step = np.linalg.norm(ahead + behind, axis=-1)
+    known = np.isfinite(bend)
+    return bool(known.sum() >= 4 and np.median(bend[known]) < 0.35 * np.median(step[known]) + 1.0)
+
+
+def gather(
+    all_sightings: tuple[Sightings, ...], frame_rate_hz: float | None
+) -> tuple[Views, Array]:
+    """Put simultaneous frames of the cameras together.
+
+    Frames are matched by stamps to within half a frame where every camera has its own stamps,
+    else by frame number.
+
+    Returns:
+        The views, and the time of every moment, NaN when stamps are unknown, (n_moments,).
+    """
+    stamped = all(np.isfinite(s.stamps_s).all() for s in all_sightings)
+    keys = [s.stamps_s if stamped else s.numbers.astype(float) for s in all_sightings]
+    joined = np.concatenate(keys) if keys else np.zeros(0)
+    reach = 0.5 / frame_rate_hz if stamped and frame_rate_hz else _half_step(keys)
+    order = np.argsort(joined, kind="stable")
+    group = np.zeros(len(joined), dtype=int)
+    start, current = -np.inf, -1
+    for index in order:
+        if joined[index] - start > reach:
+            start, current = joined[index], current + 1
+        group[index] = current
+    count = current + 1
+    times = np.bincount(group, joined, count) / np.maximum(np.bincount(group, minlength=count), 1)
+    camera = np.repeat(np.arange(len(keys)), [len(key) for key in keys])
+    lag = joined - times[group] if stamped else np.zeros(len(joined))
+    _, first = np.unique(np.stack([camera, group]), axis=1, return_index=True)
+    views = make_views(
+        camera,
+        group,
+        np.concatenate([s.pixels for s in all_sightings]),
+        np.concatenate([velocities(s) for s in all_sightings]),
+        lag,
+        tuple(label for s in all_sightings for label in s.labels),
+    ).select(np.arange(len(first)))
+    return views, times if stamped else np.full(count, np.nan)
+
+
+def _half_step(keys: list[Array]) -> float:
+    steps = [np.diff(np.sort(key)) for key in keys]
+    joined = np.concatenate(steps) if steps else np.zeros(0)
+    return 0.45 * float(joined[joined > 0.0].min()) if (joined > 0.0).any() else 0.45
