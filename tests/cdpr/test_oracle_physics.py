@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from cdpr.robot import Cable, Robot
+from tests.oracle.dynamics import derivative
 from tests.oracle.effects import Scene, add_effect
 from tests.oracle.equilibrium import Rest, displaced, lengths_at, settle
 from tests.oracle.geometry import cable, length_acceleration, turn
 from tests.oracle.mujoco_swing import mujoco_swing
-from tests.oracle.newton_euler import Motion, derivative, energy, simulate, start_state
+from tests.oracle.newton_euler import Motion, energy, simulate, start_state
 from tests.oracle.robots import declared_robot, nominal_body, true_body, with_eyelets
 from tests.oracle.world import Array, Body, World, plain_world
 

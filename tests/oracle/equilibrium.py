@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
+from tests.oracle.dynamics import constraint_rows, derivative
 from tests.oracle.forces import add_force, applied_wrench
 from tests.oracle.geometry import rotate, rotation_of, scaled, turn
-from tests.oracle.newton_euler import constraint_rows, derivative, project, start_state
+from tests.oracle.newton_euler import project, start_state
 from tests.oracle.world import Array, World
 
 ROTATION_SCALE_M = 0.25  # a radian counts as so many metres in step sizes and conditioning
@@ -54,11 +55,13 @@ def settle(world: World, position_m: Array, quaternion: Array) -> Rest:
         NoEquilibriumError: no convergence.
     """
     world = world._replace(oscillators=np.zeros((0, 6)))
-    p, q = np.array(position_m, dtype=float), np.array(quaternion, dtype=float)
+    p: Array = np.array(position_m, dtype=float)
+    q: Array = np.array(quaternion, dtype=float)
     J, _ = _rows(world, p, q)
     n = len(world.length)
     bare = _residual(world, p, q, np.zeros(n))[:6]
-    tension = np.linalg.lstsq(J.T, bare, rcond=None)[0]
+    tension: Array = np.linalg.lstsq(J.T, bare, rcond=None)[0]
+    residual = bare
     for _ in range(60):
         residual = _residual(world, p, q, tension)
         if np.max(np.abs(residual)) < RESIDUAL_LIMIT:

@@ -164,8 +164,9 @@ def _columns(times: Array, p: Array, q: Array, free: tuple[str, ...] | None) -> 
     if free is None:
         return np.concatenate([times[:, None], p, q], axis=1)
     angles = _tait_bryan(q)
-    values = dict(zip(POSE_COORDINATES, np.concatenate([p, angles], axis=1).T, strict=True))
-    return np.stack([times, *(values[name] for name in free)], axis=1)
+    values = np.concatenate([p, angles], axis=1)
+    wanted = [POSE_COORDINATES.index(name) for name in free]
+    return np.concatenate([times[:, None], values[:, wanted]], axis=1)
 
 
 def _tait_bryan(quaternions: Array) -> Array:
