@@ -1,0 +1,169 @@
+"""A rig of cameras from the board's sightings: start, adjust, drop what does not belong."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from calib.adjustment import Adjustment, Problem, adjust
+from calib.camera import Camera
+from calib.camera_models import Array
+from calib.intrinsics import CameraStart, DroppedView, start_camera
+from calib.reprojection import CLOCK, POSE, WARP, Scene, camera_slices
+from calib.rig_start import place_in_base, start_rig
+from calib.views import FixedPoints, Views
+
+Progress = Callable[[str, float], None]
+
+VIEW_OUTLIER_SIGMAS = 5.0
+CORNER_OUTLIER_SIGMAS = 6.0
+_LEAST_CORNERS = 4
+_MOST_SWEEPS = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Rig:
+    """A solved rig.
+
+    Attributes:
+        adjustment: estimate, covariance, noise and residuals.
+        problem: the data kept and the unknowns that were free.
+        reference: camera whose pose is the identity where there is no base frame.
+        dropped: views left out, by name.
+        n_trimmed: single corners left out.
+    """
+
+    adjustment: Adjustment
+    problem: Problem
+    reference: int
+    dropped: tuple[DroppedView, ...]
+    n_trimmed: int
+
+    @property
+    def cameras(self) -> tuple[Camera, ...]:
+        """The calibrated cameras."""
+        return self.adjustment.scene.cameras
+
+
+def start_cameras(
+    names: tuple[str, ...],
+    sizes_px: tuple[tuple[int, int], ...],
+    models: tuple[str, ...],
+    board_points_m: Array,
+    views: Views,
+) -> tuple[CameraStart, ...]:
+    """Every camera on its own."""
+    return tuple(
+        start_camera(name, size, model, board_points_m, views.select(views.camera == index))
+        for index, (name, size, model) in enumerate(zip(names, sizes_px, models, strict=True))
+    )
+
+
+def solve_rig(board_points_m: Array, starts: tuple[CameraStart, ...]) -> Rig:
+    """All cameras and board poses at once, in the frame of the reference camera.
+
+    Raises:
+        DataError: when the cameras do not share enough views.
+    """
+    views = _joined([start.views for start in starts])
+    poses = np.concatenate([start.T_camera_boards for start in starts])
+    cameras = tuple(start.camera for start in starts)
+    views, _ = views.compacted()
+    start = start_rig(cameras, board_points_m, views, poses)
+    free = free_unknowns(cameras, held_pose=start.reference)
+    dropped = tuple(drop for camera in starts for drop in camera.dropped)
+    problem = Problem(board_points_m, views, None, free)
+    return refine(start.scene, problem, start.reference, dropped)
+
+
+def free_unknowns(
+    cameras: tuple[Camera, ...],
+    *,
+    held_pose: int | None = None,
+    n_fixed: int = 0,
+    warp: bool = False,
+    held_lenses: bool = False,
+) -> np.ndarray:
+    """Which shared unknowns move: lenses, poses but one, warp if asked, base points; no clocks."""
+    slices = camera_slices(cameras)
+    free = np.ones(slices[-1].stop + WARP + 3 * n_fixed, dtype=bool)
+    for index, (camera, own) in enumerate(zip(cameras, slices, strict=True)):
+        k = len(camera.params)
+        free[own.start : own.start + k] = not held_lenses
+        free[own.start + k : own.start + k + POSE] = index != held_pose
+        free[own.stop - CLOCK : own.stop] = False
+    free[slices[-1].stop : slices[-1].stop + WARP] = warp
+    return free
+
+
+def refine(
+    scene: Scene,
+    problem: Problem,
+    reference: int,
+    dropped: tuple[DroppedView, ...] = (),
+    n_trimmed: int = 0,
+) -> Rig:
+    """Adjust, drop outlying views and corners, and adjust again until none is left."""
+    result = adjust(scene, problem, rounds=1)
+    for _ in range(_MOST_SWEEPS):
+        keep, limits, errors = _views_kept(result, problem)
+        trimmed = _trimmed(result, problem)
+        n_new = int(problem.views.seen.sum() - trimmed.seen.sum())
+        enough = keep & (trimmed.seen.sum(axis=1) >= _LEAST_CORNERS)
+        if enough.all() and n_new == 0:
+            break
+        dropped += tuple(
+            DroppedView(problem.views.label[i], errors[i], limits[i], "px")
+            for i in np.flatnonzero(~enough)
+        )
+        n_trimmed += int(problem.views.seen[enough].sum() - trimmed.seen[enough].sum())
+        views, moments = trimmed.select(enough).compacted()
+        problem = replace(problem, views=views)
+        scene = replace(result.scene, T_base_boards=result.scene.T_base_boards[moments])
+        result = adjust(scene, problem, result.sigma_px, rounds=1)
+    result = adjust(result.scene, problem, result.sigma_px, rounds=1)
+    return Rig(result, problem, reference, dropped, n_trimmed)
+
+
+def _views_kept(result: Adjustment, problem: Problem) -> tuple[np.ndarray, Array, Array]:
+    """Views whose rms error stays near what is usual in their camera; limits and errors, px."""
+    squares = np.sum(result.residuals_px**2, axis=-1)
+    errors = np.sqrt(np.nanmean(squares, axis=1) / 2.0)
+    limits = np.zeros(len(errors))
+    for index in range(len(result.scene.cameras)):
+        own = problem.views.camera == index
+        if own.any():
+            usual = max(float(np.median(errors[own])), float(result.sigma_px[index]))
+            limits[own] = VIEW_OUTLIER_SIGMAS * usual
+    return errors <= limits, limits, errors
+
+
+def _trimmed(result: Adjustment, problem: Problem) -> Views:
+    """The views with far-off corners blanked."""
+    length = np.linalg.norm(result.residuals_px, axis=-1)
+    limit = CORNER_OUTLIER_SIGMAS * result.sigma_px[problem.views.camera]
+    with np.errstate(invalid="ignore"):
+        far = length > limit[:, None]
+    return replace(problem.views, pixels=np.where(far[..., None], np.nan, problem.views.pixels))
+
+
+def tie_to_base(rig: Rig, fixed: FixedPoints) -> Rig:
+    """The rig in the base frame, surveyed points adjusted with everything else."""
+    scene = place_in_base(rig.adjustment.scene, fixed)
+    free = free_unknowns(scene.cameras, n_fixed=len(fixed.points_base_m))
+    problem = replace(rig.problem, fixed=fixed, free=free)
+    result = adjust(scene, problem, rig.adjustment.sigma_px, rounds=2)
+    return Rig(result, problem, rig.reference, rig.dropped, rig.n_trimmed)
+
+
+def _joined(parts: list[Views]) -> Views:
+    return Views(
+        np.concatenate([part.camera for part in parts]),
+        np.concatenate([part.moment for part in parts]),
+        np.concatenate([part.pixels for part in parts]),
+        np.concatenate([part.velocity_px_s for part in parts]),
+        np.concatenate([part.lag_s for part in parts]),
+        tuple(label for part in parts for label in part.label),
+    )
