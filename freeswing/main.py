@@ -12,7 +12,7 @@ from types import ModuleType
 from freeswing import __version__
 from freeswing.console import Console
 
-COMMANDS = ("check", "report", "convert", "home")
+COMMANDS = ("check", "report", "convert", "simulate", "board", "home")
 DONE, NO_RESULT, WRONG_INPUT, INTERRUPTED = 0, 1, 2, 130
 
 

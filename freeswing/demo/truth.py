@@ -10,11 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdpr.batch import evaluate
-from cdpr.model import Model, build_model
+from cdpr.model import build_model
 from cdpr.robot import Array, Cable, Platform, Robot
 from cdpr.simulation import Motion, simulate
-from cdpr.statics import Equilibrium, equilibrium_at_lengths, modes
+from freeswing.demo.release import release, rest_at_lengths
 
 EFFECT = "translational_drag"
 EFFECT_VALUES = (0.05, 0.6)
@@ -75,31 +74,9 @@ def demo_swings(generator: np.random.Generator, duration_s: float) -> tuple[Swin
     values = np.array(EFFECT_VALUES)
     swings = []
     for name, role, lengths in SWINGS:
-        held = np.array(lengths)
-        rest = _rest(model, held, values)
-        zeta = _release(model, rest, held, values, generator)
+        rest = rest_at_lengths(model, np.array(lengths), TRUE_INERTIA, values, generator)
+        zeta = release(model, rest, TRUE_INERTIA, values, SWING_AMPLITUDE_M, generator)
         span = (0.0, duration_s)
         motion = simulate(model, zeta, np.zeros(6), span, TRUE_INERTIA, values)
-        swings.append(Swing(name, role, held, motion))
+        swings.append(Swing(name, role, rest.lengths_m, motion))
     return tuple(swings)
-
-
-def _rest(model: Model, lengths_m: Array, values: Array) -> Equilibrium:
-    start = np.array([1.2, -0.2, -0.6, 0.0, 0.0, 0.0])
-    rest = equilibrium_at_lengths(model, lengths_m, start, TRUE_INERTIA, values)
-    if rest is None or not (rest.stable and rest.taut):
-        raise ValueError(f"no stable equilibrium with taut cables at lengths {lengths_m} m")
-    return rest
-
-
-def _release(
-    model: Model, rest: Equilibrium, lengths_m: Array, values: Array, generator: np.random.Generator
-) -> Array:
-    """A pose beside the equilibrium, on the held lengths, reached along its modes."""
-    shapes = modes(model, rest, TRUE_INERTIA, values).shapes
-    heading = shapes @ (generator.uniform(0.5, 1.0, shapes.shape[1]) * generator.choice([-1, 1]))
-    zeta = rest.zeta + heading * SWING_AMPLITUDE_M / np.linalg.norm(heading[:3])
-    for _ in range(20):
-        outputs = evaluate(model.cables, zeta, values)
-        zeta = zeta - np.linalg.pinv(outputs[3]) @ (outputs[0] - lengths_m)
-    return zeta
