@@ -14,6 +14,7 @@ Array = NDArray[np.float64]
 
 UNIT_TOLERANCE = 1e-6
 MOST_TABLES = 10_000
+LARGEST_NUMBER = 1e12
 
 
 class Reader:
@@ -182,6 +183,9 @@ class Reader:
             number = math.inf
         if not math.isfinite(number):
             self.add(key, f"{_shown(value)} is not a finite number")
+            return math.nan
+        if abs(number) > LARGEST_NUMBER:
+            self.add(key, f"{number:g} is beyond {LARGEST_NUMBER:g}: check the unit")
             return math.nan
         return number
 

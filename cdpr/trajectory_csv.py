@@ -1,31 +1,34 @@
 """Trajectories as CSV: `t_s,x_m,y_m,z_m,qw,qx,qy,qz` or `t_s` and some coordinates.
 
-Optional columns tell the noise: `std_x_m, std_y_m, std_z_m` and, of poses, `std_rx_rad, std_ry_rad,
-std_rz_rad` of the small rotation vector in the base frame; `corr_x_y`, `corr_x_rx` and so on are
-the correlations between them. An empty cell is a missing sample.
+An empty cell is a missing sample; optional columns tell the noise (`cdpr.noise_columns`).
 """
 
 from __future__ import annotations
 
-from itertools import combinations
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cdpr.documents import InputError, Problems, replace_file
+from cdpr.noise_columns import (
+    POSE_NOISE,
+    QUATERNION,
+    QUATERNION_NOISE,
+    correlation_names,
+    noise_columns,
+    noise_names,
+    read_noise,
+)
 from cdpr.number_table import NumberTable, check_times, check_width, read_lines, read_numbers
 from cdpr.robot import POSE_COORDINATES
 from cdpr.rotation import angles_from_matrix, matrix_from_quaternion, quaternion_from_matrix
-from cdpr.trajectory import Trajectory, angle_noise, rotation_noise, unwrapped
+from cdpr.trajectory import Trajectory, rotation_noise, unwrapped
 
 Array = NDArray[np.float64]
 
-QUATERNION = ("qw", "qx", "qy", "qz")
 POSE_COLUMNS = ("x_m", "y_m", "z_m", *QUATERNION)
-POSE_NOISE = ("x", "y", "z", "rx", "ry", "rz")
 QUATERNION_TOLERANCE = 0.02
-LEAST_CORRELATION = 1e-12
 
 
 def read_csv(path: Path | str, free_coordinates: tuple[str, ...] | None = None) -> Trajectory:
@@ -69,7 +72,7 @@ def write_csv(path: Path | str, trajectory: Trajectory) -> None:
         header = ["t_s", *(column_name(name) for name in trajectory.coordinates)]
         parts = [trajectory.times_s[:, None], trajectory.values]
     if trajectory.covariances is not None:
-        names, noise = _noise_columns(trajectory)
+        names, noise = noise_columns(trajectory)
         header += names
         parts.append(noise)
     rows = (",".join(map(_cell, row)) for row in np.concatenate(parts, axis=1).tolist())
@@ -79,10 +82,6 @@ def write_csv(path: Path | str, trajectory: Trajectory) -> None:
 def column_name(coordinate: str) -> str:
     """Column of a coordinate: x -> x_m, phi -> phi_rad."""
     return f"{coordinate}_m" if coordinate in POSE_COORDINATES[:3] else f"{coordinate}_rad"
-
-
-def _noise_names(names: tuple[str, ...]) -> tuple[str, ...]:
-    return tuple(f"std_{name}_m" if name in "xyz" else f"std_{name}_rad" for name in names)
 
 
 def _coordinates(path: Path | str, header: tuple[str, ...]) -> tuple[str, ...] | None:
@@ -96,8 +95,12 @@ def _coordinates(path: Path | str, header: tuple[str, ...]) -> tuple[str, ...] |
     found = tuple(name for name in POSE_COORDINATES if column_name(name) in header)
     ordered = tuple(sorted(found, key=lambda name: header.index(column_name(name))))
     noise = POSE_NOISE if is_pose else ordered
-    known = {"t_s", *(POSE_COLUMNS if is_pose else map(column_name, ordered)), *_noise_names(noise)}
-    known |= {f"corr_{a}_{b}" for a, b in combinations(noise, 2)}
+    known = {"t_s", *(POSE_COLUMNS if is_pose else map(column_name, ordered))}
+    known |= {
+        *noise_names(noise),
+        *correlation_names(noise),
+        *(QUATERNION_NOISE if is_pose else ()),
+    }
     for name in header:
         if header.count(name) > 1:
             problems.add(f"line 1: {name[:40]!r}", f"{header.count(name)} columns of this name")
@@ -129,7 +132,8 @@ def _poses(path: Path | str, table: NumberTable, columns: dict[str, Array]) -> T
         )
     angles = unwrapped(angles_from_matrix(matrix_from_quaternion(quaternion)))
     values = np.concatenate([position, angles], axis=1)
-    covariances = _covariances(path, table, columns, POSE_NOISE)
+    is_known = np.asarray(np.isfinite(values).all(axis=1))
+    covariances = read_noise(path, table, columns, POSE_NOISE, is_known)
     return Trajectory(
         columns["t_s"], POSE_COORDINATES, values, covariances, f"{Path(path).name}: measured poses"
     )
@@ -142,7 +146,8 @@ def _plain_coordinates(
     coordinates: tuple[str, ...],
 ) -> Trajectory:
     values = np.stack([columns[column_name(name)] for name in coordinates], axis=1)
-    covariances = _covariances(path, table, columns, coordinates)
+    is_known = np.asarray(np.isfinite(values).all(axis=1))
+    covariances = read_noise(path, table, columns, coordinates, is_known)
     if covariances is not None:
         covariances = rotation_noise(coordinates, values, covariances)
     provenance = f"{Path(path).name}: measured {', '.join(coordinates)}"
@@ -163,59 +168,6 @@ def _selected(
             f"header {needed}"
         )
     return trajectory.select(wanted)
-
-
-def _covariances(
-    path: Path | str, table: NumberTable, columns: dict[str, Array], names: tuple[str, ...]
-) -> Array | None:
-    """Covariances (n_t, n, n) of the `std_` and `corr_` columns.
-
-    None unless every coordinate has its `std_` column: a part of them cannot weight a pose.
-    """
-    wanted = _noise_names(names)
-    for column in (name for name in wanted if name in columns):
-        bad = np.flatnonzero(columns[column] < 0.0)
-        if len(bad):
-            raise InputError(
-                f"{path}: line {table.lines[bad[0]]}: {column} is {columns[column][bad[0]]:g}, "
-                "must be >= 0"
-            )
-    if not all(name in columns for name in wanted):
-        return None
-    std = np.stack([columns[name] for name in wanted], axis=1)
-    correlation = np.broadcast_to(np.eye(len(names)), (len(std), len(names), len(names))).copy()
-    for (i, a), (j, b) in combinations(enumerate(names), 2):
-        column = columns.get(f"corr_{a}_{b}")
-        if column is None:
-            continue
-        bad = np.flatnonzero(np.abs(column) > 1.0)
-        if len(bad):
-            raise InputError(
-                f"{path}: line {table.lines[bad[0]]}: corr_{a}_{b} is {column[bad[0]]:g}, "
-                "must be -1 to 1"
-            )
-        correlation[:, i, j] = correlation[:, j, i] = column
-    return correlation * std[:, :, None] * std[:, None, :]
-
-
-def _noise_columns(trajectory: Trajectory) -> tuple[list[str], Array]:
-    names, covariances = trajectory.coordinates, trajectory.covariances
-    if covariances is None:
-        return [], np.empty((len(trajectory), 0))
-    if trajectory.is_pose:
-        names = POSE_NOISE
-    else:
-        covariances = angle_noise(names, trajectory.values, covariances)
-    std = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
-    scale = np.where(std > 0.0, std, 1.0)
-    correlation = covariances / (scale[:, :, None] * scale[:, None, :])
-    header, parts = list(_noise_names(names)), [std]
-    for (i, a), (j, b) in combinations(enumerate(names), 2):
-        column = np.clip(correlation[:, i, j], -1.0, 1.0)
-        if np.nanmax(np.abs(column), initial=0.0) > LEAST_CORRELATION:
-            header.append(f"corr_{a}_{b}")
-            parts.append(column[:, None])
-    return header, np.concatenate(parts, axis=1)
 
 
 def _continuous(quaternions: Array) -> Array:

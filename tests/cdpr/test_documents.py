@@ -153,7 +153,9 @@ def read(values):
     return Reader(values, problems, "t"), problems
 
 
-@pytest.mark.parametrize("value", [True, "1", None, [1.0], float("nan"), float("inf"), 10**400])
+@pytest.mark.parametrize(
+    "value", [True, "1", None, [1.0], float("nan"), float("inf"), 10**400, 1e300]
+)
 def test_what_is_not_a_finite_number_is_recorded(value):
     reader, problems = read({"a": value})
     assert np.isnan(reader.number("a"))

@@ -4,6 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cdpr.documents import InputError
+from cdpr.rotation import log_rotation, matrix_from_quaternion
 from cdpr.trajectory import Trajectory
 from cdpr.trajectory_files import read_trajectory, write_csv, write_tum
 from tests.cdpr.made_motions import POSE, read, swing
@@ -85,12 +86,14 @@ def test_csv_noise_of_a_part_is_not_used(tmp_path):
         ("t_s,x_m\n0,1_0\n", "line 2: '0,1_0' is not"),
         ("t_s,x_m\n\n0,1\n0,2\n", "line 4: t_s is 0 after 0; times must increase"),
         ("t_s,x_m\n,1\n", "line 2: t_s is empty"),
-        ("t_s,x_m,std_x_m\n0,1,-1\n", "line 2: std_x_m is -1, must be >= 0"),
+        ("t_s,x_m,std_x_m\n0,1,-1\n", "line 2: std_x_m is -1, must be > 0"),
         ("t_s,x_m,y_m,std_x_m,std_y_m,corr_x_y\n0,1,1,1,1,2\n", "corr_x_y is 2, must be -1 to 1"),
         (
             "t_s,x_m,y_m,z_m,qw,qx,qy,qz\n0,1,1,1,1,1,0,0\n",
             "line 2: the quaternion's length is 1.4",
         ),
+        ("t_s,x_m,std_x_m\n0,1,1\n1,1,\n", "line 3: std_x_m is empty, but the sample is not"),
+        ("t_s,x_m,std_x_m\n0,1,1\n1,1,0\n", "line 3: std_x_m is 0, must be > 0"),
         (b"t_s,x_m\n0,\xff\n", "line 2: not UTF-8"),
     ],
 )
@@ -114,3 +117,21 @@ def test_tum_round_trip_without_missing_samples(tmp_path_factory, seed):
 def test_tum_order_is_x_y_z_w(tmp_path):
     found = read(tmp_path, "# t x y z qx qy qz qw\n1.5 1 2 3 0.6 0 0 0.8\n", "a.tum")
     assert found.values[0] == pytest.approx([1, 2, 3, 2 * np.arcsin(0.6), 0, 0])
+
+
+def test_csv_noise_of_zero_throughout_is_unknown(tmp_path):
+    assert read(tmp_path, "t_s,x_m,std_x_m\n0,1,0\n1,1,0\n").covariances is None
+
+
+def test_csv_noise_of_quaternions_becomes_that_of_the_rotation_vector(tmp_path):
+    rng, sigma, n = np.random.default_rng(0), 1e-3, 40_000
+    q, std = np.array([0.5, -0.1, 0.7, 0.5]), sigma * np.array([1.0, 2.0, 0.5, 0.0])
+    q /= np.linalg.norm(q)
+    header = "t_s,x_m,y_m,z_m,qw,qx,qy,qz,std_x_m,std_y_m,std_z_m,std_qw,std_qx,std_qy,std_qz"
+    row = ",".join(map(repr, [0.0, 1.0, 2.0, 3.0, *q.tolist(), 0.1, 0.2, 0.3, *std.tolist()]))
+    told = read(tmp_path, f"{header}\n{row}\n").covariances[0]
+    assert np.allclose(told[:3, :3], np.diag([0.01, 0.04, 0.09]))
+    turned = matrix_from_quaternion(q + std * rng.normal(size=(n, 4)))
+    seen = np.cov(log_rotation(turned @ matrix_from_quaternion(q).T).T)
+    error = np.abs(seen - told[3:, 3:]).max()
+    assert error < 6.0 * np.sqrt(2.0 / n) * seen.max(), (error, seen)
