@@ -12,7 +12,18 @@ from types import ModuleType
 from freeswing import __version__
 from freeswing.console import Console
 
-COMMANDS = ("check", "report", "convert", "simulate", "board", "home")
+COMMANDS = (
+    "demo",
+    "check",
+    "calibrate",
+    "identify",
+    "report",
+    "run",
+    "convert",
+    "simulate",
+    "board",
+    "home",
+)
 DONE, NO_RESULT, WRONG_INPUT, INTERRUPTED = 0, 1, 2, 130
 
 

@@ -106,7 +106,7 @@ class Session:
         name: label.
         robot: robot.toml.
         target: target.toml, or None.
-        cameras: cameras.toml, which may not be there yet, or None.
+        cameras: cameras.toml, which may not be there yet.
         frame_rate_hz: nominal rate of the recordings, or None.
         calibration: calibration recordings, or None.
         runs: the recorded swings.
@@ -117,8 +117,8 @@ class Session:
     name: str
     robot: Path
     results: Path
+    cameras: Path
     target: Path | None = None
-    cameras: Path | None = None
     frame_rate_hz: float | None = None
     calibration: CalibrationSource | None = None
     runs: tuple[Run, ...] = field(default=())
@@ -159,7 +159,7 @@ def read_session(path: Path | str, results: Path | str | None = None) -> Session
     name = reader.string("name")
     robot = paths.required(reader, "robot")
     target = paths.optional(reader, "target")
-    cameras = paths.optional(reader, "cameras")
+    cameras = paths.optional(reader, "cameras") or path.parent / "cameras.toml"
     rate = reader.optional_number("frame_rate_hz", above=0.0, maximum=1e6)
     section = reader.child("calibration", required=False)
     calibration = None if section is None else _read_calibration(section, paths)
@@ -171,14 +171,10 @@ def read_session(path: Path | str, results: Path | str | None = None) -> Session
     reader.finish()
     problems.raise_if_any(path)
     folder = path.parent / "results" if results is None else Path(results)
-    if results is not None:
-        cameras = folder / "cameras.toml" if _stands_in(folder, cameras) else cameras
-    return Session(path, name, robot, folder, target, cameras, rate, calibration, runs)
-
-
-def _stands_in(results: Path, cameras: Path | None) -> bool:
-    """Whether the cameras of a separate results folder are the ones to use."""
-    return (results / "cameras.toml").is_file() or cameras is None or not cameras.is_file()
+    beside = folder / "cameras.toml"
+    if results is not None and (beside.is_file() or not cameras.is_file()):
+        cameras = beside
+    return Session(path, name, robot, folder, cameras, target, rate, calibration, runs)
 
 
 class _Paths:

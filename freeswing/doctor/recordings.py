@@ -17,7 +17,7 @@ def calibration_findings(session: Session) -> Iterator[Finding]:
     """Cameras that are known, or can be calibrated."""
     if not session.video_runs:
         return
-    has_cameras = session.cameras is not None and session.cameras.is_file()
+    has_cameras = session.cameras.is_file()
     source = session.calibration
     if has_cameras:
         yield from _camera_file(session)
@@ -46,7 +46,7 @@ def video_findings(session: Session, run: Run) -> Iterator[Finding]:
         text = f"{folder} holds no <camera>.mkv and no <camera>/*.png"
         yield Finding("error", subject, text, "correct video")
         return
-    if session.cameras is not None and session.cameras.is_file():
+    if session.cameras.is_file():
         from calib.cameras_file import read_cameras
 
         try:
@@ -78,6 +78,6 @@ def _camera_file(session: Session) -> Iterator[Finding]:
     from calib.cameras_file import read_cameras
 
     try:
-        read_cameras(session.cameras or Path())
+        read_cameras(session.cameras)
     except InputError as failure:
         yield Finding("error", "cameras", str(failure).replace("\n", " "))

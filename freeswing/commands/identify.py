@@ -1,0 +1,75 @@
+"""Identify the inertial parameters from the swings, and check them on held-out runs."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from typing import Any
+
+from freeswing.commands.arguments import add_session, open_session
+from freeswing.console import Console
+from freeswing.session import Session
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """The session and the method."""
+    add_session(parser)
+    parser.add_argument(
+        "--weighting",
+        choices=("published", "covariance"),
+        default="published",
+        help="of FIDIM: as published, or weighted by the samples' covariance",
+    )
+    parser.add_argument(
+        "--fidim-only", action="store_true", help="leave out the maximum-likelihood fit"
+    )
+
+
+def run(options: Namespace, console: Console) -> None:
+    """Identify and say the parameters with their 95 % intervals."""
+    from freeswing.stages import IDENTIFY
+
+    session = open_session(options)
+    settings = {"weighting": options.weighting, "likelihood": not options.fidim_only}
+    result = IDENTIFY.take(session, console, settings)
+    console.say(str(result))
+    console.show_file(result)
+
+
+def make(
+    session: Session, console: Console, settings: dict[str, Any]
+) -> list[tuple[str, dict[str, Any]]]:
+    """identification.json and motion.json as documents."""
+    from freeswing.motions import predicted_motions
+    from freeswing.places import swing_places
+    from freeswing.swings import load_robot, load_swings, load_target
+    from ident.identify import IdentifySettings, identify
+
+    robot = load_robot(session)
+    swings = load_swings(session, robot, load_target(session))
+    chosen = IdentifySettings(
+        weighting=settings["weighting"], maximum_likelihood=settings["likelihood"]
+    )
+    found = identify(list(swings), robot, chosen, console.progress)
+    document = found.document()
+    document["swings"] = swing_places(robot, found)
+    document["entries_m"] = robot.entries_m.tolist()
+    _summarise(document, found.best, console)
+    return [("identification.json", document), ("motion.json", predicted_motions(robot, found))]
+
+
+def _summarise(document: dict[str, Any], best: str, console: Console) -> None:
+    from freeswing.report.words import ESTIMATES, millimetres, number, parameter_row
+
+    console.say(f"{ESTIMATES[best]}, ± 95 %")
+    for parameter in document["estimates"][best]["parameters"]:
+        row = parameter_row(parameter)
+        line = f"  {row['name']:6} {row['value']:>12} ± {row['half_width']:<10} {row['unit']}"
+        console.say(f"{line}  {row['weak']}".rstrip())
+    for dropped in document["estimates"][best]["dropped_runs"]:
+        console.say(f"  run {dropped['run']} left out: {dropped['why']}")
+    for entry in document["validation"]:
+        error, floor = (millimetres(entry[k]) for k in ("prediction_rmse_m", "noise_floor_m"))
+        sigma = number(entry["sigma_perp"])
+        console.say(f"  {entry['run']}: off by {error} (noise {floor}), sigma_perp {sigma}")
+    for note in document["notes"]:
+        console.say(f"  note: {note}")
