@@ -79,7 +79,7 @@ def find_start(homing: Homing) -> StartFit:
         raise DataError("platform.com_m is missing in the robot file: equilibrium needs it")
     energy = TensionEnergy(homing.robot)
     guesses = guess_poses(homing, energy)
-    model = _model_for(homing, energy, guesses[0][0])
+    model = _model_for(homing, guesses[0][0])
     fit = _best_fit(StartProblem(homing, model, homing.geometry), homing, guesses)
     if homing.geometry is not None or fit.chi_square < _DOUBTFUL_FIT * fit.degrees:
         return fit
@@ -122,14 +122,17 @@ def homing_document(robot: Robot, fit: StartFit, seconds: float) -> dict:
     offsets_std = np.sqrt(np.diag(fit.offsets_covariance))
     n = robot.n_cables
     start = fit.poses[0]
-    document = {
+    return {
         "format": "freeswing-homing/1",
-        "start_pose": {"position_m": start[:3], "angles_rad": _wrapped(start[3:])},
-        "start_pose_std": {"position_m": std[:3], "angles_rad": std[3:]},
-        "cable_lengths_m": fit.length_m,
-        "cable_lengths_std_m": offsets_std[n:],
-        "swivel_angles_rad": fit.sigma_rad,
-        "swivel_angles_std_rad": offsets_std[:n],
+        "start_pose": {
+            "position_m": start[:3].tolist(),
+            "angles_rad": _wrapped(start[3:]).tolist(),
+        },
+        "start_pose_std": {"position_m": std[:3].tolist(), "angles_rad": std[3:].tolist()},
+        "cable_lengths_m": fit.length_m.tolist(),
+        "cable_lengths_std_m": offsets_std[n:].tolist(),
+        "swivel_angles_rad": fit.sigma_rad.tolist(),
+        "swivel_angles_std_rad": offsets_std[:n].tolist(),
         "residual_rms": {
             "sigma_rad": _rms(fit, "sigma"),
             "length_m": _rms(fit, "length"),
@@ -147,13 +150,12 @@ def homing_document(robot: Robot, fit: StartFit, seconds: float) -> dict:
         "suspect_readings": _suspects(fit),
         "geometry": _geometry(robot, fit),
     }
-    return document
 
 
-def _model_for(homing: Homing, energy: TensionEnergy, pose: Array) -> RestModel:
+def _model_for(homing: Homing, pose: Array) -> RestModel:
     return RestModel(
         homing.robot,
-        free_indices(energy, pose),
+        free_indices(homing.robot, pose),
         with_tensions=homing.readings.tension_N is not None and homing.noise.tension_N is not None,
         with_tilt=homing.readings.tilt_rad is not None,
     )

@@ -125,7 +125,7 @@ def simulate_acquisition(
     energy = TensionEnergy(robot)
     asked = acquisition_tensions(start_N, largest_N, n_poses)
     poses = _settle(energy, asked / weight)
-    model = RestModel(robot, free_indices(energy, poses[0]))
+    model = RestModel(robot, free_indices(robot, poses[0]))
     lengths = model.evaluate(poses).values[:, model.columns("length")]
     motion = np.sign(np.diff(lengths, axis=0, prepend=lengths[:1]))
     tensions = asked * (1 + errors.friction * motion)

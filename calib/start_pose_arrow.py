@@ -16,6 +16,7 @@ Array = NDArray[np.float64]
 
 _RANK_LIMIT = 1e-13
 _SETTLED = 1e-11
+_STRAIGHT = 0.03
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,7 +159,7 @@ def covariance(linearization: Linearization, weights: Array) -> ArrowCovariance:
 
     The border's covariance is NaN where `rank` falls short of its size.
     """
-    block, mixed, border, _, _ = _weighted(linearization, weights)
+    block, mixed, border, _, _ = _weighted(linearization, weights, weights)
     inverse: Array = np.linalg.inv(block).astype(np.float64)
     gain = inverse @ mixed
     reduced = border - np.einsum("npb,npc->bc", mixed, gain)
@@ -180,27 +181,29 @@ def _robust_cost(linearization: Linearization, limit: float) -> float:
 
 
 def _weighted(
-    linearization: Linearization, weights: Array
+    linearization: Linearization, weights: Array, curvatures: Array
 ) -> tuple[Array, Array, Array, Array, Array]:
     """Blocks, mixed part and border of the normal matrix, and both gradients."""
     by_block = linearization.by_block
-    turned = (by_block * weights[..., None]).swapaxes(1, 2)
+    turned = (by_block * curvatures[..., None]).swapaxes(1, 2)
     flat = linearization.by_border.reshape(-1, linearization.by_border.shape[-1])
-    heavy = flat * weights.reshape(-1, 1)
-    residuals = linearization.residuals
+    heavy = flat * curvatures.reshape(-1, 1)
+    residuals = linearization.residuals * weights
     return (
         turned @ by_block,
         turned @ linearization.by_border,
         flat.T @ heavy + np.diag(linearization.prior_weight**2),
-        (turned @ residuals[..., None])[..., 0],
-        heavy.T @ residuals.ravel() + linearization.prior_weight * linearization.prior,
+        np.einsum("nmp,nm->np", by_block, residuals),
+        flat.T @ residuals.ravel() + linearization.prior_weight * linearization.prior,
     )
 
 
 def _normal_equations(
     linearization: Linearization, limit: float
 ) -> tuple[Array, Array, Array, Array, Array]:
-    return _weighted(linearization, huber_weights(linearization.residuals, limit))
+    """Huber's loss is straight beyond its limit: little curvature there, or steps come short."""
+    weights = huber_weights(linearization.residuals, limit)
+    return _weighted(linearization, weights, np.where(weights < 1, _STRAIGHT * weights, weights))
 
 
 def _damped_step(

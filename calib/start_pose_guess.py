@@ -13,9 +13,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.start_pose_model import evaluate_evenly
-from cdpr.batch import evaluate
-from cdpr.body import rate_matrix, rotation
+from calib.start_pose_model import evaluate_evenly, length_screws
+from cdpr.body import rotation
 from cdpr.free_motion import coordinate_indices
 from cdpr.pulley import Geometry, cable_state
 from cdpr.robot import Robot
@@ -66,16 +65,7 @@ class TensionEnergy:
             ["scalar_energy", "slope", "matrix_curvature"],
             {"cse": True},
         )
-        stacked = ca.vertcat(*lengths)
-        spin = rate_matrix(pose[3:])
-        by_angles = ca.solve(spin.T, ca.jacobian(stacked, pose[3:]).T).T
-        screws = ca.horzcat(ca.jacobian(stacked, pose[:3]), by_angles)
-        self._screws = ca.Function("screws", [pose], [ca.densify(screws)], ["pose"], ["matrix"])
         self.robot = robot
-
-    def screws(self, pose: Array) -> Array:
-        """The cables' screws Xi at a pose (6,), (n, 6): eq. (9)'s J."""
-        return evaluate(self._screws, pose)[0]
 
     def settle(self, poses: Array, pulls: Array, pushes: Array | None = None) -> StableRest:
         """The stable pose downhill of each start.
@@ -144,15 +134,14 @@ def stable_starts(energy: TensionEnergy, pulls: Array) -> Array:
     return np.array([distinct[k] for k in np.argsort(heights)]).reshape(-1, 6)
 
 
-def free_indices(energy: TensionEnergy, pose: Array) -> tuple[int, ...]:
+def free_indices(robot: Robot, pose: Array) -> tuple[int, ...]:
     """Coordinates whose equilibrium rows make F3: the declared ones, else the best conditioned.
 
     The cables' part of the equations is kept invertible by pivoting.
     """
-    robot = energy.robot
     if robot.free_coordinates:
         return tuple(coordinate_indices(robot.free_coordinates))
-    left, bound = energy.screws(pose), []
+    left, bound = length_screws(robot, pose), []
     for _ in range(robot.n_cables):
         sizes = np.linalg.norm(left, axis=0)
         bound.append(int(sizes.argmax()))

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from cdpr.batch import LARGEST_CHUNK, evaluate
 from cdpr.body import rotation
-from cdpr.pulley import Geometry, cable_state
+from cdpr.pulley import CableState, Geometry, cable_state
 from cdpr.robot import Robot
 
 Array = NDArray[np.float64]
@@ -144,6 +144,21 @@ def geometry_labels(robot: Robot) -> tuple[str, ...]:
     return (*points, *radii, *(f"com_{axis}_m" for axis in "xyz"))
 
 
+def length_screws(robot: Robot, pose: Array) -> Array:
+    """The cables' screws at a pose (6,), (n, 6): J of eq. (9)."""
+    symbol = ca.SX.sym("pose", 6)
+    geometry, matrix = Geometry.of(robot), rotation(symbol[3:])
+    states = [cable_state(geometry, i, symbol[:3], matrix) for i in range(robot.n_cables)]
+    return np.array(ca.Function("screws", [symbol], [_screws(states, symbol)])(pose))
+
+
+def _screws(states: list[CableState], pose: Any) -> Any:
+    """[t, a' x t] of every cable, t being the gradient of its length."""
+    directions = ca.jacobian(ca.vertcat(*[state.length for state in states]), pose[:3])
+    moments = [ca.cross(s.lever, directions[i, :].T).T for i, s in enumerate(states)]
+    return ca.horzcat(directions, ca.vertcat(*moments))
+
+
 def _rest_expressions(robot: Robot, free: tuple[int, ...], pose: Any, offsets: Any) -> dict:
     """Symbolic groups of readings; eqs. (3), (6) and (12)-(14)."""
     n = robot.n_cables
@@ -159,14 +174,7 @@ def _rest_expressions(robot: Robot, free: tuple[int, ...], pose: Any, offsets: A
     )
     matrix = rotation(pose[3:])
     states = [cable_state(geometry, i, pose[:3], matrix) for i in range(n)]
-    lengths = ca.vertcat(*[state.length for state in states])
-    directions = ca.jacobian(lengths, pose[:3])
-    screws = ca.vertcat(
-        *[
-            ca.horzcat(directions[i, :], ca.cross(s.lever, directions[i, :].T).T)
-            for i, s in enumerate(states)
-        ]
-    )
+    screws = _screws(states, pose)
     down = geometry.gravity / ca.norm_2(geometry.gravity)
     com = robot.platform.com_m + offsets[7 * n :]
     wrench = ca.vertcat(down, ca.cross(matrix @ com, down))
@@ -175,7 +183,7 @@ def _rest_expressions(robot: Robot, free: tuple[int, ...], pose: Any, offsets: A
     up = -(matrix.T @ down)
     return {
         "sigma": ca.vertcat(*[state.swivel for state in states]),
-        "length": lengths,
+        "length": ca.vertcat(*[state.length for state in states]),
         "statics": screws[:, list(free)].T @ tensions - wrench[list(free)],
         "tension": tensions,
         "tilt": ca.vertcat(ca.atan2(up[1], up[2]), ca.atan2(-up[0], ca.norm_2(up[1:]))),

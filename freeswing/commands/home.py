@@ -9,22 +9,84 @@ from freeswing.console import Console
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """homing.toml."""
-    parser.add_argument("homing", metavar="HOMING", help="homing.toml or its folder")
+    """homing.toml, or a robot file to advise on or to simulate."""
+    parser.add_argument(
+        "homing", metavar="HOMING", help="homing.toml or its folder; with the flags, robot.toml"
+    )
+    other = parser.add_mutually_exclusive_group()
+    other.add_argument(
+        "--advise",
+        action="store_true",
+        help="which pulley axes would home better: write results/homing-advice.json",
+    )
+    other.add_argument(
+        "--simulate",
+        metavar="DIR",
+        help="write a simulated acquisition with its truth to DIR, ready for `home`",
+    )
+    parser.add_argument(
+        "--poses", type=int, default=61, metavar="N", help="static poses to simulate (61)"
+    )
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the simulation (0)")
 
 
 def run(options: Namespace, console: Console) -> None:
-    """Solve the start pose and say where it is."""
+    """Solve the start pose, advise, or simulate."""
+    path = Path(options.homing)
+    if options.advise:
+        _advise(path, console)
+    elif options.simulate:
+        _simulate(path, options, console)
+    else:
+        _home(path, console)
+
+
+def _home(path: Path, console: Console) -> None:
     from calib.start_pose import home
 
-    path = Path(options.homing)
     document = home(path, console.progress)
     pose, std = document["start_pose"], document["start_pose_std"]
     for key, unit, scale in (("position_m", "mm", 1e3), ("angles_rad", "mrad", 1e3)):
         values = ", ".join(f"{scale * value:.3f}" for value in pose[key])
         spread = ", ".join(f"{scale * value:.3f}" for value in std[key])
         console.say(f"{key.partition('_')[0]}: {values} {unit} (std {spread})")
+    for reading in document["suspect_readings"]:
+        console.say(f"suspect: row {reading['row']}, {reading['column']}")
+    ratio = document["chi_square_over_degrees"]
+    if document["noise"]["stated"] and ratio > 2:
+        console.say(
+            f"the readings differ {ratio:.1f} times more (in square) than their stated noise"
+        )
     folder = path if path.is_dir() else path.parent
     result = folder / "results" / "homing.json"
     console.say(str(result))
     console.show_file(result)
+
+
+def _advise(path: Path, console: Console) -> None:
+    from calib.start_pose_advice import advise
+
+    document = advise(path, console.progress)
+    for name in ("declared", "advised"):
+        quality = document[name]
+        console.say(
+            f"{name}: start position to {1e3 * quality['position_std_m']:.2f} mm, "
+            f"conditioning {quality['conditioning']:.1f}"
+        )
+    for cable in document["cables"]:
+        if cable["changed"]:
+            axis = ", ".join(f"{value:.3f}" for value in cable["swivel_z"])
+            console.say(f"cable {cable['name']}: swivel_z = [{axis}]")
+    result = path.parent / "results" / "homing-advice.json"
+    console.say(str(result))
+    console.show_file(result)
+
+
+def _simulate(path: Path, options: Namespace, console: Console) -> None:
+    from calib.start_pose_acquisition import simulate_homing
+    from cdpr.documents import InputError
+
+    if options.poses < 3:
+        raise InputError(f"--poses {options.poses}: at least 3 static poses are needed")
+    made = simulate_homing(path, options.simulate, n_poses=options.poses, seed=options.seed)
+    console.say(str(made))
