@@ -75,7 +75,9 @@ def _chart(estimates: dict[str, Document]) -> object:
                 axes.errorbar(
                     value, -kind, xerr=half_width, fmt="o", ms=4, capsize=3, color=SERIES[kind]
                 )
-            axes.set_title(plain(name), fontsize=9, loc="left")
+            stem, _, unit = name.rpartition("_")
+            title = f"{plain(stem)} ({unit.replace('m2', 'm²')})"
+            axes.set_title(title, fontsize=9, loc="left")
             axes.set_yticks([-kind for kind, *_ in points], [""] * len(points))
             axes.margins(y=0.25)
             axes.locator_params(axis="x", nbins=4)
@@ -86,5 +88,5 @@ def _chart(estimates: dict[str, Document]) -> object:
         labels = [ESTIMATES[name] for name in estimates]
         sheet.legend(handles, labels, loc="outside lower left", ncols=2, fontsize=8)
 
-    caption = "Each estimate of each parameter (m, m²) with its 95 % interval."
+    caption = "Each estimate of each parameter with its 95 % interval."
     return figure(draw, 7.0, 1.0 + 1.15 * rows, caption)

@@ -10,6 +10,8 @@ from freeswing.report.figures import AFTER, BEFORE, figure
 from freeswing.report.material import Document, Material
 from freeswing.report.words import millimetres, number
 
+UNEVEN = 20.0  # times the middle value from which on a logarithmic axis shows more
+
 
 class SigmaByRun:
     """How well the estimate explains each held-out run."""
@@ -52,6 +54,9 @@ def _chart(before: list[Document], after: dict[str, Document]) -> object:
             axes.bar(places, values, width=width, color=colour, label=label)
         axes.set_xticks(range(len(runs)), runs, rotation=60 if len(runs) > 6 else 0)
         axes.set_ylabel("σ⊥")
+        shown = [value for _, _, values in series for value in values if value > 0.0]
+        if shown and max(shown) > UNEVEN * sorted(shown)[len(shown) // 2]:
+            axes.set_yscale("log")
         if after:
             axes.legend()
 
