@@ -16,7 +16,7 @@ from calib.corners import fit_tag, rimmed_cells, to_pixels
 from calib.tag_patterns import cut_dictionary
 from calib.views import FixedPoints
 
-SURVEY_STD_M = 0.0005
+SURVEY_STD_M = 0.0002
 CORNER_NAMES = ("TL", "TR", "BR", "BL")
 _FLOOR_PX = 0.02
 _SAME_PLACE_PX = 1.0
