@@ -63,7 +63,6 @@ class TensionEnergy:
             [energy, slope, ca.densify(curvature)],
             ["pose", "pulls", "pushes"],
             ["scalar_energy", "slope", "matrix_curvature"],
-            {"cse": True},
         )
         self.robot = robot
 

@@ -97,7 +97,7 @@ class RestModel:
         """A function for `evaluate`, which tells matrices by their names."""
         names = ["values", *(f"matrix_{k}" for k in range(len(jacobians)))]
         inputs, outputs = [self._pose, self._offsets], [self._values, *jacobians]
-        return ca.Function("rest", inputs, outputs, ["pose", "offsets"], names, {"cse": True})
+        return ca.Function("rest", inputs, outputs, ["pose", "offsets"], names)
 
     def evaluate(
         self, poses: Array, offsets: Array | None = None, *, by_geometry: bool = False
@@ -149,14 +149,18 @@ def length_screws(robot: Robot, pose: Array) -> Array:
     symbol = ca.SX.sym("pose", 6)
     geometry, matrix = Geometry.of(robot), rotation(symbol[3:])
     states = [cable_state(geometry, i, symbol[:3], matrix) for i in range(robot.n_cables)]
-    return np.array(ca.Function("screws", [symbol], [_screws(states, symbol)])(pose))
+    return np.array(ca.Function("screws", [symbol], [_screws(geometry, states)])(pose))
 
 
-def _screws(states: list[CableState], pose: Any) -> Any:
-    """[t, a' x t] of every cable, t being the gradient of its length."""
-    directions = ca.jacobian(ca.vertcat(*[state.length for state in states]), pose[:3])
-    moments = [ca.cross(s.lever, directions[i, :].T).T for i, s in enumerate(states)]
-    return ca.horzcat(directions, ca.vertcat(*moments))
+def _screws(geometry: Geometry, states: list[CableState]) -> Any:
+    """[t, a' x t] of every cable; t by eq. (4), the gradient of the length."""
+    rows = []
+    for axes, state in zip(geometry.axes, states, strict=True):
+        reach = ca.sin(state.wrap)
+        local = [reach * ca.cos(state.swivel), reach * ca.sin(state.swivel), -ca.cos(state.wrap)]
+        direction = axes.T @ ca.vertcat(*local)
+        rows.append(ca.vertcat(direction, ca.cross(state.lever, direction)).T)
+    return ca.vertcat(*rows)
 
 
 def _rest_expressions(robot: Robot, free: tuple[int, ...], pose: Any, offsets: Any) -> dict:
@@ -174,12 +178,12 @@ def _rest_expressions(robot: Robot, free: tuple[int, ...], pose: Any, offsets: A
     )
     matrix = rotation(pose[3:])
     states = [cable_state(geometry, i, pose[:3], matrix) for i in range(n)]
-    screws = _screws(states, pose)
+    screws = _screws(geometry, states)
     down = geometry.gravity / ca.norm_2(geometry.gravity)
     com = robot.platform.com_m + offsets[7 * n :]
     wrench = ca.vertcat(down, ca.cross(matrix @ com, down))
     bound = [k for k in range(6) if k not in free]
-    tensions = ca.solve(screws[:, bound].T, wrench[bound])
+    tensions = ca.inv(screws[:, bound].T) @ wrench[bound]
     up = -(matrix.T @ down)
     return {
         "sigma": ca.vertcat(*[state.swivel for state in states]),
