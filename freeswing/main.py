@@ -20,6 +20,7 @@ COMMANDS = (
     "report",
     "run",
     "convert",
+    "export",
     "simulate",
     "board",
     "home",

@@ -1,0 +1,67 @@
+"""Export the identified platform for other programs: URDF, MJCF or JSON."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from typing import TYPE_CHECKING
+
+from freeswing.commands.arguments import add_session, open_session
+from freeswing.console import Console
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from cdpr.robot import Robot
+    from freeswing.exports import Inertia
+
+SUFFIXES = {"urdf": ".urdf", "mjcf": ".xml", "plain": ".json"}
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """The session, the format and the mass."""
+    add_session(parser)
+    kinds = parser.add_mutually_exclusive_group(required=True)
+    kinds.add_argument("--urdf", dest="kind", action="store_const", const="urdf")
+    kinds.add_argument("--mjcf", dest="kind", action="store_const", const="mjcf")
+    kinds.add_argument("--plain", dest="kind", action="store_const", const="plain", help="JSON")
+    parser.add_argument(
+        "--mass-kg", type=float, help="mass, where neither payload runs nor robot.toml tell it"
+    )
+
+
+def run(options: Namespace, console: Console) -> None:
+    """Write results/platform.urdf, .xml or .json."""
+    from cdpr.documents import replace_file, write_json
+    from freeswing import exports
+    from freeswing.swings import load_robot
+
+    session = open_session(options)
+    robot = load_robot(session)
+    inertia = _inertia(options, session.results, robot)
+    path = session.results / f"platform{SUFFIXES[options.kind]}"
+    if options.kind == "plain":
+        write_json(path, exports.plain(robot, inertia))
+    else:
+        text = getattr(exports, options.kind)(robot, inertia)
+        replace_file(path, text.encode("utf-8"))
+    console.say(str(path))
+    console.show_file(path)
+
+
+def _inertia(options: Namespace, results: Path, robot: Robot) -> Inertia:
+    from cdpr.documents import DataError
+    from freeswing.exports import inertia_from
+    from freeswing.report.material import ESTIMATE_ORDER, read_result
+
+    identification = read_result(results / "identification.json", "identification")
+    diagnosis = read_result(results / "diagnosis.json", "diagnosis")
+    estimates = identification.get("estimates") or {}
+    best = next((estimates[name] for name in ESTIMATE_ORDER if estimates.get(name)), None)
+    if best is None:
+        raise DataError(f"{results}: nothing is identified yet; run freeswing identify first")
+    rows = diagnosis.get("parameters_after") or best["parameters"]
+    values = {row["name"]: row["value"] for row in [*best["parameters"], *rows]}
+    mass = options.mass_kg or values.get("mass_kg") or robot.platform.mass_kg
+    if not mass or mass <= 0.0:
+        raise DataError("swings alone do not tell the mass: give --mass-kg, or payload runs")
+    return inertia_from(values, float(mass))
