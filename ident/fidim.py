@@ -98,10 +98,10 @@ def rank_loss_sentence(solution: TotalLeastSquares) -> str:
     weights = np.abs(solution.blind)
     names = [INERTIA_NAMES[i] for i in np.argsort(-weights) if weights[i] > 0.3 * weights.max()]
     return (
-        f"the swings do not determine the nine inertial parameters: the regressor's ninth singular "
-        f"value is {solution.singular_values[-2]:.3g}, {solution.gap:.2g} times the tenth (at least "
-        f"{LEAST_GAP:g} is needed), blind along {', '.join(names)}; record larger swings in all modes about "
-        f"more equilibria"
+        "the swings do not determine the nine inertial parameters: the regressor's ninth singular "
+        f"value is {solution.singular_values[-2]:.3g}, {solution.gap:.2g} times the tenth (at "
+        f"least {LEAST_GAP:g} is needed), blind along {', '.join(names)}; record larger swings in "
+        "all modes about more equilibria"
     )
 
 

@@ -51,19 +51,19 @@ def regular_grid(times_s: Array, values: Array) -> Grid:
     if len(times_s) < 8:
         raise ValueError(f"{len(times_s)} samples, at least 8 are needed")
     steps = np.diff(times_s)
-    if not (steps > 0.0).all():
-        first = int(np.argmax(steps <= 0.0))
+    if not np.all(steps > 0.0):
+        first = int(np.argmin(steps))
         raise ValueError(f"times do not increase at {times_s[first]:.6g} s: sort the samples")
     period = float(np.median(steps))
     index = np.concatenate([[0], np.cumsum(np.maximum(1, np.round(steps / period)))]).astype(int)
     slope, start = np.polyfit(index, times_s, 1)
     grid_times = start + slope * np.arange(index[-1] + 1)
-    offset = grid_times[index] - times_s
+    offset = np.asarray(grid_times[index] - times_s, dtype=np.float64)
     moved = values
     if np.abs(offset).max() > 1e-3 * slope:
         moved = values + offset[:, None] * np.gradient(values, times_s, axis=0)
     gridded = np.full((len(grid_times), values.shape[1]), np.nan)
-    gridded[index] = np.where(np.isfinite(moved).all(axis=1)[:, None], moved, np.nan)
+    gridded[index] = np.where(np.isnan(moved).any(axis=1, keepdims=True), np.nan, moved)
     source = np.full(len(grid_times), -1)
     source[index] = np.arange(len(times_s))
     return Grid(grid_times, gridded, source, float(slope), float(np.abs(offset).max()))
@@ -107,6 +107,11 @@ def bridges(missing: NDArray[np.bool_], longest: int) -> list[Bridge]:
         for index in range(start, end):
             made.append(Bridge(index, donors, (index - centre) ** powers @ fit))
     return made
+
+
+def incomplete(values: Array) -> NDArray[np.bool_]:
+    """True where a sample misses a coordinate, (n,)."""
+    return np.asarray(np.isnan(values).any(axis=1))
 
 
 def bridged(values: Array, made: list[Bridge]) -> Array:

@@ -22,6 +22,7 @@ from ident.sampling import (
     Grid,
     bridged,
     bridges,
+    incomplete,
     jump_sizes,
     regular_grid,
     white_noise_std,
@@ -130,13 +131,13 @@ def signals_of(run: SwingRun, settings: SignalSettings | None = None) -> Signals
     except ValueError as error:
         raise UnusableRunError(str(error)) from error
     gap_samples = int(settings.longest_gap_s / grid.period_s + 1e-9)
-    made = bridges(np.isnan(grid.values).any(axis=1), gap_samples)
+    made = bridges(incomplete(grid.values), gap_samples)
     filled = bridged(grid.values, made)
     jumps = _jumps(filled, trajectory.coordinates, settings)
     window = _window(run, grid, filled, jumps, kernels)
     inside = (grid.times_s >= window[0] - 1e-9) & (grid.times_s <= window[1] + 1e-9)
     missing = _missing_share(grid, inside, settings)
-    usable = np.isfinite(filled).all(axis=1)
+    usable = ~incomplete(filled)
     if settings.processing == "centred":
         usable &= inside
     centres = _centres(usable, inside, jumps, kernels, settings)
@@ -169,7 +170,7 @@ def _missing_share(grid: Grid, inside: NDArray[np.bool_], settings: SignalSettin
             f"no sample in its window; the recording covers {grid.times_s[0]:.2f} to "
             f"{grid.times_s[-1]:.2f} s"
         )
-    missing = float(np.isnan(grid.values[inside]).any(axis=1).mean())
+    missing = float(incomplete(grid.values[inside]).mean())
     if missing > settings.largest_missing:
         raise UnusableRunError(
             f"{100 * missing:.0f} % of its samples are missing (occluded), "
@@ -184,7 +185,7 @@ def _window(
     """The stated window, or the one found from the smoothed samples."""
     if run.window_s is not None:
         return run.window_s
-    unbroken = _unbroken(np.isfinite(filled).all(axis=1), jumps, kernels.half)
+    unbroken = _unbroken(~incomplete(filled), jumps, kernels.half)
     centres = np.flatnonzero(unbroken)
     if len(centres) < _LEAST_OUTPUTS:
         raise UnusableRunError("no unbroken stretch of samples to look for free motion in")

@@ -92,9 +92,7 @@ def noisy_regressor(
     )
 
 
-def _thinned(
-    signals: Signals, motion: SwingMotion, every: int
-) -> tuple[Signals, SwingMotion]:
+def _thinned(signals: Signals, motion: SwingMotion, every: int) -> tuple[Signals, SwingMotion]:
     names = ("times_s", "values", "velocities", "accelerations", "covariances")
     kept = {name: getattr(signals, name)[::every] for name in names}
     taken = ("times_s", "zetas", "rates", "accelerations")

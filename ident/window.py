@@ -47,15 +47,18 @@ def free_window(
     )
     modes = _principal(velocities * scale)
     centred = values - np.median(values, axis=0)
-    state = [array * scale @ modes for array in (centred, velocities, accelerations)]
+    value, velocity, acceleration = (
+        array * scale @ modes for array in (centred, velocities, accelerations)
+    )
+    state = [value, velocity, acceleration]
     stretches = _stretches(times_s)
     if not stretches:
         raise ValueError(
             f"no window_s given, and {times_s[-1] - times_s[0]:.1f} s of samples hold no unbroken "
             f"{REFERENCE_S:g} s to look for a free swing in"
         )
-    liveliness = np.array([np.sqrt(np.mean(state[2][s] ** 2)) for s in stretches])
-    misfit = np.array([_misfit(*state, stretch) for stretch in stretches])
+    liveliness = np.array([np.sqrt(np.mean(acceleration[s] ** 2)) for s in stretches])
+    misfit = np.array([_misfit(value, velocity, acceleration, stretch) for stretch in stretches])
     candidate = np.where(liveliness > 0.1 * np.median(liveliness), misfit, np.inf)
     best = int(np.argmin(candidate))
     if not candidate[best] <= _FOLLOWS:
@@ -79,7 +82,8 @@ def free_window(
 def _principal(velocities: Array) -> Array:
     """Directions that the motion really takes, (n_c, k): the dependent coordinates add nothing."""
     _, sizes, axes = np.linalg.svd(velocities, full_matrices=False)
-    return axes[: min(int((sizes > 0.05 * sizes[0]).sum()), _MOST_MODES)].T
+    kept = min(int((sizes > 0.05 * sizes[0]).sum()), _MOST_MODES)
+    return np.asarray(axes[:kept].T, dtype=np.float64)
 
 
 def _stretches(times_s: Array) -> list[slice]:
@@ -135,4 +139,5 @@ def _grown(times_s: Array, state: list[Array], free: slice) -> slice:
 
 def _moving_mean(values: Array, width: int) -> NDArray[np.float64]:
     kernel = np.ones(width)
-    return np.convolve(values, kernel, "same") / np.convolve(np.ones(len(values)), kernel, "same")
+    share = np.convolve(np.ones(len(values)), kernel, "same")
+    return np.asarray(np.convolve(values, kernel, "same") / share, dtype=np.float64)
