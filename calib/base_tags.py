@@ -18,7 +18,7 @@ from calib.views import FixedPoints
 
 SURVEY_STD_M = 0.0002
 CORNER_NAMES = ("TL", "TR", "BR", "BL")
-_FLOOR_PX = 0.02
+_FLOOR_PX = 0.01
 _SAME_PLACE_PX = 1.0
 _MARGIN = 0.4
 

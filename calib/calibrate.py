@@ -48,7 +48,7 @@ def calibrate_session(
     cameras_path: Path | str | None = None,
     results_folder: Path | str | None = None,
     model: str = DEFAULT_MODEL,
-    survey_std_m: float = SURVEY_STD_M,
+    survey_std_m: float | None = None,
     progress: Progress | None = None,
 ) -> CalibrationResult:
     """Calibrate cameras, clocks and base frame from recordings of a board.
@@ -70,7 +70,7 @@ def calibrate_session(
         cameras_path: cameras.toml to write, None for none.
         results_folder: takes calibration.json, None for none.
         model: lens model of every camera.
-        survey_std_m: standard deviation of a surveyed coordinate.
+        survey_std_m: standard deviation of a surveyed coordinate; measured from the fit when None.
         progress: told a label and the fraction done.
 
     Raises:
@@ -96,14 +96,15 @@ def calibrate_session(
     if base_tags:
         told("base tags", 0.8)
         stills = [camera.still_frames for camera in sightings]
-        seen = find_base_tags(rig.cameras, stills, base_tags, rig.adjustment.sigma_px, survey_std_m)
+        std = SURVEY_STD_M if survey_std_m is None else survey_std_m
+        seen = find_base_tags(rig.cameras, stills, base_tags, rig.adjustment.sigma_px, std)
         warnings += [
             f"camera {name}: its base tags moved by {drift:.1f} px during the recording; "
             "fasten it and record again"
             for name, drift in seen.moved
         ]
         fixed = seen.fixed
-        rig = tie_to_base(rig, fixed)
+        rig = tie_to_base(rig, fixed, estimate_survey=survey_std_m is None)
     else:
         reference = rig.cameras[rig.reference].name
         warnings.append(

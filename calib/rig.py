@@ -18,9 +18,13 @@ from calib.views import FixedPoints, Views
 Progress = Callable[[str, float], None]
 
 VIEW_OUTLIER_SIGMAS = 5.0
+VIEW_OUTLIER_FLOOR_PX = 0.5
 CORNER_OUTLIER_SIGMAS = 6.0
 _LEAST_CORNERS = 4
 _MOST_SWEEPS = 3
+_SURVEY_ROUNDS = 3
+_SURVEY_PRIOR = 2.0
+LEAST_SURVEY_STD_M = 2e-5
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,7 +140,7 @@ def _views_kept(result: Adjustment, problem: Problem) -> tuple[np.ndarray, Array
         own = problem.views.camera == index
         if own.any():
             usual = max(float(np.median(errors[own])), float(result.sigma_px[index]))
-            limits[own] = VIEW_OUTLIER_SIGMAS * usual
+            limits[own] = max(VIEW_OUTLIER_SIGMAS * usual, VIEW_OUTLIER_FLOOR_PX)
     return errors <= limits, limits, errors
 
 
@@ -149,13 +153,41 @@ def _trimmed(result: Adjustment, problem: Problem) -> Views:
     return replace(problem.views, pixels=np.where(far[..., None], np.nan, problem.views.pixels))
 
 
-def tie_to_base(rig: Rig, fixed: FixedPoints) -> Rig:
-    """The rig in the base frame, surveyed points adjusted with everything else."""
+def tie_to_base(rig: Rig, fixed: FixedPoints, *, estimate_survey: bool = True) -> Rig:
+    """The rig in the base frame, surveyed points adjusted with everything else.
+
+    Args:
+        rig: solved in its own frame.
+        fixed: surveyed points and their sightings.
+        estimate_survey: measure the survey's noise from how it fits, instead of taking it as given.
+    """
     scene = place_in_base(rig.adjustment.scene, fixed)
     free = free_unknowns(scene.cameras, n_fixed=len(fixed.points_base_m))
     problem = replace(rig.problem, fixed=fixed, free=free)
-    result = adjust(scene, problem, rig.adjustment.sigma_px, rounds=2)
+    result = adjust(scene, problem, rig.adjustment.sigma_px, rounds=1)
+    for _ in range(_SURVEY_ROUNDS if estimate_survey else 1):
+        if estimate_survey:
+            std = _survey_std(result, fixed)
+            fixed = replace(fixed, std_m=np.full(len(fixed.std_m), std))
+            problem = replace(problem, fixed=fixed)
+        result = adjust(result.scene, problem, result.sigma_px, rounds=1)
     return Rig(result, problem, rig.reference, rig.dropped, rig.n_trimmed)
+
+
+def _survey_std(result: Adjustment, fixed: FixedPoints) -> float:
+    """Standard deviation of a surveyed coordinate from the corrections the cameras ask for.
+
+    Variance component estimation: squared corrections over the redundancy that carries them
+    (Foerstner and Wrobel 2016, sec. 4.2.4). Few corrections leave the given value nearly alone:
+    it counts as `_SURVEY_PRIOR` corrections of its own.
+    """
+    correction = result.scene.base_points_m - fixed.points_base_m
+    given = float(fixed.std_m.mean())
+    own = slice(len(result.covariance) - correction.size, None)
+    left = np.diag(result.covariance)[own] / given**2
+    redundancy = max(float(correction.size - left.sum()), 0.0)
+    total = float(np.sum(correction**2)) + _SURVEY_PRIOR * given**2
+    return max(np.sqrt(total / (redundancy + _SURVEY_PRIOR)), LEAST_SURVEY_STD_M)
 
 
 def _joined(parts: list[Views]) -> Views:
