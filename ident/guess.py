@@ -1,0 +1,106 @@
+"""Where the likelihood fit starts each run: a pose and rates at the first sample, from the samples.
+
+Full poses are smoothed. Free coordinates alone are completed by the cable lengths; where they
+pass too close to a singularity for that, small oscillations about the equilibrium are fitted.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cdpr.free_motion import assemble
+from cdpr.model import Model
+from cdpr.robot import POSE_COORDINATES, Array
+from cdpr.statics import Equilibrium, equilibrium_at_lengths, modes, random_poses
+from ident.likelihood_run import Samples
+
+SMOOTHED_S = 0.4
+SMOOTHED_DEGREE = 4
+MODAL_S = 1.5
+LEAD_IN = 40
+EQUILIBRIUM_STARTS = 40
+
+
+def first_state(model: Model, samples: Samples, inertia: Array) -> Array:
+    """Start state [zeta; rates], (12,), of a run.
+
+    Args:
+        model: the equations that the fit will use.
+        samples: of the run.
+        inertia: first inertia, (9,).
+
+    Raises:
+        ValueError: when the samples or lengths cannot give a state, saying why.
+    """
+    if samples.coordinates == POSE_COORDINATES:
+        return np.concatenate(_smoothed_start(samples.times_s, samples.values))
+    if samples.lengths_m is None:
+        raise ValueError(
+            f"run {samples.name}: only {', '.join(samples.coordinates)} are measured and "
+            "cable_lengths_m is not given: give the lengths that the winches held, or measure "
+            "full poses"
+        )
+    rest = taut_equilibrium(model, samples.lengths_m, inertia, samples.name)
+    try:
+        return _assembled_start(model, samples, rest)
+    except (ValueError, np.linalg.LinAlgError):
+        return _modal_start(model, samples, rest, inertia)
+
+
+def taut_equilibrium(model: Model, lengths_m: Array, inertia: Array, run: str) -> Equilibrium:
+    """A stable equilibrium with all cables taut at given lengths.
+
+    Raises:
+        ValueError: when none is found, naming the run.
+    """
+    generator = np.random.default_rng(0)
+    for start in random_poses(model, generator, EQUILIBRIUM_STARTS):
+        rest = equilibrium_at_lengths(model, lengths_m, start, inertia)
+        if rest is not None and rest.stable and rest.taut:
+            return rest
+    raise ValueError(
+        f"run {run}: no stable equilibrium with taut cables at lengths {np.round(lengths_m, 4)} "
+        "m: check cable_lengths_m and the robot's geometry"
+    )
+
+
+def _smoothed_start(times_s: Array, values: Array) -> tuple[Array, Array]:
+    """Value and rate at the first sample of a polynomial through the first samples."""
+    inside = times_s <= times_s[0] + SMOOTHED_S
+    inside[: 2 * (SMOOTHED_DEGREE + 1)] = True
+    polynomial = np.polynomial.polynomial.polyfit(
+        times_s[inside] - times_s[0], values[inside], SMOOTHED_DEGREE
+    )
+    return polynomial[0], polynomial[1]
+
+
+def _assembled_start(model: Model, samples: Samples, rest: Equilibrium) -> Array:
+    """Dependent coordinates from the lengths (FIDIM 2022, eq. 44), then smoothed."""
+    inside = samples.times_s <= samples.times_s[0] + SMOOTHED_S
+    inside[: 2 * (SMOOTHED_DEGREE + 1)] = True
+    free = samples.values[inside]
+    fractions = np.linspace(0.0, 1.0, LEAD_IN, endpoint=False)[:, None]
+    home = rest.zeta[samples.columns]
+    path = np.vstack([home + fractions * (free[0] - home), free])
+    names = samples.coordinates
+    poses = assemble(model, names, samples.lengths_m, path, rest.zeta).zetas[LEAD_IN:]
+    return np.concatenate(_smoothed_start(samples.times_s[inside], poses))
+
+
+def _modal_start(model: Model, samples: Samples, rest: Equilibrium, inertia: Array) -> Array:
+    """Small oscillations (FIDIM 2022, eqs. 38, 39) fitted to the first samples."""
+    shapes = modes(model, rest, inertia)
+    inside = samples.times_s <= samples.times_s[0] + MODAL_S
+    phase = (
+        2 * np.pi * np.outer(samples.times_s[inside] - samples.times_s[0], shapes.frequencies_hz)
+    )
+    columns = samples.columns
+    seen = shapes.shapes[columns]
+    design = np.concatenate(
+        [np.cos(phase)[:, None] * seen, np.sin(phase)[:, None] * seen], axis=2
+    ).reshape(-1, 2 * shapes.shapes.shape[1])
+    right = (samples.values[inside] - rest.zeta[columns]).reshape(-1)
+    amplitudes = np.linalg.lstsq(design, right, rcond=1e-4)[0]
+    cosine, sine = np.split(amplitudes, 2)
+    rates = shapes.shapes @ (2 * np.pi * shapes.frequencies_hz * sine)
+    return np.concatenate([rest.zeta + shapes.shapes @ cosine, rates])

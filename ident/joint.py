@@ -1,0 +1,178 @@
+"""The joint problem of all runs: cost, Gauss-Newton steps and noise scales."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cdpr.free_motion import admissible_rates
+from cdpr.model import Model
+from cdpr.robot import Array
+from cdpr.sensitivity import linearise
+from cdpr.simulation import Motion, simulate
+from ident.likelihood_run import Samples, lengths_residual, reduce_run, residuals
+
+TOLERANCE_M = 1e-8
+INERTIA_UNIT = np.array([0.05, 0.05, 0.05, 0.02, 0.02, 0.02, 0.01, 0.01, 0.01])
+RANK_LIMIT = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """Values of all unknowns.
+
+    Attributes:
+        inertia: (9,).
+        values: effect values, (k,).
+        starts: initial [zeta; rates] of each run, (runs, 12).
+        scales: noise scales of metres and radians, (2,).
+        motions: the simulated motions; empty before the first simulation.
+    """
+
+    inertia: Array
+    values: Array
+    starts: Array
+    scales: Array
+    motions: tuple[Motion, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """A damped Gauss-Newton step.
+
+    Attributes:
+        shared: change of inertia and values, (9 + k,).
+        states: change of each run's initial [zeta; rates], (12,).
+        triangle: R of the scaled joint problem in the free unknowns.
+        singular_values: of that triangle, descending.
+        rank: how many of them count.
+        decrease: of the cost in the shared unknowns that an undamped linear step would bring.
+    """
+
+    shared: Array
+    states: tuple[Array, ...]
+    triangle: Array
+    singular_values: Array
+    rank: int
+    decrease: float
+
+
+class Problem:
+    """What does not change while the unknowns do.
+
+    Args:
+        model: the equations, with the effects to be estimated.
+        samples: of the runs.
+        free: which of the 9 + k shared unknowns to estimate; None for all.
+        estimate_scales: whether noise scales follow the residuals.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        samples: Sequence[Samples],
+        free: np.ndarray | None = None,
+        estimate_scales: bool = True,
+    ) -> None:
+        parameters = model.parameters
+        self.model = model
+        self.samples = tuple(samples)
+        count = 9 + len(parameters)
+        self.free = np.ones(count, dtype=bool) if free is None else np.asarray(free, dtype=bool)
+        self.estimate_scales = estimate_scales
+        self.prior_centre = model.start_values
+        self.prior_std = np.array([max(p.high - p.start, p.start - p.low) for p in parameters])
+        self.unit = np.concatenate([INERTIA_UNIT, [p.scale for p in parameters]])
+
+    def simulated(self, state: State) -> State:
+        """The state with motions from its starts, whose rates are made admissible.
+
+        Raises:
+            ValueError: when one cannot be followed, naming the run.
+        """
+        motions = tuple(
+            self._followed(state, start, samples)
+            for start, samples in zip(state.starts, self.samples, strict=True)
+        )
+        starts = np.array([np.concatenate([one.zetas[0], one.rates[0]]) for one in motions])
+        return replace(state, starts=starts, motions=motions)
+
+    def _followed(self, state: State, start: Array, samples: Samples) -> Motion:
+        zeta, inertia, values, span = start[:6], state.inertia, state.values, samples.span_s
+        rates = admissible_rates(self.model, zeta, start[6:], inertia, values, span[0])
+        try:
+            return simulate(self.model, zeta, rates, span, inertia, values, TOLERANCE_M)
+        except (ValueError, np.linalg.LinAlgError) as error:
+            raise ValueError(f"run {samples.name}: {error}") from error
+
+    def cost(self, state: State) -> float:
+        """Sum of squared whitened residuals, lengths and priors included."""
+        total = float(np.sum(self.prior(state.values) ** 2))
+        for motion, samples in zip(state.motions, self.samples, strict=True):
+            total += float(np.sum(residuals(motion, samples, state.scales) ** 2))
+            total += float(np.sum(lengths_residual(motion, samples) ** 2))
+        return total
+
+    def prior(self, values: Array) -> Array:
+        """Distance of the effect values from where they do nothing, over their range, (k,)."""
+        return (values - self.prior_centre) / self.prior_std
+
+    def step(self, state: State, damping: float) -> Step:
+        """A damped Gauss-Newton step at the motions of a state."""
+        reduced = [
+            reduce_run(linearise(motion), samples, state.scales)
+            for motion, samples in zip(state.motions, self.samples, strict=True)
+        ]
+        rows = np.vstack([*(run.rows[:-1] for run in reduced), self._prior_rows(state)])
+        free = self.free
+        scaled = rows[:, :-1][:, free] * self.unit[free]
+        shared = np.zeros(len(free))
+        n_free = int(free.sum())
+        full = np.linalg.qr(np.column_stack([scaled, rows[:, -1]]), mode="r")
+        triangle, right = full[:n_free, :n_free], full[:n_free, -1]
+        left, singular, back = np.linalg.svd(triangle)
+        largest = singular.max(initial=0.0)
+        kept = singular > RANK_LIMIT * largest
+        gains = np.where(kept, singular / (singular**2 + damping * largest**2 + 1e-300), 0.0)
+        shared[free] = -self.unit[free] * (back.T @ (gains * (left.T @ right)))
+        shared *= min(1.0, 3.0 / max(np.abs(shared / self.unit).max(initial=0.0), 1e-300))
+        states = tuple(run.state_change(shared) for run in reduced)
+        decrease = float(right @ right)
+        return Step(shared, states, triangle, singular, int(kept.sum()), decrease)
+
+    def _prior_rows(self, state: State) -> Array:
+        rows = np.zeros((len(self.prior_std), len(self.free) + 1))
+        rows[:, 9:-1] = np.diag(1.0 / self.prior_std)
+        rows[:, -1] = self.prior(state.values)
+        return rows
+
+    def moved(self, state: State, step: Step) -> State | None:
+        """The simulated state after a step, or None where it cannot be simulated."""
+        aimed = replace(
+            state,
+            inertia=state.inertia + step.shared[:9],
+            values=state.values + step.shared[9:],
+            starts=state.starts + np.array(step.states),
+        )
+        try:
+            return self.simulated(aimed)
+        except ValueError:
+            return None
+
+    def rescaled(self, state: State) -> State:
+        """The state with noise scales that make the whitened residuals' variance one."""
+        if not self.estimate_scales:
+            return state
+        squares, counts = np.zeros(2), np.zeros(2)
+        for motion, samples in zip(state.motions, self.samples, strict=True):
+            white = residuals(motion, samples, state.scales)
+            for g in (0, 1):
+                squares[g] += np.sum(white[:, samples.groups == g] ** 2)
+                counts[g] += white[:, samples.groups == g].size
+        own = (12 - self.model.robot.n_cables) * len(self.samples)
+        share = 1.0 - min(0.9, (own + self.free.sum()) / max(counts.sum(), 1.0))
+        factors = np.sqrt(squares / np.maximum(share * counts, 1.0))
+        scales = np.where(counts > 0, state.scales * np.maximum(factors, 1e-6), state.scales)
+        return replace(state, scales=scales)
