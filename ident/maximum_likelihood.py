@@ -66,32 +66,6 @@ def started(
     return samples, first_state(model, samples, inertia)
 
 
-def prediction_rms(
-    model: Model, run: PreparedRun, free: tuple[str, ...] | None, inertia: Array
-) -> tuple[float, float]:
-    """How far the motion that an estimate predicts lies from a run's samples, in m and in rad.
-
-    The run's initial state and cable lengths are fitted, the inertia is not.
-
-    Args:
-        model: the robot.
-        run: the run to predict.
-        free: the coordinates to use of it, or None for full poses.
-        inertia: the nine parameters, (9,).
-
-    Returns:
-        Root mean square of the residuals a coordinate, NaN where none was measured.
-
-    Raises:
-        ValueError: when the motion cannot be simulated.
-    """
-    samples, first = started(model, run, free, inertia)
-    state = State(np.array(inertia), model.start_values, first[None], np.ones(2))
-    held = np.zeros(9, dtype=bool)
-    found = fit(model, [samples], state, free=held, estimate_scales=False)
-    return float(found.noise[0]), float(found.noise[1])
-
-
 def _entry(found: LikelihoodFit, dropped: tuple[DroppedRun, ...]) -> Estimate:
     covariance = found.covariance[:9, :9]
     if not np.isfinite(covariance).all():

@@ -8,8 +8,8 @@ import numpy as np
 
 from cdpr.model import Model
 from cdpr.robot import POSE_COORDINATES, Array
-from ident.maximum_likelihood import prediction_rms
 from ident.motion import regressor
+from ident.prediction import Prediction, predict
 from ident.prepare import PreparedRun
 
 
@@ -24,6 +24,7 @@ class ValidatedRun:
             over the whole run, its initial state and lengths fitted; None where that fails.
         noise_floor_m: what the samples' own noise would leave.
         note: what a reader should know, or empty.
+        prediction: the predicted samples, where they were asked for.
     """
 
     run: str
@@ -31,6 +32,7 @@ class ValidatedRun:
     prediction_rmse_m: float | None
     noise_floor_m: float | None
     note: str = ""
+    prediction: Prediction | None = None
 
     def document(self) -> dict[str, object]:
         """The entry of `validation` in results/identification.json."""
@@ -73,19 +75,19 @@ def validate_run(
     if motion is None:
         raise ValueError(f"run {run.name}: {run.why_not_free or 'full poses were not measured'}")
     # Near a singularity of the free coordinates the projected equations blow up: say so.
-    rmse, note = None, run.why_not_free if full else ""
+    prediction, note = None, run.why_not_free if full else ""
     try:
         if simulated:
-            in_metres, _ = prediction_rms(model, run, None if full else motion.free, inertia)
-            rmse = in_metres if np.isfinite(in_metres) else None
+            prediction = predict(model, run, None if full else motion.free, inertia)
     except (ValueError, np.linalg.LinAlgError) as error:
         note = f"not predicted: {error}"
     return ValidatedRun(
         run.name,
         sigma_perp(regressor(model, motion), inertia),
-        rmse,
+        None if prediction is None else prediction.rmse_m,
         _noise_floor(run, motion.free, full),
         note,
+        prediction,
     )
 
 

@@ -54,7 +54,7 @@ def make(
     document["swings"] = swing_places(robot, found)
     document["entries_m"] = robot.entries_m.tolist()
     _summarise(document, found.best, console)
-    return [("identification.json", document), ("motion.json", predicted_motions(robot, found))]
+    return [("identification.json", document), ("motion.json", predicted_motions(found))]
 
 
 def _summarise(document: dict[str, Any], best: str, console: Console) -> None:

@@ -1,0 +1,101 @@
+"""The motion that an estimate predicts for a run: simulated, its initial state fitted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cdpr.model import Model
+from cdpr.robot import POSE_COORDINATES, Array, frozen_array
+from ident.joint import State
+from ident.likelihood import LikelihoodFit, fit
+from ident.likelihood_run import Samples, predicted
+from ident.maximum_likelihood import started
+from ident.prepare import PreparedRun
+
+PREDICTED_HZ = 50.0
+_ASTRAY = 0.3  # residual over motion beyond which a fit deserves a second, careful start
+
+
+@dataclass(frozen=True, slots=True)
+class Prediction:
+    """A run's samples beside the predicted motion.
+
+    Attributes:
+        run: its name.
+        times_s: of the samples used, (n,).
+        coordinates: names of the measured coordinates.
+        measured: samples, (n, n_c).
+        predicted: (n, n_c).
+    """
+
+    run: str
+    times_s: Array
+    coordinates: tuple[str, ...]
+    measured: Array
+    predicted: Array
+
+    @property
+    def rmse_m(self) -> float | None:
+        """Root mean square of the position residuals, a coordinate; None without positions."""
+        places = [i for i, name in enumerate(self.coordinates) if name in POSE_COORDINATES[:3]]
+        if not places:
+            return None
+        residuals = (self.measured - self.predicted)[:, places]
+        return float(np.sqrt(np.mean(residuals**2)))
+
+
+def predict(
+    model: Model, run: PreparedRun, free: tuple[str, ...] | None, inertia: Array
+) -> Prediction:
+    """Predict a run with its initial state and cable lengths fitted and the inertia held.
+
+    Args:
+        model: the robot.
+        run: the run.
+        free: the coordinates to use of it, or None for full poses.
+        inertia: the nine parameters, (9,).
+
+    Raises:
+        ValueError: when the motion cannot be simulated.
+    """
+    samples, first = started(model, run, free, inertia)
+    samples = _thinned(samples)
+    state = State(np.array(inertia), model.start_values, first[None], np.ones(2))
+    found = _fitted(model, samples, state, grow=False)
+    seen = _seen(found)
+    # A start too far off leaves the simulated swing out of phase: grow into the run instead.
+    spread = np.sqrt(np.mean((samples.values - samples.values.mean(axis=0)) ** 2))
+    if np.sqrt(np.mean((seen - samples.values) ** 2)) > _ASTRAY * spread:
+        seen = _seen(_fitted(model, samples, state, grow=True))
+    return Prediction(
+        run.name,
+        frozen_array(samples.times_s, samples.times_s.shape, "times"),
+        samples.coordinates,
+        frozen_array(samples.values, samples.values.shape, "measured"),
+        frozen_array(seen, seen.shape, "predicted"),
+    )
+
+
+def _fitted(model: Model, samples: Samples, state: State, grow: bool) -> LikelihoodFit:
+    return fit(model, [samples], state, free=np.zeros(9, dtype=bool), grow=grow)
+
+
+def _seen(found: LikelihoodFit) -> Array:
+    samples = found.samples[0]
+    return predicted(found.motions[0], samples.times_s)[:, samples.columns]
+
+
+def _thinned(samples: Samples) -> Samples:
+    """Every k-th sample, down to `PREDICTED_HZ`: initial states need no more."""
+    period = float(np.median(np.diff(samples.times_s)))
+    every = max(1, round(1.0 / (PREDICTED_HZ * period)))
+    times = samples.times_s[::every]
+    return replace(
+        samples,
+        times_s=times,
+        values=samples.values[::every],
+        whitener=samples.whitener[::every],
+        span_s=(float(times[0]), float(times[-1])),
+    )
