@@ -52,7 +52,8 @@ def write_mocap_session(
             progress("recording", count / len(swings))
         recording = _record(swing, target, generator)
         write_trc(folder / "runs" / f"{swing.name}.trc", recording)
-        runs.append(_run_table(swing, generator))
+        table = run_table(swing, generator, (0.0, DURATION_S))
+        runs.append({**table, "trajectory": f"runs/{swing.name}.trc"})
     write_robot(folder / "robot.toml", demo_robot())
     write_target(folder / "target.toml", target)
     session = {
@@ -86,13 +87,15 @@ def _record(swing: Swing, target: Target, generator: np.random.Generator) -> Mar
     return MarkerRecording(times, exact.names, exact.positions_m + noise, swing.name)
 
 
-def _run_table(swing: Swing, generator: np.random.Generator) -> dict[str, object]:
+def run_table(
+    swing: Swing, generator: np.random.Generator, window_s: tuple[float, float]
+) -> dict[str, object]:
+    """What session.toml says of a swing, but for where its recording is."""
     told = swing.lengths_m + generator.normal(0.0, LENGTH_NOISE_M, len(swing.lengths_m))
     return {
         "name": swing.name,
         "role": swing.role,
         "cable_lengths_m": np.round(told, 6),
         "cable_lengths_std_m": LENGTH_NOISE_M,
-        "window_s": [0.0, DURATION_S],
-        "trajectory": f"runs/{swing.name}.trc",
+        "window_s": list(window_s),
     }

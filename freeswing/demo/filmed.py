@@ -1,0 +1,77 @@
+"""The demonstration as cameras saw it: videos, calibration footage, surveyed tags."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from cdpr.documents import dump_toml, write_json
+from cdpr.robot_file import write_robot
+from cdpr.target import write_target
+from freeswing.demo.mocap import run_table, truth_document
+from freeswing.demo.rig import (
+    BOARD,
+    RATE_HZ,
+    base_tags,
+    demo_target,
+    film_board,
+    film_swing,
+    true_cameras,
+)
+from freeswing.demo.truth import Swing, demo_robot, demo_swings
+
+DURATION_S = 5.4
+CUT_S = 0.2  # nothing is filmed this close to the ends of the simulated motion
+FILMED = ("swing-01", "swing-02", "swing-04", "swing-05", "check-01", "check-03")
+
+
+def write_filmed_session(
+    folder: Path,
+    seed: int = 1,
+    progress: Callable[[str, float], None] | None = None,
+    filmed: tuple[str, ...] = FILMED,
+) -> Path:
+    """Film the calibration and the swings; gives the path of session.toml.
+
+    The same seed gives the same files. `truth.json` holds what no file declares.
+    """
+    generator = np.random.default_rng(seed)
+    swings = [s for s in demo_swings(generator, DURATION_S) if s.name in filmed]
+    film_board(folder / "calibration", seed, progress)
+    for swing in swings:
+        film_swing(folder / "runs" / swing.name, swing, CUT_S, seed, progress)
+    write_robot(folder / "robot.toml", demo_robot())
+    write_target(folder / "target.toml", demo_target())
+    cameras = {camera.name: {"clock_offset_s": camera.clock_offset_s} for camera in true_cameras()}
+    write_json(folder / "truth.json", {**truth_document(), "cameras": cameras})
+    session = {
+        "format": "freeswing-session/1",
+        "name": "freeswing demo",
+        "robot": "robot.toml",
+        "target": "target.toml",
+        "cameras": "cameras.toml",
+        "frame_rate_hz": RATE_HZ,
+        "calibration": _calibration_table(),
+        "runs": [_run(swing, generator) for swing in swings],
+    }
+    dump_toml(folder / "session.toml", session)
+    return folder / "session.toml"
+
+
+def _calibration_table() -> dict[str, object]:
+    surveyed = [
+        {
+            "family": tag.family,
+            "id": tag.id,
+            "corners_base_m": np.round(tag.corners_platform_m, 6).tolist(),
+        }
+        for tag in base_tags()
+    ]
+    return {"recordings": "calibration", "board": BOARD, "base_tags": surveyed}
+
+
+def _run(swing: Swing, generator: np.random.Generator) -> dict[str, object]:
+    window_s = (CUT_S + 0.05, DURATION_S - CUT_S - 0.05)
+    return {**run_table(swing, generator, window_s), "video": f"runs/{swing.name}"}
