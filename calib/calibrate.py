@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from calib.base_tags import SURVEY_STD_M, SurveyedTag, find_base_tags
 from calib.boards import Board, board_from
 from calib.calibration_result import FORMAT, camera_entries, covariance_entry
 from calib.camera import Camera
+from calib.camera_models import Array
 from calib.cameras_file import write_cameras
 from calib.recordings import find_recordings
 from calib.rig import Rig, solve_rig, start_cameras, tie_to_base
 from calib.sightings import Sightings, gather, see_boards
-from calib.views import FixedPoints
+from calib.survey_check import SurveyCheck, check_survey
+from calib.trust import Verdict, judge
+from calib.truth_checks import check_truth
 from cdpr.documents import DataError, write_json
 
 Progress = Callable[[str, float], None]
@@ -90,30 +95,28 @@ def calibrate_session(
         lambda label, share: told(label, 0.7 * share),
     )
     told("adjusting", 0.7)
-    rig, n_moments = _board_rig(sightings, board, frame_rate_hz, model)
+    rig, alone_px, n_moments = _board_rig(sightings, board, frame_rate_hz, model)
     warnings: list[str] = []
-    fixed: FixedPoints | None = None
+    survey: SurveyCheck | None = None
     if base_tags:
         told("base tags", 0.8)
-        stills = [camera.still_frames for camera in sightings]
         std = SURVEY_STD_M if survey_std_m is None else survey_std_m
+        stills = [camera.still_frames for camera in sightings]
         seen = find_base_tags(rig.cameras, stills, base_tags, rig.adjustment.sigma_px, std)
-        warnings += [
-            f"camera {name}: its base tags moved by {drift:.1f} px during the recording; "
-            "fasten it and record again"
-            for name, drift in seen.moved
-        ]
-        fixed = seen.fixed
-        rig = tie_to_base(rig, fixed, estimate_survey=survey_std_m is None)
+        warnings += _moved_warnings(seen.moved)
+        survey = check_survey(rig.cameras, seen.fixed)
+        if not survey.reasons:
+            rig = tie_to_base(rig, seen.fixed, estimate_survey=survey_std_m is None)
     else:
-        reference = rig.cameras[rig.reference].name
-        warnings.append(
-            f"no base tags: camera {reference} is the base frame, so gravity and cable anchors in "
-            "robot.toml do not fit it; survey tags on the frame and name them in session.toml"
-        )
-    document = _document(rig, board, sightings, warnings, n_moments)
+        warnings.append(_no_base_warning(rig.cameras[rig.reference].name))
+    told("checking against truth", 0.9)
+    verdict = judge(rig, check_truth(rig, board.edges), survey, alone_px)
+    verdict = replace(verdict, warnings=(*warnings, *verdict.warnings))
+    document = _document(rig, board, sightings, verdict, n_moments)
     if results_folder is not None:
         write_json(Path(results_folder) / "calibration.json", document)
+    if not verdict.usable:
+        raise DataError("; ".join(["the calibration must not be used", *verdict.reasons]))
     if cameras_path is not None:
         write_cameras(cameras_path, rig.cameras)
     told("calibrated", 1.0)
@@ -122,7 +125,8 @@ def calibrate_session(
 
 def _board_rig(
     sightings: tuple[Sightings, ...], board: Board, frame_rate_hz: float | None, model: str
-) -> tuple[Rig, int]:
+) -> tuple[Rig, Array, int]:
+    """The rig from the board, what each camera reached alone (px), and the number of moments."""
     for camera in sightings:
         if len(camera.numbers) == 0:
             raise DataError(
@@ -137,24 +141,47 @@ def _board_rig(
         board.points_m,
         views,
     )
-    return solve_rig(board.points_m, starts), len(times)
+    alone = np.array([start.rms_px for start in starts])
+    return solve_rig(board.points_m, starts), alone, len(times)
+
+
+def _moved_warnings(moved: tuple[tuple[str, float], ...]) -> list[str]:
+    return [
+        f"camera {name}: its base tags moved by {drift:.1f} px during the recording; fasten it and "
+        "record again"
+        for name, drift in moved
+    ]
+
+
+def _no_base_warning(reference: str) -> str:
+    return (
+        f"no base tags: camera {reference} is the base frame, so gravity and cable anchors in "
+        "robot.toml do not fit it; survey tags on the frame and name them in session.toml"
+    )
 
 
 def _document(
     rig: Rig,
     board: Board,
     sightings: tuple[Sightings, ...],
-    warnings: list[str],
+    verdict: Verdict,
     n_moments: int,
 ) -> dict[str, Any]:
     entries = camera_entries(rig)
-    for entry, camera in zip(entries, sightings, strict=True):
+    for entry, camera, judged in zip(entries, sightings, verdict.by_camera, strict=True):
         entry["frames"] = camera.n_frames
         entry["frames_with_board"] = len(camera.numbers)
+        entry.update(judged)
     return {
         "format": FORMAT,
-        "verdict": {"usable": True, "reasons": [], "warnings": warnings},
+        "verdict": {
+            "usable": verdict.usable,
+            "reasons": list(verdict.reasons),
+            "warnings": list(verdict.warnings),
+        },
+        "base_frame": _base_frame(rig),
         "cameras": entries,
+        "checks": verdict.checks,
         "moments": n_moments,
         "board": {
             "kind": board.kind,
@@ -171,6 +198,21 @@ def _document(
             "condition": rig.adjustment.condition,
         },
         "covariance": covariance_entry(rig),
+    }
+
+
+def _base_frame(rig: Rig) -> dict[str, Any]:
+    """Where the base frame comes from and how well it is held."""
+    fixed = rig.problem.fixed
+    if fixed is None:
+        return {"source": f"camera {rig.cameras[rig.reference].name}"}
+    tags = list(dict.fromkeys(name.rpartition(" ")[0] for name in fixed.names))
+    residuals = rig.adjustment.fixed_residuals_px
+    return {
+        "source": "base tags",
+        "tags": tags,
+        "survey_std_m": float(fixed.std_m[0]),
+        "reprojection_px": float(np.sqrt(np.mean(residuals**2))),
     }
 
 

@@ -11,6 +11,7 @@ from calib.camera_models import Array
 
 _STEPS = 5
 _LEAST_ANGLE_RAD = 0.01
+_LEAST_CURVATURE = 1e-12
 
 
 def triangulate(cameras: Sequence[Camera], pixels: Array) -> Array:
@@ -26,10 +27,13 @@ def triangulate(cameras: Sequence[Camera], pixels: Array) -> Array:
     points = _intersect_rays(cameras, flat)
     for _ in range(_STEPS):
         normal, slope = _normal(cameras, points, flat)
-        solvable = np.isfinite(normal).all(axis=(1, 2)) & (np.linalg.cond(normal) < 1e12)
+        known = np.isfinite(normal.sum(axis=(1, 2)))
+        safe = np.where(known[:, None, None], normal, np.eye(3))
+        values = np.linalg.eigvalsh(safe)
+        solvable = known & (values[:, 0] > _LEAST_CURVATURE * values[:, 2])
         safe = np.where(solvable[:, None, None], normal, np.eye(3))
-        points = points + np.linalg.solve(safe, slope[..., None])[..., 0]
-        points[~solvable] = np.nan
+        step = np.linalg.solve(safe, slope[..., None])[..., 0]
+        points = np.where(solvable[:, None], points + step, np.nan)
     return points.reshape(*np.shape(pixels)[1:-1], 3)
 
 
@@ -50,8 +54,7 @@ def _intersect_rays(cameras: Sequence[Camera], pixels: Array) -> Array:
     solvable = (rays_seen >= 2) & (np.linalg.eigvalsh(normal)[:, 0] > _LEAST_ANGLE_RAD**2)
     safe = np.where(solvable[:, None, None], normal, np.eye(3))
     points = np.linalg.solve(safe, right[..., None])[..., 0]
-    points[~solvable] = np.nan
-    return points
+    return np.where(solvable[:, None], points, np.nan)
 
 
 def _normal(cameras: Sequence[Camera], points: Array, pixels: Array) -> tuple[Array, Array]:
