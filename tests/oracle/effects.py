@@ -92,7 +92,8 @@ def magnitude(table: dict[str, tuple[str, float, float, float]], name: str, size
         return float(size)
     if size not in SIZES:
         raise ValueError(f"size {size!r} of {name} must be a number or one of {SIZES}")
-    return table[name][1 + SIZES.index(str(size))]
+    _, small, medium, large = table[name]
+    return (small, medium, large)[SIZES.index(str(size))]
 
 
 def random_direction(rng: np.random.Generator, flat: bool = False) -> Array:

@@ -42,7 +42,7 @@ class Rest:
 
 def lengths_at(world: World, position_m: Array, quaternion: Array) -> Array:
     """Geometric lengths of all cables at a pose, (n,)."""
-    return _rows(world, position_m, quaternion)[1]
+    return jacobian_and_lengths(world, position_m, quaternion)[1]
 
 
 def settle(world: World, position_m: Array, quaternion: Array) -> Rest:
@@ -57,7 +57,7 @@ def settle(world: World, position_m: Array, quaternion: Array) -> Rest:
     world = world._replace(oscillators=np.zeros((0, 6)))
     p: Array = np.array(position_m, dtype=float)
     q: Array = np.array(quaternion, dtype=float)
-    J, _ = _rows(world, p, q)
+    J, _ = jacobian_and_lengths(world, p, q)
     n = len(world.length)
     bare = _residual(world, p, q, np.zeros(n))[:6]
     tension: Array = np.linalg.lstsq(J.T, bare, rcond=None)[0]
@@ -94,8 +94,8 @@ def displaced(
     state = start_state(rigid, rest.position_m, rest.quaternion)
     heading = rest.freedom @ direction
     for _ in range(400):
-        J, _ = _rows(rigid, state[:3], state[3:7])
-        freedom = _freedom(J)
+        J, _ = jacobian_and_lengths(rigid, state[:3], state[3:7])
+        freedom = freedom_of(J)
         heading = freedom @ (freedom.T @ heading)
         heading /= np.linalg.norm(heading)
         trial = state.copy()
@@ -135,8 +135,8 @@ def _elastic_hold(world: World, state: Array) -> tuple[Array, Array]:
 
 
 def _rest(world: World, p: Array, q: Array, tension: Array) -> Rest:
-    J, _ = _rows(world, p, q)
-    freedom = _freedom(J)
+    J, _ = jacobian_and_lengths(world, p, q)
+    freedom = freedom_of(J)
     scale = np.array([1.0, 1.0, 1.0] + 3 * [1.0 / ROTATION_SCALE_M])
     moves = scale[:, None] * freedom
     stiffness = -moves.T @ _slope(world, p, q, tension)[:6, :6] @ moves
@@ -144,12 +144,14 @@ def _rest(world: World, p: Array, q: Array, tension: Array) -> Rest:
     return Rest(p, q, tension, bool(lowest > 0.5), freedom)
 
 
-def _freedom(J: Array) -> Array:
+def freedom_of(J: Array) -> Array:
+    """Null space of the length Jacobian, rotations counted with `ROTATION_SCALE_M`, (6, f)."""
     scaled_rows = J * np.array([1.0, 1.0, 1.0] + 3 * [1.0 / ROTATION_SCALE_M])
     return np.linalg.svd(scaled_rows)[2][len(J) :].T
 
 
-def _rows(world: World, p: Array, q: Array) -> tuple[Array, Array]:
+def jacobian_and_lengths(world: World, p: Array, q: Array) -> tuple[Array, Array]:
+    """Length Jacobian (n, 6) and lengths (n,) at a pose."""
     R = np.empty((3, 3))
     rotation_of(q, R)
     J, _, _, _, scalars = constraint_rows(p, R, np.zeros(3), np.zeros(3), world)

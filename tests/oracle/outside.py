@@ -12,11 +12,11 @@ from tests.oracle.effects import Effect, Scene, changed, random_direction
 OUTSIDE_MAGNITUDES: dict[str, tuple[str, float, float, float]] = {
     "hanging_bob": ("mass_kg", 0.05, 0.15, 0.4),
     "contact": ("stiffness_n_m", 100.0, 400.0, 1500.0),
-    "magnet": ("force_at_0.3_m_n", 0.2, 0.6, 2.0),
+    "magnet": ("force_at_0.3_m_n", 1.0, 3.0, 10.0),
     "winch_hunting": ("amplitude_m", 5e-5, 2e-4, 6e-4),
     "negative_damping": ("rate_1_s", -0.003, -0.01, -0.03),
     "chirp_force": ("amplitude_n", 0.05, 0.15, 0.5),
-    "spinning_rotor": ("angular_momentum_nms", 0.02, 0.08, 0.3),
+    "spinning_rotor": ("angular_momentum_nms", 0.05, 0.2, 0.6),
     "turbulence": ("rms_n", 0.03, 0.1, 0.3),
     "clock_rate": ("share", 1e-3, 3e-3, 1e-2),
 }
@@ -35,7 +35,7 @@ def _contact(scene: Scene, stiffness: float, rng: np.random.Generator):
 
 
 def _magnet(scene: Scene, force: float, rng: np.random.Generator):
-    place = scene.centre_m + np.array([*rng.uniform(-0.2, 0.2, 2), -0.45])
+    place = scene.centre_m + np.array([*rng.uniform(-0.2, 0.2, 2), -0.4])
     strength = force * 0.3**4
     return changed(scene, magnet=place, magnet_strength=strength), {"place_m": place}
 

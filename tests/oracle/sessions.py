@@ -12,7 +12,7 @@ import numpy as np
 from cdpr.robot import POSE_COORDINATES, Robot
 from tests.oracle import session_files as files
 from tests.oracle.effects import EFFECTS, Scene, add_effect
-from tests.oracle.geometry import rotation_of, turn
+from tests.oracle.geometry import turn
 from tests.oracle.outside import OUTSIDE, OUTSIDE_MAGNITUDES
 from tests.oracle.robots import declared_robot, true_body
 from tests.oracle.runs import TrueRun, draw_run, workspace
@@ -87,7 +87,7 @@ def make_session(
     for k in range(n_runs):
         run = draw_run(scene, rng, duration_s, rate_hz, rows, reach_share)
         name = f"swing-{k + 1:02d}"
-        times, p, q = _measured(scene, run, rng, noise_m, noise_rad, held=not window)
+        times, p, q = _recorded(scene, run, rng, noise_m, noise_rad, held=not window)
         columns = _columns(times, p, q, None if pose else free)
         header = files.POSE_HEADER if pose else tuple(_column_name(name) for name in free)
         _blank(columns, rng, missing_share)
@@ -122,7 +122,18 @@ def make_scene(
     return scene
 
 
-def _measured(
+def measured(scene: Scene, run: TrueRun) -> tuple[Array, Array, Array]:
+    """Stamps (n_t,), points (n_t, 3) and quaternions (n_t, 4) of perfect instruments.
+
+    The marker's offset, the delay of the orientation and the clock's rate are in, noise is not.
+    """
+    motion = run.motion
+    points = motion.positions_m + motion.rotations @ scene.marker_offset_m
+    seen = _delayed(motion.times_s, motion.quaternions, scene.orientation_delay_s)
+    return motion.times_s * (1.0 + scene.clock_rate), points, seen
+
+
+def _recorded(
     scene: Scene,
     run: TrueRun,
     rng: np.random.Generator,
@@ -130,14 +141,8 @@ def _measured(
     noise_rad: float,
     held: bool,
 ) -> tuple[Array, Array, Array]:
-    """Stamps, measured points and quaternions: offset, delay, clock and white noise."""
-    motion = run.motion
-    times, p, q = motion.times_s, motion.positions_m, motion.quaternions.copy()
-    seen = _delayed(times, q, scene.orientation_delay_s)
-    points, R = p.copy(), np.empty((3, 3))
-    for k in range(len(times)):
-        rotation_of(q[k], R)
-        points[k] += R @ scene.marker_offset_m
+    """The measurements with white noise, after a second of rest when `held`."""
+    times, points, seen = measured(scene, run)
     if held:
         before = round(HELD_BEFORE_RELEASE_S / (times[1] - times[0]))
         points = np.concatenate([np.repeat(points[:1], before, axis=0), points])
@@ -146,7 +151,7 @@ def _measured(
     points = points + rng.normal(0.0, noise_m, points.shape)
     for quaternion, error in zip(seen, rng.normal(0.0, noise_rad, points.shape), strict=True):
         turn(quaternion, error)
-    return times * (1.0 + scene.clock_rate), points, seen
+    return times, points, seen
 
 
 def _delayed(times: Array, quaternions: Array, delay_s: float) -> Array:
@@ -163,13 +168,13 @@ def _delayed(times: Array, quaternions: Array, delay_s: float) -> Array:
 def _columns(times: Array, p: Array, q: Array, free: tuple[str, ...] | None) -> Array:
     if free is None:
         return np.concatenate([times[:, None], p, q], axis=1)
-    angles = _tait_bryan(q)
+    angles = tait_bryan(q)
     values = np.concatenate([p, angles], axis=1)
     wanted = [POSE_COORDINATES.index(name) for name in free]
     return np.concatenate([times[:, None], values[:, wanted]], axis=1)
 
 
-def _tait_bryan(quaternions: Array) -> Array:
+def tait_bryan(quaternions: Array) -> Array:
     """phi, theta, chi of R = Rx(phi) Ry(theta) Rz(chi), (n_t, 3)."""
     w, x, y, z = quaternions.T
     phi = np.arctan2(2.0 * (w * x - y * z), 1.0 - 2.0 * (x * x + y * y))

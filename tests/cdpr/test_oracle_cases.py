@@ -1,0 +1,75 @@
+"""The benchmark's list of sealed sessions, and how visible their effects are."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from tests.oracle.cases import TIERS, manifest
+from tests.oracle.effects import EFFECTS, SIZES
+from tests.oracle.outside import OUTSIDE
+from tests.oracle.sessions import SessionTruth, make_session
+from tests.oracle.visibility import visibility
+
+
+def test_every_effect_at_every_size_and_forty_clean_sessions() -> None:
+    cases = manifest("standard")
+    kinds = Counter(case.kind for case in cases)
+    singles = {case.effects[0] for case in cases if case.kind == "single"}
+    outside = {case.effects[0][0] for case in cases if case.kind == "outside"}
+    assert kinds["clean"] == 40, kinds
+    assert singles == {(name, size) for name in EFFECTS for size in SIZES}
+    assert outside == set(OUTSIDE)
+    assert {(case.robot, case.pose) for case in cases if case.kind == "clean"} == {
+        ("bologna-4", True),
+        ("bologna-4", False),
+        ("three-cable", True),
+        ("three-cable", False),
+    }
+
+
+def test_tiers_grow_and_names_and_seeds_are_unique() -> None:
+    lists = [manifest(tier) for tier in TIERS]
+    names = [{case.name for case in cases} for cases in lists]
+    assert names[0] < names[1] < names[2]
+    assert [len(cases) for cases in lists] == [len(found) for found in names]
+    assert len({case.seed for case in lists[2]}) == len(lists[2])
+
+
+def test_unknown_tier_is_refused() -> None:
+    with pytest.raises(ValueError, match="must be one of"):
+        manifest("huge")
+
+
+def test_a_case_makes_its_session(tmp_path: Path) -> None:
+    case = next(case for case in manifest("quick") if case.kind == "pair")
+    truth = case.make(tmp_path, n_runs=2, duration_s=0.5)
+    found = [entry["effect"] for entry in truth.scene.record]
+    assert found == [name for name, _ in case.effects]
+    assert (tmp_path / case.name / "session.toml").exists()
+
+
+@pytest.fixture(scope="module")
+def sessions(tmp_path_factory: pytest.TempPathFactory) -> dict[str, SessionTruth]:
+    made = {}
+    for name, effects in {
+        "clean": {},
+        "small": {"translational_drag": "small"},
+        "large": {"translational_drag": "large"},
+    }.items():
+        folder = tmp_path_factory.mktemp(name)
+        made[name] = make_session(folder, 9, "bologna-4", effects, n_runs=2, duration_s=3.0)
+    return made
+
+
+def test_nothing_is_visible_in_a_clean_session(sessions: dict[str, SessionTruth]) -> None:
+    seen = visibility(sessions["clean"], "bologna-4")
+    assert seen < 0.05, f"{seen:.3f} standard deviations of nothing"
+
+
+def test_larger_drag_is_more_visible(sessions: dict[str, SessionTruth]) -> None:
+    small, large = (visibility(sessions[size], "bologna-4") for size in ("small", "large"))
+    assert small > 1.0, f"small {small:.2f}"
+    assert 10.0 < large / small < 20.0, f"rate 16 times larger: {small:.2f} to {large:.2f}"
