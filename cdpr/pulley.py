@@ -55,9 +55,12 @@ class CableState:
         wrap: psi (eq. 7).
         straight: |rho|.
         arm: u . (a - d), the distance of A from the swivel axis.
+        square: |rho|^2, negative where A lies inside the pulley.
         lever: a', from P to A in the base frame, (3,).
         direction: t, from the pulley to the platform, base frame, (3,).
-        bend: dt/da, how the direction turns when A moves, (3, 3), symmetric.
+        across: w, normal to the pulley's plane, base frame, (3,); None for an eyelet.
+        normal: n, from the pulley's centre to the exit point, base frame, (3,); None likewise.
+        sine: sin psi.
     """
 
     length: Expression
@@ -65,9 +68,37 @@ class CableState:
     wrap: Expression
     straight: Expression
     arm: Expression
+    square: Expression
     lever: Expression
     direction: Expression
-    bend: Expression
+    across: Expression
+    normal: Expression
+    sine: Expression
+
+    @property
+    def is_eyelet(self) -> bool:
+        """Whether the declared radius is zero: nothing swivels and nothing winds."""
+        return self.normal is None
+
+    @property
+    def bend(self) -> Expression:
+        """dt/da, how the direction turns when A moves, (3, 3), symmetric.
+
+        The closed form of eqs. (23), (26), (27): half the operations of differentiating the
+        length twice.
+        """
+        if self.is_eyelet:
+            return (ca.SX.eye(3) - self.direction @ self.direction.T) / self.straight
+        about_axis = (self.sine / self.arm) * (self.across @ self.across.T)
+        return about_axis + self.normal @ self.normal.T / self.straight
+
+    def turning(self, velocity: Expression) -> Expression:
+        """Velocity . bend . velocity: the length's second derivative when A moves evenly."""
+        if self.is_eyelet:
+            along = ca.dot(self.direction, velocity)
+            return (ca.dot(velocity, velocity) - along**2) / self.straight
+        swivelling = self.sine / self.arm * ca.dot(self.across, velocity) ** 2
+        return swivelling + ca.dot(self.normal, velocity) ** 2 / self.straight
 
 
 def cable_state(
@@ -76,36 +107,38 @@ def cable_state(
     """Length, angles and direction of cable `index` at a pose.
 
     The cable leaves the pulley along t, tangent to it: with e = a - c measured from the pulley's
-    centre, e = r n + |rho| t gives psi and |rho| without iteration. The bend is the closed form
-    of eqs. (23), (26), (27): half the operations of differentiating the length twice.
+    centre, e = r n + |rho| t gives psi and |rho| without iteration.
     """
     radius, axes = geometry.radii[index], geometry.axes[index]
     lever = rotation @ geometry.attachments[index]
     local = axes @ (position + lever - geometry.entries[index])
-    square = local[0] ** 2 + local[1] ** 2
-    arm = ca.sqrt(square)
-    across, along_axis = arm - radius, local[2]
-    straight = ca.sqrt(square - 2 * radius * arm + along_axis**2)
-    reach = across**2 + along_axis**2
-    sine = (radius * along_axis + straight * across) / reach
-    cosine = (radius * across - straight * along_axis) / reach
+    in_plane = local[0] ** 2 + local[1] ** 2
+    arm = ca.sqrt(in_plane)
+    beyond, along_axis = arm - radius, local[2]
+    square = in_plane - 2 * radius * arm + along_axis**2
+    straight = ca.sqrt(square)
+    reach = beyond**2 + along_axis**2
+    sine = (radius * along_axis + straight * beyond) / reach
+    cosine = (radius * beyond - straight * along_axis) / reach
     wrap = ca.atan2(sine, cosine)
+    across = normal = None
     if radius.is_zero():
         direction = local / straight
-        bend = (ca.SX.eye(3) - direction @ direction.T) / straight
     else:
         u = ca.vertcat(local[0] / arm, local[1] / arm, 0)
-        w = ca.vertcat(-u[1], u[0], 0)
+        across = axes.T @ ca.vertcat(-u[1], u[0], 0)
+        normal = axes.T @ ca.vertcat(cosine * u[0], cosine * u[1], sine)
         direction = ca.vertcat(sine * u[0], sine * u[1], -cosine)
-        normal = ca.vertcat(cosine * u[0], cosine * u[1], sine)
-        bend = (sine / arm) * (w @ w.T) + normal @ normal.T / straight
     return CableState(
         length=straight + radius * (ca.pi - wrap),
         swivel=ca.atan2(local[1], local[0]),
         wrap=wrap,
         straight=straight,
         arm=arm,
+        square=square,
         lever=lever,
         direction=axes.T @ direction,
-        bend=axes.T @ bend @ axes,
+        across=across,
+        normal=normal,
+        sine=sine,
     )

@@ -67,6 +67,10 @@ class Instant:
         """Velocity of P in the base frame, (3,)."""
         return self.rates[:3]
 
+    def velocity_of(self, cable: CableState) -> Expression:
+        """Velocity of a cable's attachment point in the base frame, (3,)."""
+        return self.velocity + ca.cross(self.omega, cable.lever)
+
     def force_at(self, lever: Expression, force: Expression) -> Expression:
         """Wrench about P, (6,), of a force at the point P + lever."""
         return ca.vertcat(force, ca.cross(lever, force))
