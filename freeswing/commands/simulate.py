@@ -82,6 +82,8 @@ def _poses(options: Namespace, times: ndarray, generator) -> ndarray:
     lengths = np.array(options.lengths_m)
     if len(lengths) != robot.n_cables:
         raise InputError(f"--lengths-m: {len(lengths)} lengths, {robot.n_cables} cables")
+    if not 0.0 < options.amplitude_m <= 0.5 * lengths.min():
+        raise InputError(f"--amplitude-m must lie in (0, {0.5 * lengths.min():g}], half a cable")
     model = _model(robot, options, build_model)
     values = _values(model, options)
     rest = rest_at_lengths(model, lengths, robot.inertia, values, generator)

@@ -12,6 +12,7 @@ from cdpr.statics import Equilibrium, equilibria, modes
 
 SWEEPS = 30
 LENGTH_TOLERANCE_M = 1e-12
+MOST_CORRECTION = 0.3  # of the wished displacement, to come back on the lengths
 
 
 def rest_at_lengths(
@@ -48,11 +49,18 @@ def release(
     shapes = modes(model, rest, inertia, values).shapes
     signs = generator.choice([-1.0, 1.0], shapes.shape[1])
     heading = shapes @ (generator.uniform(0.5, 1.0, shapes.shape[1]) * signs)
-    zeta = rest.zeta + heading * amplitude_m / np.linalg.norm(heading[:3])
+    step = heading * amplitude_m / np.linalg.norm(heading[:3])
+    zeta = rest.zeta + step
+    gap = np.full(model.robot.n_cables, np.inf)
     for _ in range(SWEEPS):
         outputs = evaluate(model.cables, zeta, values)
         gap = outputs[0] - rest.lengths_m
         if np.abs(gap).max() < LENGTH_TOLERANCE_M:
-            return zeta
+            break
         zeta = zeta - np.linalg.pinv(outputs[3]) @ gap
-    raise DataError(f"no pose {amplitude_m:g} m from rest has the cable lengths: swing less far")
+    correction = float(np.linalg.norm(zeta - rest.zeta - step))
+    if np.abs(gap).max() > LENGTH_TOLERANCE_M or correction > MOST_CORRECTION * np.linalg.norm(
+        step
+    ):
+        raise DataError(f"no pose {amplitude_m:g} m from rest on its lengths: swing less far")
+    return zeta

@@ -1,0 +1,145 @@
+"""The smaller commands, through the command line."""
+
+from __future__ import annotations
+
+import json
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from cdpr.documents import write_json
+from cdpr.robot import INERTIA_NAMES
+from cdpr.trajectory_files import read_trajectory
+from freeswing.main import main
+
+ROBOT = Path(__file__).parents[2] / "samples" / "three-cables" / "robot.toml"
+LENGTHS = "1.2,1.3,1.3"
+
+
+def simulate(result: Path, *more: str, lengths: str = LENGTHS) -> int:
+    return main(["simulate", str(ROBOT), str(result), "--lengths-m", lengths, *more, "--quiet"])
+
+
+def test_simulate_is_the_same_from_the_same_seed(tmp_path: Path) -> None:
+    options = ("--duration-s", "2", "--noise-m", "1e-4", "--seed", "3")
+    first, second, other = (tmp_path / f"{name}.csv" for name in "abc")
+    assert simulate(first, *options) == 0
+    assert simulate(second, *options) == 0
+    assert simulate(other, *options[:-1], "4") == 0
+    assert first.read_bytes() == second.read_bytes()
+    assert first.read_bytes() != other.read_bytes()
+    motion = read_trajectory(first)
+    assert (len(motion), motion.is_pose, motion.sample_rate_hz) == (201, True, pytest.approx(100))
+
+
+def test_simulate_takes_effects(tmp_path: Path) -> None:
+    drag = ("--effect", "translational_drag", "--set", "rate_1_s=1.0")
+    amplitudes = []
+    for name, options in (("free", ()), ("drag", drag)):
+        path = tmp_path / f"{name}.csv"
+        assert simulate(path, "--duration-s", "6", *options) == 0
+        late = read_trajectory(path).positions()[400:]
+        amplitudes.append(float(np.linalg.norm(np.ptp(late, axis=0))))
+    assert amplitudes[1] < 0.7 * amplitudes[0], amplitudes
+
+
+@pytest.mark.parametrize(
+    ("options", "status"),
+    [
+        (("--effect", "gremlins"), 2),
+        (("--set", "rate_1_s=1"), 2),
+        (("--duration-s", "-1"), 2),
+        (("--amplitude-m", "5"), 2),
+    ],
+)
+def test_simulate_says_what_is_wrong(
+    tmp_path: Path, options: tuple[str, ...], status: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert simulate(tmp_path / "a.csv", *options) == status
+    assert "Traceback" not in capsys.readouterr().err
+    assert not (tmp_path / "a.csv").exists()
+
+
+def test_simulate_refuses_lengths_of_another_robot(tmp_path: Path) -> None:
+    assert simulate(tmp_path / "a.csv", lengths="1.2,1.3") == 2
+    assert simulate(tmp_path / "a.csv", lengths="0.01,0.01,9.0") == 1
+
+
+def test_board_has_its_size_and_its_tags(tmp_path: Path) -> None:
+    (tmp_path / "robot.toml").write_bytes(ROBOT.read_bytes())
+    (tmp_path / "session.toml").write_text(
+        """format = "freeswing-session/1"
+name = "print"
+robot = "robot.toml"
+[calibration]
+recordings = "calibration"
+board.kind = "charuco"
+board.squares = [5, 4]
+board.square_m = 0.04
+board.marker_m = 0.03
+board.dictionary = "DICT_5X5_100"
+[[calibration.base_tags]]
+family = "tag36h11"
+id = 100
+corners_base_m = [[0,0,0],[0.1,0,0],[0.1,-0.1,0],[0,-0.1,0]]
+[[runs]]
+name = "a"
+role = "identify"
+video = "a"
+""",
+        encoding="utf-8",
+    )
+    assert main(["board", str(tmp_path), "--quiet"]) == 0
+    sheet = ET.parse(tmp_path / "results" / "print" / "board.svg").getroot()
+    width_mm = float(str(sheet.get("width")).removesuffix("mm"))
+    assert width_mm == pytest.approx(40 * (5 + 1), abs=1e-6)
+    assert (tmp_path / "results" / "print" / "tag36h11-100.svg").is_file()
+
+
+def identified(session: Path) -> None:
+    values = (0.01, -0.02, 0.19, 0.056, 0.066, 0.037, 1e-4, -9e-4, 7e-4)
+    rows = [
+        {"name": name, "value": value, "std": 1e-5, "std_percent": 1.0, "essential": True}
+        for name, value in zip(INERTIA_NAMES, values, strict=True)
+    ]
+    estimates = {"ml_full": {"parameters": rows, "dropped_runs": []}}
+    document = {"format": "freeswing-identification/1", "estimates": estimates}
+    write_json(session / "results" / "identification.json", document)
+
+
+def test_exports_agree_with_mujoco(session: Path) -> None:
+    identified(session)
+    for kind in ("--urdf", "--mjcf", "--plain"):
+        assert main(["export", str(session), kind, "--mass-kg", "5", "--quiet"]) == 0
+    results = session / "results"
+    plain = json.loads((results / "platform.json").read_text(encoding="utf-8"))
+    principal = sorted(np.linalg.eigvalsh(plain["inertia_about_com_kg_m2"]))
+    model = mujoco.MjModel.from_xml_path(  # pyright: ignore[reportAttributeAccessIssue]
+        str(results / "platform.xml")
+    )
+    np.testing.assert_allclose(sorted(model.body_inertia[1]), principal, rtol=1e-6)
+    np.testing.assert_allclose(model.body_ipos[1], [0.01, -0.02, 0.19], atol=1e-9)
+    assert model.body_mass[1] == 5.0
+    assert model.ntendon == 4
+    inertial = ET.parse(results / "platform.urdf").getroot().find("link/inertial")
+    assert inertial is not None
+    tensor = inertial.find("inertia")
+    assert tensor is not None
+    assert float(str(tensor.get("ixx"))) == pytest.approx(plain["inertia_about_com_kg_m2"][0][0])
+
+
+def test_export_before_identify_is_1(session: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["export", str(session), "--urdf"]) == 1
+    assert "run freeswing identify first" in capsys.readouterr().err
+
+
+def test_demo_leaves_other_folders_alone(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "thesis.txt").write_text("dear", encoding="utf-8")
+    assert main(["demo", str(tmp_path)]) == 2
+    assert "name a new folder" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["thesis.txt"]
