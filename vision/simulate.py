@@ -180,7 +180,8 @@ class Renderer:
         positions, rotations = self.scene.motion(times_s)
         poses = np.zeros((len(times_s), 4, 4))
         poses[:, :3, :3], poses[:, :3, 3], poses[:, 3, 3] = rotations, positions, 1.0
-        return (self.camera.T_camera_base @ poses).astype(np.float64)
+        np.matmul(self.camera.T_camera_base, poses.copy(), out=poses)
+        return poses
 
     def _row_times(self, time_s: float, top: int, rows: int, exposure: float) -> Array:
         if self.camera.line_time_s == 0.0:

@@ -5,7 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from calib.camera import Camera
+from cdpr.rotation import exp_rotation
+from cdpr.target import Tag
 from vision.patterns import Patch, tag_patch
+from vision.simulate import Scene
 
 OPENCV_PARAMS = [900.0, 905.0, 359.5, 287.5, -0.12, 0.05, 0.001, -0.0005]
 
@@ -50,3 +53,54 @@ def facing(position=(0.0, 0.0, 0.0), yaw=0.0, roll=0.0) -> np.ndarray:
 def tag(tag_id=0, size_m=0.13, parent="platform", family="tag36h11", **where) -> Patch:
     """A tag that faces the camera."""
     return tag_patch(family, tag_id, size_m, facing(**where), parent)
+
+
+def swing(times_s, amplitude_m=0.12, turn_rad=0.15):
+    """A swing about the origin in all six coordinates: positions (n, 3), rotations (n, 3, 3)."""
+    t = np.asarray(times_s, float)
+    frequencies = np.array([0.8, 0.71, 1.3])
+    phases = np.array([0.0, 0.9, 2.0])
+    way = np.sin(2 * np.pi * frequencies * t[:, None] + phases)
+    turn = np.sin(2 * np.pi * np.array([0.9, 1.1, 0.6]) * t[:, None] + phases[::-1])
+    return amplitude_m * np.array([1.0, 0.6, 0.3]) * way, exp_rotation(turn_rad * turn)
+
+
+def platform_tags(size_m=0.13) -> tuple[Tag, ...]:
+    """Six tags on three faces of a prism that looks towards -y."""
+    tags = []
+    for column, yaw in enumerate((-0.7, 0.0, 0.7)):
+        for row, z in enumerate((0.1, -0.1)):
+            place = (0.22 * np.sin(yaw), -0.22 * np.cos(yaw), z)
+            pose = facing(place, yaw)
+            tags.append(Tag("tag36h11", 2 * column + row, size_m, pose))
+    return tuple(tags)
+
+
+def standing_tags(size_m=0.2) -> tuple[Tag, ...]:
+    """Surveyed tags behind the platform."""
+    places = ((-0.55, 0.9, 0.35), (0.55, 0.9, 0.4), (-0.5, 0.8, -0.4), (0.6, 0.85, -0.45))
+    return tuple(Tag("tag36h11", 100 + k, size_m, facing(p)) for k, p in enumerate(places))
+
+
+def arc_of_cameras(count=4, distance_m=2.3, **changes) -> tuple[Camera, ...]:
+    """Cameras on an arc in front of the platform."""
+    cameras = []
+    for k, azimuth in enumerate(np.linspace(-0.6, 0.6, count)):
+        height = 0.35 if k % 2 else -0.15
+        place = (distance_m * np.sin(azimuth), -distance_m * np.cos(azimuth), height)
+        cameras.append(camera(f"cam{k}", place, **changes))
+    return tuple(cameras)
+
+
+def scene_of(tags, base_tags=(), motion=swing, extra=(), spheres=()) -> Scene:
+    """What is filmed: the platform's tags, standing tags and what else there is."""
+    patches = [tag_patch(t.family, t.id, t.size_m, t.T_platform_tag) for t in tags]
+    patches += [tag_patch(t.family, t.id, t.size_m, t.T_platform_tag, "base") for t in base_tags]
+    return Scene((*patches, *extra), motion, spheres)
+
+
+class SurveyedTag:
+    """A base tag as sessions state it: four corners in the base frame."""
+
+    def __init__(self, tag: Tag) -> None:
+        self.family, self.id, self.corners_base_m = tag.family, tag.id, tag.corners_platform_m
