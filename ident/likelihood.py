@@ -99,6 +99,8 @@ def fit(
     progress: Progress | None = None,
     estimate_scales: bool = True,
     grow: bool = True,
+    steps: int = STEPS,
+    tolerance: float = CONVERGED_DECREASE,
 ) -> LikelihoodFit:
     """Fit inertia, effect values, initial states and lengths to the samples of the runs.
 
@@ -110,6 +112,8 @@ def fit(
         progress: told a label and a fraction.
         estimate_scales: whether noise scales follow the residuals.
         grow: False when the start is close over the whole length of the runs already.
+        steps: at most so many Gauss-Newton steps on the whole runs.
+        tolerance: converged when an undamped step lowers the cost by less.
 
     Raises:
         ValueError: when no run is given, or a start cannot be simulated, with the reason.
@@ -136,7 +140,7 @@ def fit(
                 problem = Problem(model, [s.loosened(std) for s in samples], free, estimate_scales)
                 state = _minimised(problem, state, STEPS, ROUGH_DECREASE)[0]
     problem = Problem(model, samples, free, estimate_scales)
-    state, step, taken, reason = _minimised(problem, state, STEPS, CONVERGED_DECREASE)
+    state, step, taken, reason = _minimised(problem, state, steps, tolerance)
     if progress:
         progress("maximum likelihood", 1.0)
     return _packed(problem, state, step, taken, reason)

@@ -1,0 +1,126 @@
+"""A candidate added to the model and fitted in earnest, with its score on runs left out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cdpr.effects import effect_named
+from cdpr.model import Model, build_model
+from cdpr.robot import Array
+from ident.diagnose.rows import Evidence, Score, score
+from ident.diagnose.screen import BASE, screen
+from ident.joint import State
+from ident.likelihood import LikelihoodFit, fit
+
+RANKING_STEPS = 8
+
+
+@dataclass(frozen=True, slots=True)
+class Refit:
+    """A fit with a set of effects in the model.
+
+    Attributes:
+        effects: in the model, the candidate last.
+        fit: in units of the noise.
+        evidence: linear, at the fit, over inertia and effect values.
+        score: of that evidence: its held-out costs count.
+    """
+
+    effects: tuple[str, ...]
+    fit: LikelihoodFit
+    evidence: Evidence
+    score: Score
+
+    @property
+    def held_out(self) -> float:
+        """Sum of squares over the runs, each predicted with shared unknowns from the others."""
+        return float(self.score.held_out.sum())
+
+    def values_of(self, name: str) -> slice:
+        """Where an effect's values stand among the fit's."""
+        used = 0
+        for other in self.effects:
+            count = len(effect_named(other).parameters(self.fit.model.robot))
+            if other == name:
+                return slice(used, used + count)
+            used += count
+        raise ValueError(f"{name} is not among {self.effects}")
+
+
+def rescored(current: LikelihoodFit, noise_scales: Array) -> Refit:
+    """Score a fit that is there already."""
+    linear = screen(current, (), noise_scales)
+    return Refit(current.model.effects, current, linear.evidence, score(linear.evidence))
+
+
+def refit(
+    current: LikelihoodFit,
+    candidate: str,
+    values: Array,
+    change: Array,
+    noise_scales: Array,
+) -> Refit:
+    """Add a candidate to a fit's model and fit again.
+
+    Args:
+        current: the fit without it.
+        candidate: its name.
+        values: its start values, (k,).
+        change: of the inertia and earlier effect values that goes with it, from the screening.
+        noise_scales: of metres and radians, (2,).
+
+    Raises:
+        ValueError: when the start cannot be simulated.
+    """
+    model = build_model(current.model.robot, (*current.model.effects, candidate))
+    start = current.state
+    limited = np.clip(change, -0.05, 0.05)
+    state = State(
+        start.inertia + limited[:BASE],
+        np.concatenate([start.values + change[BASE:], values]),
+        start.starts,
+        noise_scales,
+    )
+    try:
+        found = _fitted(model, current, state)
+    except ValueError:
+        state = replace(state, inertia=start.inertia, values=_unchanged(start.values, model))
+        found = _fitted(model, current, state)
+    return rescored(found, noise_scales)
+
+
+def _fitted(model: Model, current: LikelihoodFit, state: State) -> LikelihoodFit:
+    """Converged to a ten-thousandth of the cost: enough to rank candidates."""
+    return fit(
+        model,
+        current.samples,
+        state,
+        estimate_scales=False,
+        grow=False,
+        steps=RANKING_STEPS,
+        tolerance=max(1.0, 1e-4 * current.cost),
+    )
+
+
+def _unchanged(values: Array, model: Model) -> Array:
+    full = model.start_values.copy()
+    full[: len(values)] = values
+    return full
+
+
+def plausible(refitted: Refit, name: str) -> list[str]:
+    """What is not plausible about an effect's values: a sentence each."""
+    where = refitted.values_of(name)
+    parameters = refitted.fit.model.parameters[where]
+    stds = refitted.fit.std[BASE:][where]
+    complaints = []
+    for parameter, value, std in zip(parameters, refitted.fit.values[where], stds, strict=True):
+        slack = min(3.0 * std, 0.1 * (parameter.high - parameter.low))
+        if parameter.amplitude and not parameter.low - slack <= value <= parameter.high + slack:
+            complaints.append(
+                f"{parameter.name} = {value:.4g} lies outside its plausible range "
+                f"{parameter.low:g} to {parameter.high:g}"
+            )
+    return complaints

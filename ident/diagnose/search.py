@@ -1,0 +1,296 @@
+"""Forward search for missing effects with removal, decided on runs that were left out.
+
+A round screens all candidates linearly, fits the most promising in earnest, and takes the one
+that predicts left-out runs best, if it passes: significant against a residual as coloured as the
+one at hand and with as many candidates as were tried, better on most runs, within its plausible
+range, and large enough to matter. Candidates that held-out runs cannot tell from it form a group.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, field
+from multiprocessing import get_context
+
+import numpy as np
+from scipy.stats import chi2
+
+from cdpr.effects import effect_named
+from cdpr.robot import Array
+from ident.diagnose.refit import Refit, plausible, refit, rescored
+from ident.diagnose.rows import score
+from ident.diagnose.screen import BASE, Screen, screen
+from ident.diagnose.spectrum import common_frequency
+from ident.likelihood import LikelihoodFit, correlation_factor
+
+Progress = Callable[[str, float], None]
+
+REFITTED = 5
+MOST_ROUNDS = 4
+SIGNIFICANCE = 1e-3
+LEAST_SHARE_IMPROVED = 0.6
+# A second effect must be worth its place: integrators, shapes of friction and points of
+# application differ a little from reality, and 0.1 mm samples see it.
+LEAST_GAIN_LATER = 0.25
+LEAST_EXCESS_LATER = 0.04
+CONFOUNDED_DIFFERENCE = 12.0
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """What became of one effect.
+
+    Attributes:
+        effect: its name.
+        verdict: accepted, rejected, confounded or not_identifiable.
+        delta_bic: BIC with it less BIC without it, the residual's colour allowed for.
+        held_out_gain: share of the held-out excess over the noise that it removes.
+        confounded_with: effects that held-out runs cannot tell from it.
+        reason: a sentence.
+    """
+
+    effect: str
+    verdict: str
+    delta_bic: float
+    held_out_gain: float
+    confounded_with: tuple[str, ...]
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Round:
+    """One round of the search: what stood before, who was tried, who won."""
+
+    before: Refit
+    candidates: tuple[Candidate, ...]
+    winner: Refit | None
+    group: tuple[str, ...]
+
+
+@dataclass(slots=True)
+class Search:
+    """State of a search.
+
+    Attributes:
+        noise_scales: of metres and radians, (2,).
+        candidates: names still to be considered.
+        workers: processes that fit candidates side by side.
+        progress: told a label and a fraction.
+    """
+
+    noise_scales: Array
+    candidates: tuple[str, ...]
+    workers: int = 2
+    progress: Progress | None = None
+    rounds: list[Round] = field(default_factory=list)
+
+    def run(self, base: LikelihoodFit) -> Refit:
+        """Add effects to a base fit until none passes; the last fit."""
+        self._tell("base dynamics", 0.0)
+        current = rescored(base, self.noise_scales)
+        for index in range(MOST_ROUNDS):
+            done = self._round(current, index)
+            self.rounds.append(done)
+            if done.winner is None:
+                break
+            current = done.winner
+        return current
+
+    def _tell(self, label: str, fraction: float) -> None:
+        if self.progress:
+            self.progress(label, fraction)
+
+    def _round(self, current: Refit, index: int) -> Round:
+        share = 1.0 / MOST_ROUNDS
+        self._tell(f"round {index + 1}: screening", index * share)
+        left = [n for n in self.candidates if n not in current.effects]
+        screens = self._screens(current.fit, left)
+        linear = {name: _linear_held_out(screens[name], name) for name in left}
+        ranked = sorted(linear, key=lambda name: linear[name])
+        promising = _promising(ranked, linear, current)
+        tried = self._refits(current, screens, promising, index)
+        return _decided(current, screens, linear, ranked, tried, index)
+
+    def _screens(self, fit: LikelihoodFit, names: Sequence[str]) -> dict[str, Screen]:
+        """Linear evidence by candidate: those that need tensions apart, they cost more."""
+        shapes = {}
+        frequency = common_frequency(fit, self.noise_scales)
+        if "harmonic_force" in names:
+            shapes["harmonic_force"] = {"frequency_hz": frequency}
+        found: dict[str, Screen] = {}
+        for loaded in (False, True):
+            group = [n for n in names if effect_named(n).needs_tension == loaded]
+            if group:
+                together = screen(fit, group, self.noise_scales, shapes)
+                found |= dict.fromkeys(group, together)
+        return found
+
+    def _refits(
+        self, current: Refit, screens: dict[str, Screen], names: Sequence[str], index: int
+    ) -> dict[str, Refit]:
+        jobs = [(current, name, *_start_of(screens[name], name)) for name in names]
+        share = 1.0 / MOST_ROUNDS
+        found: dict[str, Refit] = {}
+        if not jobs:
+            return found
+        if self.workers < 2:
+            results = (_job(*job, self.noise_scales) for job in jobs)
+            for k, (name, result) in enumerate(zip(names, results, strict=True)):
+                self._tell(f"round {index + 1}: {name}", (index + (k + 1) / len(jobs)) * share)
+                found |= {} if result is None else {name: result}
+            return found
+        with ProcessPoolExecutor(self.workers, mp_context=get_context("fork")) as pool:
+            futures = [pool.submit(_job, *job, self.noise_scales) for job in jobs]
+            for k, (name, future) in enumerate(zip(names, futures, strict=True)):
+                self._tell(f"round {index + 1}: {name}", (index + k / len(jobs)) * share)
+                result = future.result()
+                found |= {} if result is None else {name: result}
+        return found
+
+
+def _job(
+    current: Refit, name: str, values: Array, change: Array, noise_scales: Array
+) -> Refit | None:
+    try:
+        return refit(current.fit, name, values, change, noise_scales)
+    except ValueError:
+        return None
+
+
+def _linear_held_out(one: Screen, name: str) -> float:
+    return float(score(one.with_candidate(name)).held_out.sum())
+
+
+def _start_of(one: Screen, name: str) -> tuple[Array, Array]:
+    """Start values of a candidate from its linear estimate, and the change of the others."""
+    found = score(one.with_candidate(name))
+    columns = one.columns[name]
+    n_base = len(one.base)
+    parameters = effect_named(name).parameters(one.model.robot)
+    first = int(columns[0]) - BASE - next(i for i, p in enumerate(parameters) if p.amplitude)
+    values = one.values[first : first + len(parameters)].copy()
+    places = columns - BASE - first
+    low = np.array([parameters[i].low for i in places])
+    high = np.array([parameters[i].high for i in places])
+    values[places] = np.clip(found.change[n_base:], low, high)
+    return values, found.change[:n_base]
+
+
+def _promising(ranked: Sequence[str], linear: dict[str, float], current: Refit) -> list[str]:
+    """The candidates worth fitting: the linear best and those that are not far behind."""
+    gain = current.held_out - linear[ranked[0]]
+    within = [n for n in ranked if current.held_out - linear[n] > max(0.3 * gain, 10.0)]
+    return within[:REFITTED]
+
+
+def colour_of(fit: LikelihoodFit, noise_scales: Array) -> float:
+    """How much stronger than white noise the residual is in the band of the motion, >= 1."""
+    total = correlation_factor(fit.motions, fit.samples, noise_scales)
+    squares = fit.cost / max(fit.n_samples, 1)
+    return max(1.0, total * squares)
+
+
+def _decided(
+    current: Refit,
+    screens: dict[str, Screen],
+    linear: dict[str, float],
+    ranked: Sequence[str],
+    tried: dict[str, Refit],
+    index: int,
+) -> Round:
+    count = float(current.evidence.counts.sum())
+    excess = max(current.held_out - count, 1e-9)
+    colour = colour_of(current.fit, np.ones(2) * current.fit.scales)
+    complaints: dict[str, str] = {}
+    passed: dict[str, Refit] = {}
+    for name, one in tried.items():
+        complaint = _complaint(current, one, name, colour, len(ranked), index, count)
+        if complaint:
+            complaints[name] = complaint
+        else:
+            passed[name] = one
+    winner, group = _winner(passed, current)
+    candidates = []
+    for name in ranked:
+        known = tried.get(name)
+        held_out = known.held_out if known else linear[name]
+        n_new = len(effect_named(name).parameters(current.fit.model.robot))
+        bic = (
+            _delta_bic(current, known, n_new, colour, count)
+            if known
+            else ((linear[name] - current.held_out) / colour + n_new * np.log(count))
+        )
+        gain = float((current.held_out - held_out) / excess)
+        verdict, reason, others = _verdict(name, winner, group, complaints, known, passed, gain)
+        candidates.append(Candidate(name, verdict, float(bic), gain, others, reason))
+    return Round(current, tuple(candidates), winner, group)
+
+
+def _delta_bic(current: Refit, one: Refit, n_new: int, colour: float, count: float) -> float:
+    return (one.score.cost - current.score.cost) / colour + n_new * float(np.log(count))
+
+
+def _complaint(
+    current: Refit, one: Refit, name: str, colour: float, n_tried: int, index: int, count: float
+) -> str:
+    """Why a refitted candidate does not pass, or nothing."""
+    outside = plausible(one, name)
+    if outside:
+        return "; ".join(outside)
+    n_new = len(effect_named(name).parameters(current.fit.model.robot))
+    drop = (current.score.cost - one.score.cost) / colour
+    chance = min(1.0, float(chi2.sf(max(drop, 0.0), n_new)) * n_tried)
+    if chance > SIGNIFICANCE or _delta_bic(current, one, n_new, colour, count) > -10.0:
+        return f"not significant: p = {chance:.2g} with {n_tried} candidates tried"
+    gains = current.score.held_out - one.score.held_out
+    better = float((gains > 0.0).mean())
+    if gains.sum() <= 0.0 or better < LEAST_SHARE_IMPROVED:
+        return f"only {100 * better:.0f} % of the left-out runs are predicted better"
+    excess = (current.held_out - count) / count
+    gain = float(gains.sum()) / max(current.held_out - count, 1e-9)
+    if index and (excess < LEAST_EXCESS_LATER or gain < LEAST_GAIN_LATER):
+        return (
+            f"it would remove {100 * gain:.0f} % of an excess of {100 * excess:.0f} % over the "
+            "noise: too little to claim another effect"
+        )
+    return ""
+
+
+def _winner(passed: dict[str, Refit], current: Refit) -> tuple[Refit | None, tuple[str, ...]]:
+    """The best of those that passed, and all that held-out runs cannot tell from it."""
+    if not passed:
+        return None, ()
+    best = min(passed.values(), key=lambda one: one.held_out)
+    colour = colour_of(best.fit, best.fit.scales)
+    group = [
+        name
+        for name, one in passed.items()
+        if (one.held_out - best.held_out) / colour < CONFOUNDED_DIFFERENCE
+    ]
+    robot = current.fit.model.robot
+    group.sort(key=lambda n: (len(effect_named(n).parameters(robot)), passed[n].held_out))
+    return passed[group[0]], tuple(group)
+
+
+def _verdict(
+    name: str,
+    winner: Refit | None,
+    group: tuple[str, ...],
+    complaints: dict[str, str],
+    known: Refit | None,
+    passed: dict[str, Refit],
+    gain: float,
+) -> tuple[str, str, tuple[str, ...]]:
+    if winner is not None and name in group:
+        others = tuple(n for n in group if n != name)
+        if others:
+            return "confounded", f"held-out runs cannot tell it from {', '.join(others)}", others
+        return "accepted", f"removes {100 * gain:.1f} % of the held-out excess over the noise", ()
+    if name in complaints:
+        return "rejected", complaints[name], ()
+    if known is not None and name in passed and winner is not None:
+        return "rejected", f"{winner.effects[-1]} predicts left-out runs better", ()
+    if known is not None:
+        return "rejected", "its fit could not be completed", ()
+    return "rejected", f"removes at most {100 * gain:.1f} % of the excess to first order", ()

@@ -1,0 +1,42 @@
+"""What a residual looks like: its spectrum over all runs and what it follows."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cdpr.robot import Array
+from ident.likelihood import LikelihoodFit
+from ident.likelihood_run import residuals
+
+LOWEST_HZ = 0.15
+
+
+def mean_log_spectrum(fit: LikelihoodFit, noise_scales: Array) -> tuple[Array, Array]:
+    """Geometric mean over runs of the whitened residuals' power, one for white noise.
+
+    A line that all runs share stands out of it; the platform's own modes differ from run to run.
+
+    Returns:
+        Frequencies in Hz and power, (f,) each.
+    """
+    rate = min(1.0 / float(np.median(np.diff(run.times_s))) for run in fit.samples)
+    duration = min(run.span_s[1] - run.span_s[0] for run in fit.samples)
+    frequencies = np.arange(LOWEST_HZ, 0.4 * rate, 0.25 / duration)
+    logs = np.zeros(len(frequencies))
+    for motion, run in zip(fit.motions, fit.samples, strict=True):
+        white = residuals(motion, run, noise_scales)
+        window = np.hanning(len(white))
+        wave = np.exp(-2j * np.pi * np.outer(frequencies, run.times_s)) * window
+        power = np.abs(wave @ white) ** 2 / np.sum(window**2)
+        logs += np.log(power.mean(axis=1) + 1e-12)
+    return frequencies, np.exp(logs / len(fit.samples))
+
+
+def common_frequency(fit: LikelihoodFit, noise_scales: Array) -> float:
+    """The frequency at which all runs' residuals are strongest against their surroundings, Hz."""
+    frequencies, power = mean_log_spectrum(fit, noise_scales)
+    width = max(5, len(frequencies) // 20) | 1
+    padded = np.pad(np.log(power), width // 2, mode="edge")
+    around = np.median(np.lib.stride_tricks.sliding_window_view(padded, width), axis=-1)
+    prominence = np.log(power) - around
+    return float(frequencies[int(np.argmax(prominence))])
