@@ -121,48 +121,59 @@ def _per_cable(scene: Scene, value: float) -> Array:
 
 
 def _translational_drag(scene: Scene, rate: float, rng: np.random.Generator):
+    """Force -mass rate v at P, v the velocity of P."""
     return changed(scene, drag=rate * scene.world.mass), {}
 
 
 def _rotational_drag(scene: Scene, damping: float, rng: np.random.Generator):
+    """Moment -damping omega."""
     return changed(scene, drag_angular=damping), {}
 
 
 def _quadratic_drag(scene: Scene, coefficient: float, rng: np.random.Generator):
+    """Force -coefficient |v| v at P."""
     return changed(scene, drag_quadratic=coefficient), {}
 
 
 def _swivel_friction(scene: Scene, torque: float, rng: np.random.Generator):
+    """Dry torque against the swivel rate of every pulley, the same at any load."""
     return changed(scene, swivel_coulomb=_per_cable(scene, torque)), {}
 
 
 def _swivel_viscous(scene: Scene, damping: float, rng: np.random.Generator):
+    """Torque -damping times the swivel rate of every pulley."""
     return changed(scene, swivel_viscous=_per_cable(scene, damping)), {}
 
 
 def _pulley_friction(scene: Scene, coefficient: float, rng: np.random.Generator):
+    """Dry torque coefficient r T against the wrap angle's rate: the cable is bent on and off."""
     return changed(scene, bending=_per_cable(scene, coefficient)), {}
 
 
 def _cable_elasticity(scene: Scene, stiffness: float, rng: np.random.Generator):
+    """Every cable a damped spring of EA over its held length; real vibration, not statics."""
     return changed(scene, stiffness_ea=stiffness, relaxation=1e-3), {"relaxation_s": 1e-3}
 
 
 def _cable_mass(scene: Scene, density: float, rng: np.random.Generator):
+    """Straight heavy cables: a third of their mass moves with A, half their weight hangs on it."""
     return changed(scene, density=density), {}
 
 
 def _gravity_tilt(scene: Scene, angle: float, rng: np.random.Generator):
+    """Gravity turned about a horizontal axis: the base frame is not level."""
     gravity = turned(scene.world.gravity, random_direction(rng, flat=True), angle)
     return changed(scene, gravity=gravity), {"gravity_m_s2": gravity}
 
 
 def _marker_offset(scene: Scene, distance: float, rng: np.random.Generator):
+    """The measured point is P plus a shift in the platform frame."""
     offset = distance * random_direction(rng)
     return replace(scene, marker_offset_m=offset), {"offset_m": offset}
 
 
 def _cable_length_bias(scene: Scene, bias: float, rng: np.random.Generator):
+    """Told lengths wrong by 0.5 to 1 times the size, each sign at random, all runs alike."""
     n = scene.n_cables
     biases = bias * rng.choice([-1.0, 1.0], n) * rng.uniform(0.5, 1.0, n)
     return replace(scene, length_bias_m=biases), {"told_minus_true_m": biases}
@@ -177,20 +188,24 @@ def _moved_point(scene: Scene, points: Array, distance: float, rng: np.random.Ge
 
 
 def _anchor_offset(scene: Scene, distance: float, rng: np.random.Generator):
+    """One cable's entry point lies elsewhere than declared."""
     entry, drawn = _moved_point(scene, scene.world.entry, distance, rng)
     return changed(scene, entry=entry), drawn
 
 
 def _attachment_offset(scene: Scene, distance: float, rng: np.random.Generator):
+    """One cable's attachment lies elsewhere than declared."""
     attach, drawn = _moved_point(scene, scene.world.attach, distance, rng)
     return changed(scene, attach=attach), drawn
 
 
 def _pulley_radius(scene: Scene, excess: float, rng: np.random.Generator):
+    """All pulleys larger than declared (cable thickness, groove depth)."""
     return changed(scene, radius=scene.world.radius + excess), {"cable": "all"}
 
 
 def _pulley_axis(scene: Scene, angle: float, rng: np.random.Generator):
+    """One pulley's swivel frame turned about an axis perpendicular to its swivel axis."""
     k = int(rng.integers(scene.n_cables))
     swivel = scene.world.swivel.copy()
     across = math.tau * rng.random()
@@ -200,6 +215,7 @@ def _pulley_axis(scene: Scene, angle: float, rng: np.random.Generator):
 
 
 def _tether(scene: Scene, stiffness: float, rng: np.random.Generator):
+    """A spring from a fixed point to a point near P, slack below its rest length."""
     away = random_direction(rng, flat=True)
     anchor = scene.centre_m + 1.2 * away + np.array([0.0, 0.0, rng.uniform(0.2, 0.8)])
     point = np.array([0.1, 0.1, 0.05]) * rng.uniform(-1.0, 1.0, 3)
@@ -209,16 +225,19 @@ def _tether(scene: Scene, stiffness: float, rng: np.random.Generator):
 
 
 def _torsion_spring(scene: Scene, stiffness: float, rng: np.random.Generator):
+    """Energy stiffness h^2 / 2 of the heading h from its neutral value."""
     yaw = scene.heading_rad + rng.uniform(-0.2, 0.2)
     return changed(scene, torsion=stiffness, torsion_yaw=yaw), {"neutral_yaw_rad": yaw}
 
 
 def _constant_force(scene: Scene, size: float, rng: np.random.Generator):
+    """A horizontal force at P, fixed in the base frame."""
     force = size * random_direction(rng, flat=True)
     return changed(scene, force=force), {"force_vector_n": force, "at": "P"}
 
 
 def _harmonic_force(scene: Scene, amplitude: float, rng: np.random.Generator):
+    """A horizontal sine force at P; its phase at release is new in every run."""
     hz, direction = rng.uniform(0.7, 3.5), random_direction(rng, flat=True)
     row = np.array([[hz, 0.0, *(amplitude * direction), 0.0]])
     scene = replace(changed(scene, oscillators=row), random_phase=True)
@@ -226,11 +245,13 @@ def _harmonic_force(scene: Scene, amplitude: float, rng: np.random.Generator):
 
 
 def _winch_creep(scene: Scene, rate: float, rng: np.random.Generator):
+    """All cables run out, each at 0.6 to 1.4 times the size, from the release on."""
     rates = rate * rng.uniform(0.6, 1.4, scene.n_cables)
     return changed(scene, creep=rates), {"rates_m_s": rates}
 
 
 def _clock_offset(scene: Scene, delay: float, rng: np.random.Generator):
+    """Orientation samples come from an instrument that lags behind the positions."""
     return replace(scene, orientation_delay_s=delay), {"of": "orientation after position"}
 
 

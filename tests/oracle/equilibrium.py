@@ -58,8 +58,7 @@ def settle(world: World, position_m: Array, quaternion: Array) -> Rest:
     p: Array = np.array(position_m, dtype=float)
     q: Array = np.array(quaternion, dtype=float)
     J, _ = jacobian_and_lengths(world, p, q)
-    n = len(world.length)
-    bare = _residual(world, p, q, np.zeros(n))[:6]
+    bare = _residual(world, p, q, np.zeros(len(world.length)))[:6]
     tension: Array = np.linalg.lstsq(J.T, bare, rcond=None)[0]
     residual = bare
     for _ in range(60):
@@ -68,7 +67,7 @@ def settle(world: World, position_m: Array, quaternion: Array) -> Rest:
             return _rest(world, p, q, tension)
         step = np.linalg.lstsq(_slope(world, p, q, tension), -residual, rcond=None)[0]
         step *= min(1.0, 0.05 / max(np.max(np.abs(step[:3])), 0.25 * np.max(np.abs(step[3:6]))))
-        p = p + step[:3]
+        p += step[:3]
         turn(q, step[3:6])
         tension = tension + step[6:]
     raise NoEquilibriumError(f"balance still off by {np.max(np.abs(residual)):.2g} after 60 steps")

@@ -23,6 +23,7 @@ OUTSIDE_MAGNITUDES: dict[str, tuple[str, float, float, float]] = {
 
 
 def _hanging_bob(scene: Scene, mass: float, rng: np.random.Generator):
+    """A ball on a string below the platform: two more pendulum coordinates."""
     pivot = np.array([0.12, 0.12, 0.05]) * rng.uniform(-1.0, 1.0, 3)
     length = rng.uniform(0.1, 0.3)
     drawn = {"bob_length": length, "bob_pivot": pivot, "bob_damping": 0.05 * mass}
@@ -30,17 +31,20 @@ def _hanging_bob(scene: Scene, mass: float, rng: np.random.Generator):
 
 
 def _contact(scene: Scene, stiffness: float, rng: np.random.Generator):
+    """A padded stop, set up afresh in every run, that the centre of mass runs into."""
     scene = changed(scene, wall_stiffness=stiffness, wall_damping=0.02 * stiffness)
     return replace(scene, stop_share=0.5), {"stop_at_share_of_displacement": 0.5}
 
 
 def _magnet(scene: Scene, force: float, rng: np.random.Generator):
+    """Attraction of the centre of mass to a pole below, strength over distance^4."""
     place = scene.centre_m + np.array([*rng.uniform(-0.2, 0.2, 2), -0.4])
     strength = force * 0.3**4
     return changed(scene, magnet=place, magnet_strength=strength), {"place_m": place}
 
 
 def _winch_hunting(scene: Scene, amplitude: float, rng: np.random.Generator):
+    """One held length oscillates; its phase is new in every run."""
     k, hz = int(rng.integers(scene.n_cables)), rng.uniform(0.5, 2.5)
     hunting = np.zeros(scene.n_cables)
     hunting[k] = amplitude
@@ -49,10 +53,12 @@ def _winch_hunting(scene: Scene, amplitude: float, rng: np.random.Generator):
 
 
 def _negative_damping(scene: Scene, rate: float, rng: np.random.Generator):
+    """A draught that feeds the swing: drag of the wrong sign."""
     return changed(scene, drag=rate * scene.world.mass), {}
 
 
 def _chirp_force(scene: Scene, amplitude: float, rng: np.random.Generator):
+    """A motor that runs up: a horizontal force of rising frequency at P."""
     direction = random_direction(rng, flat=True)
     row = np.array([[0.8, 0.0, *(amplitude * direction), 0.22]])
     scene = replace(changed(scene, oscillators=row), random_phase=True)
@@ -60,11 +66,13 @@ def _chirp_force(scene: Scene, amplitude: float, rng: np.random.Generator):
 
 
 def _spinning_rotor(scene: Scene, momentum: float, rng: np.random.Generator):
+    """Gyroscopic moment -omega x h of a rotor fixed to the platform."""
     rotor = momentum * random_direction(rng)
     return changed(scene, rotor=rotor), {"angular_momentum_nms_vector": rotor}
 
 
 def _turbulence(scene: Scene, rms: float, rng: np.random.Generator):
+    """Random broad-band force at P, 0.2 to 5 Hz."""
     count = 24
     rows = np.zeros((count, 6))
     rows[:, 0] = np.exp(rng.uniform(math.log(0.2), math.log(5.0), count))
@@ -73,6 +81,7 @@ def _turbulence(scene: Scene, rms: float, rng: np.random.Generator):
 
 
 def _clock_rate(scene: Scene, share: float, rng: np.random.Generator):
+    """Time stamps run fast, which free motion cannot tell from weaker gravity."""
     return replace(scene, clock_rate=share), {}
 
 

@@ -167,8 +167,8 @@ def _step(
         q, _ = np.linalg.qr(own)
         left.append(shared - q @ (q.T @ shared))
         right.append(-r + q @ (q.T @ r))
-    found = np.linalg.lstsq(np.vstack(left), np.concatenate(right), rcond=1e-10)[0]
-    steps = [
+    found: Array = np.linalg.lstsq(np.vstack(left), np.concatenate(right), rcond=1e-10)[0]
+    steps: list[Array] = [
         np.linalg.lstsq(own, -r - shared @ found, rcond=1e-10)[0]
         for r, (shared, own) in zip(residuals, jacobians, strict=True)
     ]
