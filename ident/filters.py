@@ -26,10 +26,12 @@ class Smoother:
 
     Attributes:
         period_s: sampling period.
+        pass_hz: end of the pass band.
         kernels: value, first and second derivative, (3, 2 half + 1).
     """
 
     period_s: float
+    pass_hz: float
     kernels: Array
 
     @property
@@ -56,7 +58,7 @@ def taps_for(period_s: float, pass_hz: float, stop_hz: float, attenuation_db: fl
     return max(7, int(np.ceil(taps))) | 1
 
 
-@lru_cache(maxsize=32)
+@lru_cache(maxsize=128)
 def smoother(
     period_s: float, pass_hz: float = 5.0, stop_hz: float = 10.0, attenuation_db: float = 60.0
 ) -> Smoother:
@@ -80,44 +82,51 @@ def smoother(
             f"{nyquist:.4g} Hz; lower pass_hz or record faster"
         )
     half = taps_for(period_s, pass_hz, stop_hz, attenuation_db) // 2
-    kernels = np.array([_design(d, half, period_s, pass_hz, stop_hz) for d in range(3)])
-    return Smoother(period_s, frozen_array(kernels, kernels.shape, "kernels"))
-
-
-def _design(order: int, half: int, period_s: float, pass_hz: float, stop_hz: float) -> Array:
-    """Least-squares kernel of derivative `order` with exact polynomial moments, (2 half + 1,)."""
-    k = np.arange(-half, half + 1)
-    reach = k * period_s
+    reach = period_s * np.arange(-half, half + 1)
     omega = np.pi / period_s * (np.arange(_GRID) + 0.5) / _GRID
-    pass_, stop = 2.0 * np.pi * pass_hz, 2.0 * np.pi * stop_hz
+    inside, outside = omega <= 2.0 * np.pi * pass_hz, omega >= 2.0 * np.pi * stop_hz
+    weight = np.where(inside | outside, 1.0, 0.0)
+    value = _design(0, reach, omega, inside.astype(float), weight)
+    # What the value's kernel lets through of each frequency, its derivatives' kernels must too:
+    # then a linear law between position and acceleration survives smoothing, transition included.
+    gain = np.cos(np.outer(omega, reach)) @ value
+    even = np.maximum(omega, 0.2 * np.pi * pass_hz)
+    first = _design(1, reach, omega, gain * omega, 1.0 / even)
+    second = _design(2, reach, omega, -gain * omega**2, 1.0 / even**2)
+    kernels = np.array([value, first, second])
+    return Smoother(period_s, pass_hz, frozen_array(kernels, kernels.shape, "kernels"))
+
+
+def _design(order: int, reach: Array, omega: Array, target: Array, weight: Array) -> Array:
+    """Least-squares kernel of derivative `order` with exact polynomial moments, (2 half + 1,).
+
+    Args:
+        order: 0, 1 or 2.
+        reach: times of the taps, symmetric about 0, (2 half + 1,).
+        omega: frequencies of the design, rad/s, (n,).
+        target: wanted real (order 0, 2) or imaginary (order 1) gain there, (n,).
+        weight: of the errors there, (n,).
+    """
+    half = len(reach) // 2
     # Only cosines carry an even operation and only sines an odd one, so each design is real.
     even = order % 2 == 0
     waves = np.cos(np.outer(omega, reach)) if even else np.sin(np.outer(omega, reach))
-    sign = -1.0 if order == 2 else 1.0
-    target = np.where(omega <= pass_, sign * omega**order, 0.0)
-    # Relative errors count alike over the pass band; in the stop band, relative to its edge.
-    weight = np.where(omega <= pass_, np.maximum(omega, 0.1 * pass_) ** -order, 0.0)
-    weight = np.where(omega >= stop, _STOP_WEIGHT / pass_**order, weight)
-    rows, goal = weight[:, None] * waves, weight * target
-    normal = rows.T @ rows + 1e-9 * np.eye(len(k))  # the ridge settles the transition band
-    degrees = np.arange(order % 2, _EXACT_DEGREE + 1, 2)
-    scale = half * period_s
-    moments = (reach[None, :] / scale) ** degrees[:, None]
-    exact = np.where(degrees == order, [1.0, 1.0, 2.0][order] / scale**order, 0.0)
     # Parity of the kernel is imposed by halving the unknowns: k and -k share one coefficient.
-    fold = np.zeros((len(k), half + 1))
+    fold = np.zeros((len(reach), half + 1))
     fold[half + np.arange(half + 1), np.arange(half + 1)] = 1.0
     fold[half - np.arange(half + 1), np.arange(half + 1)] = 1.0 if even else -1.0
     fold[half, 0] = 1.0 if even else 0.0
-    if not even:
-        fold = fold[:, 1:]
-    system = np.block(
-        [
-            [fold.T @ normal @ fold, (moments @ fold).T],
-            [moments @ fold, np.zeros((len(degrees), len(degrees)))],
-        ]
-    )
-    right = np.concatenate([fold.T @ rows.T @ goal, exact])
+    fold = fold if even else fold[:, 1:]
+    rows = weight[:, None] * waves @ fold
+    normal = rows.T @ rows
+    normal += 1e-12 * np.trace(normal) * np.eye(len(normal))  # settles the transition band
+    degrees = np.arange(order % 2, _EXACT_DEGREE + 1, 2)
+    span = reach[-1]
+    moments = (reach / span) ** degrees[:, None] @ fold
+    exact = np.where(degrees == order, [1.0, 1.0, 2.0][order] / span**order, 0.0)
+    corner = np.zeros((len(degrees), len(degrees)))
+    system = np.block([[normal, moments.T], [moments, corner]])
+    right = np.concatenate([rows.T @ (weight * target), exact])
     return fold @ np.linalg.solve(system, right)[: fold.shape[1]]
 
 
@@ -139,4 +148,4 @@ def forward_difference_smoother(
     velocity = (np.roll(value, 1) - value) / period_s
     acceleration = (np.roll(velocity, 1) - velocity) / period_s
     kernels = np.array([value, velocity, acceleration])
-    return Smoother(period_s, frozen_array(kernels, kernels.shape, "kernels"))
+    return Smoother(period_s, pass_hz, frozen_array(kernels, kernels.shape, "kernels"))

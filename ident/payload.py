@@ -67,7 +67,10 @@ def mass_from_payloads(com_m: Array, covariance: Array, loaded: list[LoadedCentr
     variance, weight = np.inf, np.eye(len(shifts))
     for _ in range(_SWEEPS):
         weight = np.linalg.inv(_residual_covariance(max(mass, 0.0), covariance, loaded))
-        variance = 1.0 / float(shifts @ weight @ shifts)
+        information = float(shifts @ weight @ shifts)
+        if not information > 0.0:
+            break
+        variance = 1.0 / information
         mass = variance * float(shifts @ weight @ pulls)
     std = float(np.sqrt(variance))
     if not mass > 2.0 * std:

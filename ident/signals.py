@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from cdpr.robot import Array
 from cdpr.rotation import angle_rate_matrix
+from ident.band import LOWEST_PASS_HZ, best_pass_hz
 from ident.filters import Smoother, forward_difference_smoother, smoother
 from ident.runs import SwingRun
 from ident.sampling import (
@@ -22,6 +23,7 @@ from ident.sampling import (
     Grid,
     bridged,
     bridges,
+    gaps,
     incomplete,
     jump_sizes,
     regular_grid,
@@ -45,8 +47,9 @@ class SignalSettings:
 
     Attributes:
         processing: `centred`, or `authors`: the published one, whose derivatives lag.
-        pass_hz: the motion's frequencies lie below.
-        stop_hz: silent from here on (FIDIM 2022, sec. 5.2: 10 Hz).
+        pass_hz: the motion's frequencies lie below; None: chosen from each run's spectrum.
+        stop_hz: silent from here on; None: three quarters of the pass band above it, at
+            least 5 Hz.
         attenuation_db: sets the smoother's span.
         output_hz: rate after decimation; 0 keeps every sample.
         longest_gap_s: longer gaps stay open.
@@ -56,8 +59,8 @@ class SignalSettings:
     """
 
     processing: Processing = "centred"
-    pass_hz: float = 5.0
-    stop_hz: float = 10.0
+    pass_hz: float | None = None
+    stop_hz: float | None = None
     attenuation_db: float = 60.0
     output_hz: float = 10.0
     longest_gap_s: float = 0.05
@@ -65,10 +68,15 @@ class SignalSettings:
     jump_limit_m: float = 0.003
     jump_limit_rad: float = 0.015
 
-    def kernels(self, period_s: float) -> Smoother:
-        """The smoother for samples of this period."""
-        design = smoother if self.processing == "centred" else forward_difference_smoother
-        return design(period_s, self.pass_hz, self.stop_hz, self.attenuation_db)
+    def kernels(self, period_s: float, pass_hz: float = LOWEST_PASS_HZ) -> Smoother:
+        """The smoother for samples of this period, of this pass band where none is set."""
+        if self.processing == "authors":
+            # FIDIM 2022, sec. 5.2: stop band at 10 Hz.
+            bands = self.pass_hz or 5.0, self.stop_hz or 10.0
+            return forward_difference_smoother(period_s, *bands, self.attenuation_db)
+        pass_hz = self.pass_hz or pass_hz
+        stop_hz = self.stop_hz or pass_hz + max(5.0, 0.75 * pass_hz)
+        return smoother(period_s, pass_hz, stop_hz, self.attenuation_db)
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,6 +93,7 @@ class Signals:
         covariances: of values, velocities, accelerations stacked, (n, 3 n_c, 3 n_c).
         noise_std: of one recorded sample, (n_c,).
         window_s: the free motion that the samples were taken from.
+        pass_hz: end of the smoother's pass band.
         missing: share of recorded samples that were missing in the window.
         jumps: steps that the smoother did not reach across.
     """
@@ -98,6 +107,7 @@ class Signals:
     covariances: Array
     noise_std: Array
     window_s: tuple[float, float]
+    pass_hz: float
     missing: float
     jumps: int
 
@@ -127,17 +137,20 @@ def signals_of(run: SwingRun, settings: SignalSettings | None = None) -> Signals
     trajectory = run.trajectory
     try:
         grid = regular_grid(trajectory.times_s, trajectory.values)
-        kernels = settings.kernels(grid.period_s)
+        rough = settings.kernels(grid.period_s)
     except ValueError as error:
         raise UnusableRunError(str(error)) from error
     gap_samples = int(settings.longest_gap_s / grid.period_s + 1e-9)
     made = bridges(incomplete(grid.values), gap_samples)
     filled = bridged(grid.values, made)
     jumps = _jumps(filled, trajectory.coordinates, settings)
-    window = _window(run, grid, filled, jumps, kernels)
+    window = _window(run, grid, filled, jumps, rough)
     inside = (grid.times_s >= window[0] - 1e-9) & (grid.times_s <= window[1] + 1e-9)
     missing = _missing_share(grid, inside, settings)
     usable = ~incomplete(filled)
+    kernels = settings.kernels(
+        grid.period_s, _pass_band(filled, usable & inside, trajectory.coordinates, grid.period_s)
+    )
     if settings.processing == "centred":
         usable &= inside
     centres = _centres(usable, inside, jumps, kernels, settings)
@@ -159,6 +172,7 @@ def signals_of(run: SwingRun, settings: SignalSettings | None = None) -> Signals
         covariances=_propagate(kernels, centres, noise, made),
         noise_std=np.sqrt(np.median(noise[inside].diagonal(axis1=1, axis2=2), axis=0)),
         window_s=window,
+        pass_hz=kernels.pass_hz,
         missing=missing,
         jumps=int(jumps[inside].sum()),
     )
@@ -190,12 +204,26 @@ def _window(
     if len(centres) < _LEAST_OUTPUTS:
         raise UnusableRunError("no unbroken stretch of samples to look for free motion in")
     values, velocities, accelerations = _apply(filled, kernels, centres)
-    names = run.trajectory.coordinates
-    scale = np.array([_LEVER_M if name in _ANGLES else 1.0 for name in names])
+    scale = _scale(run.trajectory.coordinates)
     try:
         return free_window(grid.times_s[centres], values, velocities, accelerations, scale)
     except ValueError as error:
         raise UnusableRunError(str(error)) from error
+
+
+def _scale(coordinates: tuple[str, ...]) -> Array:
+    return np.array([_LEVER_M if name in _ANGLES else 1.0 for name in coordinates])
+
+
+def _pass_band(
+    filled: Array, usable: NDArray[np.bool_], coordinates: tuple[str, ...], period_s: float
+) -> float:
+    """Pass band from the longest unbroken stretch; whole tenths of a hertz, to share designs."""
+    stretches = gaps(usable)
+    if not stretches:
+        return LOWEST_PASS_HZ
+    start, end = max(stretches, key=lambda stretch: stretch[1] - stretch[0])
+    return round(best_pass_hz(filled[start:end], period_s, _scale(coordinates)), 1)
 
 
 def _jumps(
