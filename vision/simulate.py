@@ -186,7 +186,7 @@ class Renderer:
     def _row_times(self, time_s: float, top: int, rows: int, exposure: float) -> Array:
         if self.camera.line_time_s == 0.0:
             return np.array([time_s + exposure])
-        return time_s + exposure + self.camera.line_time_s * (top + np.arange(rows))
+        return time_s + exposure + self.camera.line_time_s * np.arange(top, top + rows, dtype=float)
 
     def _exposures(self, *, moves: bool) -> list[float]:
         count = self.look.exposure_samples if moves and self.look.exposure_s > 0.0 else 1
