@@ -35,12 +35,15 @@ _SUSPECT_WEIGHT = 0.6
 _WEIGHTS_OF_A_GUESS = 1.5
 
 
-def home(path: Path | str, progress: Progress | None = None) -> dict:
+def home(
+    path: Path | str, progress: Progress | None = None, results: Path | str | None = None
+) -> dict:
     """Find the start pose that homing.toml's readings tell and write results/homing.json beside it.
 
     Args:
         path: homing.toml, or the folder that holds it.
         progress: told a label and a fraction from 0 to 1.
+        results: the folder to write to instead.
 
     Returns:
         What was written: the document of FORMATS, "Start pose and excitation".
@@ -58,7 +61,8 @@ def home(path: Path | str, progress: Progress | None = None) -> dict:
     begun = time.perf_counter()
     fit = find_start(homing)
     document = homing_document(homing.robot, fit, time.perf_counter() - begun)
-    write_json(path.parent / "results" / "homing.json", document)
+    results = path.parent / "results" if results is None else Path(results)
+    write_json(results / "homing.json", document)
     say("start pose", 1.0)
     return document
 

@@ -56,8 +56,15 @@ class HomingQuality:
     conditioning: float
 
 
-def advise(robot_path: Path | str, progress: Progress | None = None) -> dict:
+def advise(
+    robot_path: Path | str, progress: Progress | None = None, results: Path | None = None
+) -> dict:
     """Advise on the swivel axes and write results/homing-advice.json beside the robot file.
+
+    Args:
+        robot_path: robot.toml with the platform's mass and centre of mass.
+        progress: told a label and a fraction from 0 to 1.
+        results: where to write homing-advice.json instead.
 
     Raises:
         InputError: the robot file is wrong.
@@ -91,7 +98,7 @@ def advise(robot_path: Path | str, progress: Progress | None = None) -> dict:
             for new, old in zip(better.cables, robot.cables, strict=True)
         ],
     }
-    write_json(robot_path.parent / "results" / "homing-advice.json", document)
+    write_json((results or robot_path.parent / "results") / "homing-advice.json", document)
     return document
 
 
