@@ -39,7 +39,15 @@ class Prediction:
     @property
     def rmse_m(self) -> float | None:
         """Root mean square of the position residuals, a coordinate; None without positions."""
-        places = [i for i, name in enumerate(self.coordinates) if name in POSE_COORDINATES[:3]]
+        return self._rmse(POSE_COORDINATES[:3])
+
+    @property
+    def rmse_rad(self) -> float | None:
+        """Root mean square of the angles' residuals, an angle; None without angles."""
+        return self._rmse(POSE_COORDINATES[3:])
+
+    def _rmse(self, names: tuple[str, ...]) -> float | None:
+        places = [i for i, name in enumerate(self.coordinates) if name in names]
         if not places:
             return None
         residuals = (self.measured - self.predicted)[:, places]
@@ -47,7 +55,11 @@ class Prediction:
 
 
 def predict(
-    model: Model, run: PreparedRun, free: tuple[str, ...] | None, inertia: Array
+    model: Model,
+    run: PreparedRun,
+    free: tuple[str, ...] | None,
+    inertia: Array,
+    values: Array | None = None,
 ) -> Prediction:
     """Predict a run with its initial state and cable lengths fitted and the inertia held.
 
@@ -56,13 +68,15 @@ def predict(
         run: the run.
         free: the coordinates to use of it, or None for full poses.
         inertia: the nine parameters, (9,).
+        values: effect values, (k,); None for those that leave the declared model as it is.
 
     Raises:
         ValueError: when the motion cannot be simulated.
     """
+    values = model.start_values if values is None else values
     samples, first = started(model, run, free, inertia)
     samples = _thinned(samples)
-    state = State(np.array(inertia), model.start_values, first[None], np.ones(2))
+    state = State(np.array(inertia), values, first[None], np.ones(2))
     found = _fitted(model, samples, state, grow=False)
     seen = _seen(found)
     # A start too far off leaves the simulated swing out of phase: grow into the run instead.
@@ -79,7 +93,9 @@ def predict(
 
 
 def _fitted(model: Model, samples: Samples, state: State, grow: bool) -> LikelihoodFit:
-    return fit(model, [samples], state, free=np.zeros(9, dtype=bool), grow=grow)
+    return fit(
+        model, [samples], state, free=np.zeros(9 + len(model.parameters), dtype=bool), grow=grow
+    )
 
 
 def _seen(found: LikelihoodFit) -> Array:

@@ -35,6 +35,7 @@ LEAST_SHARE_IMPROVED = 0.6
 LEAST_GAIN_LATER = 0.25
 LEAST_EXCESS_LATER = 0.04
 CONFOUNDED_DIFFERENCE = 12.0
+LEAST_EXCESS = 0.005
 
 
 @dataclass(frozen=True, slots=True)
@@ -200,7 +201,7 @@ def _decided(
     index: int,
 ) -> Round:
     count = float(current.evidence.counts.sum())
-    excess = max(current.held_out - count, 1e-9)
+    excess = max(current.held_out - count, LEAST_EXCESS * count)
     colour = colour_of(current.fit, np.ones(2) * current.fit.scales)
     complaints: dict[str, str] = {}
     passed: dict[str, Refit] = {}
@@ -248,7 +249,7 @@ def _complaint(
     if gains.sum() <= 0.0 or better < LEAST_SHARE_IMPROVED:
         return f"only {100 * better:.0f} % of the left-out runs are predicted better"
     excess = (current.held_out - count) / count
-    gain = float(gains.sum()) / max(current.held_out - count, 1e-9)
+    gain = float(gains.sum()) / max(current.held_out - count, LEAST_EXCESS * count)
     if index and (excess < LEAST_EXCESS_LATER or gain < LEAST_GAIN_LATER):
         return (
             f"it would remove {100 * gain:.0f} % of an excess of {100 * excess:.0f} % over the "

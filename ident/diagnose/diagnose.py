@@ -1,0 +1,340 @@
+"""The loop closed: find the residual, trace it to an effect, add it, report before and after."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from cdpr.documents import DataError
+from cdpr.effects import catalogue
+from cdpr.model import build_model
+from cdpr.robot import INERTIA_NAMES, POSE_COORDINATES, Array, Robot
+from ident.diagnose.experiments import separating_experiment
+from ident.diagnose.heldout import HeldOut, held_out
+from ident.diagnose.refit import Refit
+from ident.diagnose.search import Candidate, Search
+from ident.diagnose.unexplained import Unexplained, unexplained
+from ident.identify import IdentifySettings, identify
+from ident.joint import State
+from ident.likelihood import LikelihoodFit, fit
+from ident.maximum_likelihood import started
+from ident.prepare import PreparedRun
+from ident.runs import SwingRun
+from ident.samples import UNIT_NOISE_M, UNIT_NOISE_RAD
+
+Progress = Callable[[str, float], None]
+
+FORMAT = "freeswing-diagnosis/1"
+LEAST_RUNS = 3
+# Effects whose best mixture explains less than this of the excess are the nearest, not the cause.
+LEAST_SHARE_EXPLAINED = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class Rung:
+    """One step of the ladder: the model after an effect was added, on the validation runs."""
+
+    effects: tuple[str, ...]
+    held_out: HeldOut
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnosis:
+    """The result of `diagnose`.
+
+    Attributes:
+        ladder: the declared model first, then one rung an effect.
+        candidates: the last word on every effect of the catalogue.
+        groups: for each effect of the final model, those that stand in its group.
+        first: the fit without effects.
+        final: the fit with all accepted effects.
+        unexplained: what remains.
+        notes: sentences about the session.
+    """
+
+    ladder: tuple[Rung, ...]
+    candidates: tuple[Candidate, ...]
+    groups: dict[str, tuple[str, ...]]
+    first: LikelihoodFit
+    final: LikelihoodFit
+    unexplained: Unexplained
+    notes: tuple[str, ...]
+
+    def document(self) -> dict[str, Any]:
+        """results/diagnosis.json."""
+        before, after = (self.ladder[k].held_out.document() for k in (0, -1))
+        return {
+            "format": FORMAT,
+            "before": before,
+            "candidates": [_candidate_entry(one) for one in self.candidates],
+            "accepted": _accepted(self.final, self.groups),
+            "after": after,
+            "share_closed": _share_closed(before, after),
+            "parameters_before": _parameters(self.first),
+            "parameters_after": _parameters(self.final),
+            "parameters_moved_percent": _moved(self.first, self.final),
+            "ladder": [
+                {"effects": list(rung.effects), **rung.held_out.document()} for rung in self.ladder
+            ],
+            "unexplained": {
+                "present": self.unexplained.present,
+                "signature": self.unexplained.signature,
+                "evidence": self.unexplained.evidence,
+            },
+            "notes": list(self.notes),
+        }
+
+
+def diagnose(
+    runs: list[SwingRun],
+    robot: Robot,
+    progress: Progress | None = None,
+    workers: int = 2,
+    candidates: tuple[str, ...] | None = None,
+) -> Diagnosis:
+    """Find the effects that the model of a session lacks.
+
+    Args:
+        runs: all runs; those with role `validate` serve the final before and after alone.
+        robot: declared geometry.
+        progress: told a label and a fraction.
+        workers: processes that fit candidates side by side.
+        candidates: effects to consider; None for the whole catalogue.
+
+    Raises:
+        DataError: when fewer than three runs can be fitted, or no validation run is usable.
+    """
+    known = identify(
+        runs,
+        robot,
+        IdentifySettings(maximum_likelihood=False, predict=False),
+        _part(progress, 0.0, 0.05),
+    )
+    estimate = known.estimates[known.best]
+    full = all(set(run.signals.coordinates) == set(POSE_COORDINATES) for run in known.prepared.runs)
+    free = None if full else known.free_coordinates
+    fitted = _of_role(known.prepared.runs, "identify")
+    checked = _of_role(known.prepared.runs, "validate")
+    _refuse_few(fitted, checked)
+    noise_scales = _noise_scales([*fitted, *checked], free)
+    names = tuple(catalogue()) if candidates is None else candidates
+    barred = _barred(fitted, robot, full)
+    considered = tuple(name for name in names if name not in barred)
+    base, fitted, dropped = _base_fit(
+        robot, fitted, free, estimate.values, noise_scales, _part(progress, 0.05, 0.2)
+    )
+    search = Search(noise_scales, considered, workers, _part(progress, 0.2, 0.85))
+    last = search.run(base)
+    notes = [*known.notes, *dropped]
+    share = _share_explained(search, last)
+    rest = unexplained(last.fit, fitted, full, noise_scales)
+    accepted = [one for one in search.rounds if one.winner is not None]
+    if accepted and rest.present and share < LEAST_SHARE_EXPLAINED:
+        notes.append(
+            f"{', '.join(last.effects)} would remove only {100 * share:.0f} % of the excess: the "
+            "nearest candidates, not the cause; not accepted"
+        )
+        last = search.rounds[0].before
+        accepted = []
+        rest = unexplained(last.fit, fitted, full, noise_scales)
+    ladder = _ladder(search, accepted, checked, free, _part(progress, 0.85, 0.95))
+    final = _with_own_noise(last.fit)
+    first = final if not accepted else _with_own_noise(search.rounds[0].before.fit)
+    groups = {one.winner.effects[-1]: one.group for one in accepted if one.winner is not None}
+    if progress:
+        progress("diagnosis", 1.0)
+    return Diagnosis(
+        ladder,
+        _last_words(search, accepted, barred, names),
+        groups,
+        first,
+        final,
+        rest,
+        tuple(notes),
+    )
+
+
+def _part(progress: Progress | None, low: float, high: float) -> Progress | None:
+    if progress is None:
+        return None
+    return lambda label, fraction: progress(label, low + (high - low) * fraction)
+
+
+def _of_role(runs: tuple[PreparedRun, ...] | list[PreparedRun], role: str) -> list[PreparedRun]:
+    return [run for run in runs if run.run.role == role and run.run.payload is None]
+
+
+def _refuse_few(fitted: list[PreparedRun], checked: list[PreparedRun]) -> None:
+    if len(fitted) < LEAST_RUNS:
+        raise DataError(
+            f"{len(fitted)} usable runs with role identify: at least {LEAST_RUNS} are needed to "
+            "decide on runs left out; record more swings about other equilibria"
+        )
+    if not checked:
+        raise DataError(
+            "no usable run has role validate: before and after are measured on such runs alone; "
+            "give at least one run that role"
+        )
+
+
+def _noise_scales(runs: list[PreparedRun], free: tuple[str, ...] | None) -> Array:
+    """White noise of the samples over what their covariance (or the unit noise) states, (2,)."""
+    ratios: list[list[float]] = [[], []]
+    for run in runs:
+        trajectory = run.run.trajectory
+        stated = trajectory.standard_deviations()
+        names = POSE_COORDINATES if free is None else free
+        for name in names:
+            group = int(name not in POSE_COORDINATES[:3])
+            noise = run.signals.noise_std[run.signals.coordinates.index(name)]
+            unit = UNIT_NOISE_RAD if group else UNIT_NOISE_M
+            if stated is not None:
+                unit = float(np.nanmedian(stated[:, trajectory.coordinates.index(name)]))
+            ratios[group].append(float(noise / unit))
+    return np.array([np.sqrt(np.mean(np.square(group))) if group else 1.0 for group in ratios])
+
+
+def _barred(runs: list[PreparedRun], robot: Robot, full: bool) -> dict[str, str]:
+    """Effects that these data cannot show, and why."""
+    barred = {}
+    if all(run.run.lengths_m is None for run in runs):
+        barred["cable_length_bias"] = "no cable lengths are stated: nothing to be biased"
+    for name, effect in catalogue().items():
+        if not effect.parameters(robot):
+            barred[name] = "this robot has no part that could show it"
+    return barred
+
+
+def _base_fit(
+    robot: Robot,
+    runs: list[PreparedRun],
+    free: tuple[str, ...] | None,
+    inertia: Array,
+    noise_scales: Array,
+    progress: Progress | None,
+) -> tuple[LikelihoodFit, list[PreparedRun], list[str]]:
+    """The declared model fitted to the runs that can be started, in units of the noise."""
+    model = build_model(robot)
+    samples, states, kept, dropped = [], [], [], []
+    for run in runs:
+        try:
+            one, state = started(model, run, free, inertia)
+        except (ValueError, np.linalg.LinAlgError) as error:
+            dropped.append(f"run {run.name} left out: {error}")
+            continue
+        samples.append(one)
+        states.append(state)
+        kept.append(run)
+    _refuse_few(kept, kept)
+    start = State(inertia, model.start_values, np.array(states), noise_scales)
+    rough = fit(model, samples, start, progress=progress)
+    exact = replace(rough.state, scales=noise_scales)
+    return fit(model, samples, exact, estimate_scales=False, grow=False), kept, dropped
+
+
+def _with_own_noise(found: LikelihoodFit) -> LikelihoodFit:
+    """The same fit with scales that follow its residuals: for honest standard deviations."""
+    return fit(found.model, found.samples, found.state, grow=False)
+
+
+def _share_explained(search: Search, last: Refit) -> float:
+    first = search.rounds[0].before
+    count = float(first.evidence.counts.sum())
+    return (first.held_out - last.held_out) / max(first.held_out - count, 1e-9)
+
+
+def _ladder(
+    search: Search,
+    accepted: list,
+    runs: list[PreparedRun],
+    free: tuple[str, ...] | None,
+    progress: Progress | None,
+) -> tuple[Rung, ...]:
+    stages: list[Refit] = [search.rounds[0].before, *(one.winner for one in accepted)]
+    rungs = []
+    for k, stage in enumerate(stages):
+        if progress:
+            progress("before and after", k / len(stages))
+        found = stage.fit
+        rungs.append(
+            Rung(stage.effects, held_out(found.model, runs, free, found.inertia, found.values))
+        )
+    return tuple(rungs)
+
+
+def _last_words(
+    search: Search, accepted: list, barred: dict[str, str], names: tuple[str, ...]
+) -> tuple[Candidate, ...]:
+    """Each effect's verdict in the round that accepted it, else in the first."""
+    words: dict[str, Candidate] = {}
+    for one in search.rounds:
+        for candidate in one.candidates:
+            if candidate.effect not in words or candidate.verdict != "rejected":
+                words[candidate.effect] = candidate
+    if not accepted:
+        words = {
+            name: replace(one, verdict="rejected", confounded_with=())
+            for name, one in words.items()
+        }
+    for name, why in barred.items():
+        if name in names:
+            words[name] = Candidate(name, "not_identifiable", 0.0, 0.0, (), why)
+    order = {"accepted": 0, "confounded": 1, "rejected": 2, "not_identifiable": 3}
+    return tuple(sorted(words.values(), key=lambda c: (order[c.verdict], c.delta_bic)))
+
+
+def _candidate_entry(one: Candidate) -> dict[str, Any]:
+    entry: dict[str, Any] = {
+        "effect": one.effect,
+        "verdict": one.verdict,
+        "delta_bic": one.delta_bic,
+        "held_out_gain": one.held_out_gain,
+        "confounded_with": list(one.confounded_with),
+        "reason": one.reason,
+    }
+    if one.confounded_with:
+        entry["experiment"] = separating_experiment((one.effect, *one.confounded_with))
+    return entry
+
+
+def _accepted(final: LikelihoodFit, groups: dict[str, tuple[str, ...]]) -> list[dict[str, Any]]:
+    entries, used = [], 0
+    for name in final.model.effects:
+        parameters = catalogue()[name].parameters(final.model.robot)
+        rows = [
+            {
+                "name": parameter.name,
+                "value": float(final.values[used + k]),
+                "std": float(final.std[9 + used + k]),
+            }
+            for k, parameter in enumerate(parameters)
+        ]
+        used += len(parameters)
+        group = [other for other in groups.get(name, ()) if other != name]
+        entries.append({"effect": name, "parameters": rows, "confounded_with": group})
+    return entries
+
+
+def _parameters(found: LikelihoodFit) -> list[dict[str, Any]]:
+    return [
+        {"name": name, "value": float(value), "std": float(std)}
+        for name, value, std in zip(INERTIA_NAMES, found.inertia, found.std[:9], strict=True)
+    ]
+
+
+def _moved(first: LikelihoodFit, final: LikelihoodFit) -> dict[str, float]:
+    size = np.maximum(np.abs(first.inertia), 1e-12)
+    change = 100.0 * (final.inertia - first.inertia) / size
+    return dict(zip(INERTIA_NAMES, change.tolist(), strict=True))
+
+
+def _share_closed(before: dict[str, Any], after: dict[str, Any]) -> float | None:
+    """Share of the distance between the prediction error and the noise floor that was closed."""
+    error, floor = before["prediction_rmse_m"], before["noise_floor_m"]
+    left = after["prediction_rmse_m"]
+    if error is None or left is None or error <= floor:
+        return None
+    return float((error - left) / (error - floor))

@@ -1,0 +1,138 @@
+"""Before and after on the validation runs: how well a model predicts runs it never saw."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdpr.batch import evaluate
+from cdpr.free_motion import free_basis
+from cdpr.model import Model
+from cdpr.robot import POSE_COORDINATES, Array
+from ident.motion import SwingMotion
+from ident.prediction import Prediction, predict
+from ident.prepare import PreparedRun
+
+
+@dataclass(frozen=True, slots=True)
+class HeldOutRun:
+    """One validation run under one model.
+
+    Attributes:
+        run: its name.
+        sigma_perp: standard deviation of the internal dynamics' error (FIDIM 2022, eq. 50).
+        prediction: of the whole run, its start state and lengths fitted; None where that fails.
+        noise_floor_m: what the samples' own noise leaves.
+    """
+
+    run: str
+    sigma_perp: float
+    prediction: Prediction | None
+    noise_floor_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class HeldOut:
+    """All validation runs under one model."""
+
+    runs: tuple[HeldOutRun, ...]
+
+    def document(self) -> dict[str, object]:
+        """Root mean squares and medians over the runs."""
+        errors = [
+            run.prediction.rmse_m
+            for run in self.runs
+            if run.prediction is not None and run.prediction.rmse_m is not None
+        ]
+        turns = [
+            run.prediction.rmse_rad
+            for run in self.runs
+            if run.prediction is not None and run.prediction.rmse_rad is not None
+        ]
+        sigmas = [run.sigma_perp for run in self.runs if np.isfinite(run.sigma_perp)]
+        return {
+            "sigma_perp": _rms(sigmas),
+            "prediction_rmse_m": _rms(errors),
+            "noise_floor_m": _rms([run.noise_floor_m for run in self.runs]),
+            "prediction_rmse_rad": _rms(turns),
+            "sigma_perp_median": _median(sigmas),
+            "prediction_median_m": _median(errors),
+            "runs": [
+                {
+                    "run": run.run,
+                    "sigma_perp": run.sigma_perp,
+                    "prediction_rmse_m": None if run.prediction is None else run.prediction.rmse_m,
+                    "prediction_rmse_rad": (
+                        None if run.prediction is None else run.prediction.rmse_rad
+                    ),
+                    "noise_floor_m": run.noise_floor_m,
+                }
+                for run in self.runs
+            ],
+        }
+
+
+def _rms(numbers: list[float]) -> float | None:
+    return float(np.sqrt(np.mean(np.square(numbers)))) if numbers else None
+
+
+def _median(numbers: list[float]) -> float | None:
+    return float(np.median(numbers)) if numbers else None
+
+
+def held_out(
+    model: Model,
+    runs: list[PreparedRun],
+    free: tuple[str, ...] | None,
+    inertia: Array,
+    values: Array,
+) -> HeldOut:
+    """Confront validation runs with a model.
+
+    Args:
+        model: with its effects.
+        runs: validation runs.
+        free: the coordinates measured, or None for full poses.
+        inertia: (9,).
+        values: effect values, (k,).
+    """
+    return HeldOut(tuple(_one(model, run, free, inertia, values) for run in runs))
+
+
+def _one(
+    model: Model,
+    run: PreparedRun,
+    free: tuple[str, ...] | None,
+    inertia: Array,
+    values: Array,
+) -> HeldOutRun:
+    try:
+        prediction = predict(model, run, free, inertia, values)
+    except (ValueError, np.linalg.LinAlgError):
+        prediction = None
+    motion = run.full if free is None else run.free
+    sigma = np.nan if motion is None else internal_error(model, motion, inertia, values)
+    names = POSE_COORDINATES[:3] if free is None else free
+    places = [run.signals.coordinates.index(n) for n in names if n in POSE_COORDINATES[:3]]
+    floor = float(np.sqrt(np.mean(run.signals.noise_std[places] ** 2)))
+    return HeldOutRun(run.name, sigma, prediction, floor)
+
+
+def internal_error(model: Model, motion: SwingMotion, inertia: Array, values: Array) -> float:
+    """sigma-perp (eq. 50) of a model with effects: Xi-perp^T M (measured - modelled acceleration).
+
+    Without effects it is the paper's: cable forces do no work on the free directions.
+    """
+    error = internal_residual(model, motion, inertia, values)
+    return float(np.sqrt(np.sum(error**2) / len(error)))
+
+
+def internal_residual(model: Model, motion: SwingMotion, inertia: Array, values: Array) -> Array:
+    """Force per mass that the model lacks along each free coordinate, (n, 6 - n_cables)."""
+    arguments = (motion.times_s, motion.zetas, motion.rates, inertia, values)
+    modelled = evaluate(model.acceleration, *arguments)[0]
+    mass = evaluate(model.mass_matrix, motion.zetas, inertia, values)[0]
+    basis = free_basis(model, motion.free, motion.zetas, motion.rates, values).zeta_map
+    missing = mass @ (motion.accelerations - modelled)[..., None]
+    return (np.swapaxes(basis, -1, -2) @ missing)[..., 0]
