@@ -6,6 +6,7 @@ R = Rx(phi) Ry(theta) Rz(chi) (FIDIM 2022, sec. 2; self-calibration 2019, sec. 2
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
@@ -57,3 +58,46 @@ def symmetric(entries: Expression) -> Expression:
 def along(expression: Expression, variables: Expression, rates: Expression) -> Expression:
     """Directional derivative of an expression when `variables` move with `rates`."""
     return ca.jtimes(expression, variables, rates)
+
+
+@dataclass(frozen=True, slots=True)
+class Spin:
+    """Rotation of the platform in its own frame.
+
+    Attributes:
+        angles: phi, theta, chi, (3,).
+        matrix: body angular velocity = matrix @ angle rates, (3, 3).
+        omega: body angular velocity, (3,).
+        drift: its time derivative at zero second angle rates, (3,).
+    """
+
+    angles: Expression
+    matrix: Expression
+    omega: Expression
+    drift: Expression
+
+    @classmethod
+    def of(cls, angles: Expression, rates: Expression) -> Spin:
+        """The spin of angles and their rates."""
+        sin, cos = (ca.sin(angles), ca.cos(angles))
+        matrix = ca.vertcat(
+            ca.horzcat(cos[2] * cos[1], sin[2], 0),
+            ca.horzcat(-sin[2] * cos[1], cos[2], 0),
+            ca.horzcat(sin[1], 0, 1),
+        )
+        omega = matrix @ rates
+        return cls(angles, matrix, omega, along(omega, angles, rates))
+
+    def angle_rates(self, vector: Expression) -> Expression:
+        """Inverse of `matrix` times a vector, in closed form; singular at theta = 90 degrees."""
+        sin, cos = ca.sin(self.angles), ca.cos(self.angles)
+        phi = (cos[2] * vector[0] - sin[2] * vector[1]) / cos[1]
+        theta = sin[2] * vector[0] + cos[2] * vector[1]
+        return ca.vertcat(phi, theta, vector[2] - sin[1] * phi)
+
+    def torque(self, effort: Expression) -> Expression:
+        """Body torque of efforts conjugate to the angle rates: transposed inverse of `matrix`."""
+        sin, cos = ca.sin(self.angles), ca.cos(self.angles)
+        across = (effort[0] - sin[1] * effort[2]) / cos[1]
+        x = cos[2] * across + sin[2] * effort[1]
+        return ca.vertcat(x, cos[2] * effort[1] - sin[2] * across, effort[2])

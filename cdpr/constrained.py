@@ -12,8 +12,9 @@ from dataclasses import dataclass, replace
 
 import casadi as ca
 
-from cdpr.body import Expression, along, symmetric
+from cdpr.body import Expression, Spin, along, symmetric
 from cdpr.effects import Effect, Instant
+from cdpr.factors import Factors
 from cdpr.pulley import Geometry
 from cdpr.robot import Robot
 
@@ -59,49 +60,6 @@ def total_inertia(robot: Robot, inertia: Expression, instant: Instant, owned: Ow
     cross = ca.skew(centre)
     central = tensor + mass * cross @ cross
     return Inertia(mass, moment, heavy, heavy_moment, centre, tensor, central)
-
-
-@dataclass(frozen=True, slots=True)
-class Spin:
-    """Rotation of the platform in its own frame.
-
-    Attributes:
-        angles: phi, theta, chi, (3,).
-        matrix: body angular velocity = matrix @ angle rates, (3, 3).
-        omega: body angular velocity, (3,).
-        drift: its time derivative at zero second angle rates, (3,).
-    """
-
-    angles: Expression
-    matrix: Expression
-    omega: Expression
-    drift: Expression
-
-    @classmethod
-    def of(cls, angles: Expression, rates: Expression) -> Spin:
-        """The spin of angles and their rates."""
-        sin, cos = (ca.sin(angles), ca.cos(angles))
-        matrix = ca.vertcat(
-            ca.horzcat(cos[2] * cos[1], sin[2], 0),
-            ca.horzcat(-sin[2] * cos[1], cos[2], 0),
-            ca.horzcat(sin[1], 0, 1),
-        )
-        omega = matrix @ rates
-        return cls(angles, matrix, omega, along(omega, angles, rates))
-
-    def angle_rates(self, vector: Expression) -> Expression:
-        """Inverse of `matrix` times a vector, in closed form; singular at theta = 90 degrees."""
-        sin, cos = ca.sin(self.angles), ca.cos(self.angles)
-        phi = (cos[2] * vector[0] - sin[2] * vector[1]) / cos[1]
-        theta = sin[2] * vector[0] + cos[2] * vector[1]
-        return ca.vertcat(phi, theta, vector[2] - sin[1] * phi)
-
-    def torque(self, effort: Expression) -> Expression:
-        """Body torque of efforts conjugate to the angle rates: transposed inverse of `matrix`."""
-        sin, cos = ca.sin(self.angles), ca.cos(self.angles)
-        across = (effort[0] - sin[1] * effort[2]) / cos[1]
-        x = cos[2] * across + sin[2] * effort[1]
-        return ca.vertcat(x, cos[2] * effort[1] - sin[2] * across, effort[2])
 
 
 def applied_wrench(
@@ -223,42 +181,6 @@ class Platform:
                 + cable.turning(self.instant.velocity_of(cable))
             )
         return ca.vertcat(*rows)
-
-
-@dataclass(frozen=True, slots=True)
-class Factors:
-    """L D L^T of a symmetric positive definite matrix, as expressions."""
-
-    lower: list[list[Expression]]
-    inverse_diagonal: list[Expression]
-
-    @classmethod
-    def of(cls, matrix: Expression) -> Factors:
-        """Factors of the matrix, of which the lower triangle is read."""
-        lower: list[list[Expression]] = []
-        inverse: list[Expression] = []
-        diagonal: list[Expression] = []
-        for i in range(matrix.shape[0]):
-            scaled: list[Expression] = []
-            for j in range(i):
-                rest = matrix[i, j] - sum(scaled[k] * lower[j][k] for k in range(j))
-                scaled.append(rest)
-            row = [scaled[j] * inverse[j] for j in range(i)]
-            diagonal.append(matrix[i, i] - sum(scaled[k] * row[k] for k in range(i)))
-            inverse.append(1 / diagonal[i])
-            lower.append(row)
-        return cls(lower, inverse)
-
-    def solved(self, right: Expression) -> Expression:
-        """Solution (n,) of the system with this matrix."""
-        n = len(self.lower)
-        x = [right[i] for i in range(n)]
-        for i in range(n):
-            x[i] = x[i] - sum(self.lower[i][k] * x[k] for k in range(i))
-        x = [value * inverse for value, inverse in zip(x, self.inverse_diagonal, strict=True)]
-        for i in reversed(range(n)):
-            x[i] = x[i] - sum(self.lower[k][i] * x[k] for k in range(i + 1, n))
-        return ca.vertcat(*x)
 
 
 @dataclass(frozen=True, slots=True)

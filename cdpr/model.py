@@ -13,12 +13,11 @@ from typing import Any, NoReturn
 import casadi as ca
 import numpy as np
 
-from cdpr.body import Expression, along, rate_matrix, rotation
+from cdpr.body import Expression, Spin, along, rate_matrix, rotation
 from cdpr.constrained import (
     Inertia,
     Owned,
     Platform,
-    Spin,
     applied_wrench,
     held_motion,
     length_change,

@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.polynomial import legendre
 
 from cdpr.batch import Bound, evaluate, first_output, with_jacobian
 from cdpr.collocation import Table, interpolation, table
+from cdpr.domain import check_domain, domain_problems
 from cdpr.model import Model
 from cdpr.robot import Array
 
@@ -15,6 +17,8 @@ NODES = 12
 LONGEST_SEGMENT_S = 0.4
 SHORTEST_SEGMENT_S = 5e-4
 SWEEPS = 12
+KEPT_ORDERS = 6
+LARGEST_SLIP_M_S = 1e-7
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,6 +104,11 @@ def simulate(
 ) -> Motion:
     """Integrate the free motion from a state that obeys the constraints.
 
+    `cdpr.sensitivity.linearise(motion)` gives the exact derivatives of the motion by its initial
+    state, the inertia and the effect values; `cdpr.start_state` turns those of the state into
+    derivatives by free coordinates and cable lengths. Derivatives by geometry are those by the
+    values of the geometric effects (`anchor_offset`, `attachment_offset`, `pulley_radius`, ...).
+
     Args:
         model: the equations.
         zeta: pose coordinates at the start, (6,).
@@ -115,15 +124,18 @@ def simulate(
         invariant that the segments' order of accuracy preserves.
 
     Raises:
-        ValueError: when the motion cannot be followed, with the time at which it fails (a cable
-            reaches its swivel axis, the angles reach theta = 90 degrees, or the constraint
-            Jacobian loses rank).
+        ValueError: for wrong shapes, numbers that are not finite, an empty span, rates that the
+            cables do not allow, and when the motion cannot be followed, with the time at which it
+            fails and why (a cable reaches its pulley or swivel axis, the angles theta = 90
+            degrees, or the constraints lose rank).
     """
-    values = model.start_values if values is None else np.asarray(values, dtype=np.float64)
-    inertia = np.asarray(inertia, dtype=np.float64)
+    values = model.start_values if values is None else values
+    zeta, rates = _checked("zeta", zeta, 6), _checked("rates", rates, 6)
+    inertia, values = _checked("inertia", inertia, 9), _checked("values", values, len(model.names))
+    _check_start(model, span_s, zeta, rates, inertia, values, tolerance_m)
     stepper = _Stepper(model, inertia, values, tolerance_m)
-    time, end = span_s
-    state = np.asarray(zeta, dtype=np.float64), np.asarray(rates, dtype=np.float64)
+    time, end = map(float, span_s)
+    state = zeta, rates
     step, guess = min(0.1, longest_s, end - time), None
     rows: list[tuple[float, float, Array, Array, Array]] = []
     while end - time > 1e-12:
@@ -131,11 +143,7 @@ def simulate(
         found, factor = stepper.segment(time, step, *state, guess)
         if found is None:
             if step <= SHORTEST_SEGMENT_S:
-                raise ValueError(
-                    f"the free motion cannot be followed beyond {time:.4f} s from pose "
-                    f"{np.array2string(state[0], precision=4)}: the cables or angles reach a "
-                    "singular configuration there"
-                )
+                raise ValueError(_stuck(model, time, *state, inertia, values))
             step, guess = step * factor, None
             continue
         rows.append((time, step, *state, found))
@@ -150,13 +158,65 @@ def simulate(
     return Motion(model, inertia, values, starts, steps, zetas, speeds, accelerations)
 
 
+def _checked(what: str, numbers: Array, size: int) -> Array:
+    array = np.array(numbers, dtype=np.float64)
+    if array.shape != (size,):
+        raise ValueError(f"{what} has shape {array.shape}, must be ({size},)")
+    if not np.isfinite(array).all():
+        raise ValueError(f"{what} is {array}: every number must be finite")
+    return array
+
+
+def _check_start(
+    model: Model,
+    span_s: tuple[float, float],
+    zeta: Array,
+    rates: Array,
+    inertia: Array,
+    values: Array,
+    tolerance_m: float,
+) -> None:
+    """A simulation that starts wrong would drift in silence."""
+    if not (np.isfinite(span_s).all() and span_s[1] > span_s[0]):
+        raise ValueError(f"span_s is {tuple(span_s)}: the end must come after the start")
+    if not tolerance_m > 0.0:
+        raise ValueError(f"tolerance_m is {tolerance_m}, must be above 0; 1e-10 is usual")
+    check_domain(model, zeta, values)
+    slip = evaluate(model.slip, span_s[0], zeta, rates, inertia, values)[0]
+    worst = int(np.argmax(np.abs(slip)))
+    if not np.abs(slip[worst]) <= LARGEST_SLIP_M_S:
+        raise ValueError(
+            f"the rates lengthen cable {model.robot.cables[worst].name} by {slip[worst]:.2e} m/s "
+            f"(limit {LARGEST_SLIP_M_S:g}); take cdpr.free_motion.admissible_rates of them"
+        )
+
+
+def _stuck(
+    model: Model, time: float, zeta: Array, rates: Array, inertia: Array, values: Array
+) -> str:
+    """Why a motion cannot be followed beyond a state."""
+    begin = f"the free motion cannot be followed beyond {time:.4f} s from pose "
+    begin += f"{np.array2string(zeta, precision=4)}: "
+    ahead = zeta + np.linspace(0.0, 2 * SHORTEST_SEGMENT_S, 20)[:, None] * rates
+    problems = domain_problems(model, ahead, values)
+    if problems:
+        return f"{begin}{str(problems[0]).split(': ', 1)[1]}"
+    jacobian = evaluate(model.cables, zeta, values)[3]
+    ratio = np.divide(*np.linalg.svd(jacobian, compute_uv=False)[[-1, 0]])
+    tensions = evaluate(model.acceleration, time, zeta, rates, inertia, values)[1]
+    return (
+        f"{begin}the equations turn singular or too fast there (cable Jacobian's singular values "
+        f"{ratio:.1e} apart, largest specific tension {np.abs(tensions).max():.1e} m/s^2, largest "
+        f"rate {np.abs(rates).max():.1e}); start from a smaller swing"
+    )
+
+
 def _extrapolated(accelerations: Array, step: float, following: float) -> Array:
     """The last segment's low-order polynomial carried on into the next one."""
     t = table(accelerations.shape[0])
-    keep = 6
     fractions = 1.0 + t.nodes * following / step
-    coefficients = t.spectrum[:keep] @ accelerations
-    return np.polynomial.legendre.legvander(2 * fractions - 1, keep - 1) @ coefficients
+    coefficients = t.spectrum[:KEPT_ORDERS] @ accelerations
+    return legendre.legvander(2 * fractions - 1, KEPT_ORDERS - 1) @ coefficients
 
 
 class _Stepper:
@@ -165,6 +225,8 @@ class _Stepper:
     def __init__(self, model: Model, inertia: Array, values: Array, tolerance: float) -> None:
         self.tolerance = tolerance
         self.table: Table = table(NODES)
+        self.integrals = np.vstack([self.table.twice, self.table.once])
+        _, self.once_middle, self.twice_middle = interpolation(NODES, np.array([0.5]))
         self.force = Bound(first_output(model.acceleration), NODES)
         self.slope = Bound(with_jacobian(model.acceleration, (1, 2)), 1)
         for bound in (self.force, self.slope):
@@ -176,20 +238,22 @@ class _Stepper:
     ) -> tuple[Array | None, float]:
         """Node accelerations, or None, and the factor by which to change the step."""
         t = self.table
-        inverse, value = self._newton_matrix(time, step, zeta, rates)
+        inverse, value = self._newton_matrix(time, step, zeta, rates, guess)
         found = np.tile(value, (NODES, 1)) if guess is None else guess
         force = self.force
+        into_zetas, into_rates, accelerations = force.inputs[1], force.inputs[2], force.outputs[0]
         force.inputs[0][:, 0] = time + step * t.nodes
         drifted = zeta + step * t.nodes[:, None] * rates
-        twice, once = step**2 * t.twice, step * t.once
+        integrals = self.integrals * np.repeat([step**2, step], NODES)[:, None]
         change = np.inf
         for _ in range(SWEEPS):
-            np.add(drifted, twice @ found, out=force.inputs[1])
-            np.add(rates, once @ found, out=force.inputs[2])
+            moved = integrals @ found
+            np.add(drifted, moved[:NODES], out=into_zetas)
+            np.add(rates, moved[NODES:], out=into_rates)
             force.run()
-            delta = (inverse @ (force.outputs[0] - found).reshape(-1)).reshape(NODES, 6)
-            found = found + delta
-            last, change = change, step**2 * float(np.abs(delta).max())
+            delta = inverse @ (accelerations - found).reshape(-1)
+            found = found + delta.reshape(NODES, 6)
+            last, change = change, step**2 * float(delta @ delta) ** 0.5
             if not np.isfinite(change) or (change > 1e-3 and change > last):
                 return None, 0.4
             # The next change would be about change^2 / last: stop when that is negligible.
@@ -205,18 +269,22 @@ class _Stepper:
         return found, float(np.clip(factor, 0.5, 1.6))
 
     def _newton_matrix(
-        self, time: float, step: float, zeta: Array, rates: Array
+        self, time: float, step: float, zeta: Array, rates: Array, guess: Array | None
     ) -> tuple[Array, Array]:
         """Inverse of the collocation equations' Jacobian with mid-segment slopes; a first guess."""
         slope, t = self.slope, self.table
         slope.inputs[0][:] = time + step / 2
         slope.inputs[1][0] = zeta + 0.5 * step * rates
         slope.inputs[2][0] = rates
+        if guess is not None:
+            slope.inputs[1][0] += step**2 * (self.twice_middle @ guess)[0]
+            slope.inputs[2][0] += step * (self.once_middle @ guess)[0]
         slope.run()
         jacobian = slope.outputs[1][0]  # (12, 6): transposed
-        blocks = step**2 * t.twice[:, None, :, None] * jacobian[:6].T[:, None, :]
-        blocks = blocks + step * t.once[:, None, :, None] * jacobian[6:].T[:, None, :]
-        matrix = np.eye(6 * NODES) - blocks.reshape(6 * NODES, 6 * NODES)
+        blocks = (-(step**2) * t.twice)[:, None, :, None] * jacobian[:6].T[:, None, :]
+        blocks -= (step * t.once)[:, None, :, None] * jacobian[6:].T[:, None, :]
+        matrix = blocks.reshape(6 * NODES, 6 * NODES)
+        matrix.flat[:: 6 * NODES + 1] += 1.0
         return np.linalg.inv(matrix), slope.outputs[0][0].copy()
 
     def end(self, step: float, zeta: Array, rates: Array, found: Array) -> tuple[Array, Array]:

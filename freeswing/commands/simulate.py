@@ -71,6 +71,7 @@ def _poses(options: Namespace, times: ndarray, generator) -> ndarray:
     import numpy as np
 
     from cdpr.documents import InputError
+    from cdpr.free_motion import admissible_rates
     from cdpr.model import build_model
     from cdpr.robot_file import read_robot
     from cdpr.simulation import simulate
@@ -89,7 +90,8 @@ def _poses(options: Namespace, times: ndarray, generator) -> ndarray:
     rest = rest_at_lengths(model, lengths, robot.inertia, values, generator)
     zeta = release(model, rest, robot.inertia, values, options.amplitude_m, generator)
     span = (0.0, float(times[-1]))
-    motion = simulate(model, zeta, np.zeros(6), span, robot.inertia, values)
+    rates = admissible_rates(model, zeta, np.zeros(6), robot.inertia, values)
+    motion = simulate(model, zeta, rates, span, robot.inertia, values)
     return motion.at(times)[0]
 
 
