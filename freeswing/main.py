@@ -24,6 +24,7 @@ COMMANDS = (
     "simulate",
     "board",
     "home",
+    "excite",
 )
 DONE, NO_RESULT, WRONG_INPUT, INTERRUPTED = 0, 1, 2, 130
 
@@ -71,7 +72,7 @@ def describe(failure: BaseException) -> str:
         return f"{where}{failure.strerror}"
     if isinstance(failure, MemoryError):
         return "the data do not fit into memory: shorten the windows or take fewer runs"
-    if isinstance(failure, ValueError):
+    if isinstance(failure, ValueError) and type(failure).__module__ != "numpy.linalg":
         return f"{failure}"
     kind = type(failure).__name__
     return f"{kind}: {failure} (not foreseen; --verbose shows where it happened)"

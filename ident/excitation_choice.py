@@ -97,4 +97,5 @@ def choose(
 def random_costs(matrices: Array, n_swings: int, n_plans: int, rng: np.random.Generator) -> Array:
     """C of plans drawn at random from the library, (n_plans,)."""
     plans = [rng.choice(len(matrices), n_swings, replace=False) for _ in range(n_plans)]
-    return excitation_cost(np.array([matrices[plan].sum(axis=0) for plan in plans]))
+    sums = np.array([matrices[plan].sum(axis=0) for plan in plans])
+    return excitation_cost(sums.reshape(n_plans, *matrices.shape[1:]))

@@ -12,11 +12,13 @@ if TYPE_CHECKING:
 def add_session(parser: ArgumentParser) -> None:
     """The session and where its results go."""
     parser.add_argument("session", metavar="SESSION", help="a session's folder or session.toml")
-    parser.add_argument(
-        "--results",
-        metavar="DIR",
-        help="write everything to DIR instead of SESSION/results (for read-only sessions)",
-    )
+    add_results(parser, "SESSION/results")
+
+
+def add_results(parser: ArgumentParser, usual: str) -> None:
+    """Where results go."""
+    text = f"write everything to DIR instead of {usual} (for read-only folders)"
+    parser.add_argument("--results", metavar="DIR", help=text)
 
 
 def open_session(options: Namespace) -> Session:

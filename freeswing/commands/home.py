@@ -5,6 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
+from freeswing.commands.arguments import add_results
 from freeswing.console import Console
 
 
@@ -13,6 +14,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "homing", metavar="HOMING", help="homing.toml or its folder; with the flags, robot.toml"
     )
+    add_results(parser, "HOMING's folder/results")
     other = parser.add_mutually_exclusive_group()
     other.add_argument(
         "--advise",
@@ -38,13 +40,15 @@ def run(options: Namespace, console: Console) -> None:
     elif options.simulate:
         _simulate(path, options, console)
     else:
-        _home(path, console)
+        _home(path, options, console)
 
 
-def _home(path: Path, console: Console) -> None:
+def _home(path: Path, options: Namespace, console: Console) -> None:
     from calib.start_pose import home
 
-    document = home(path, console.progress)
+    beside = path if path.is_dir() else path.parent
+    folder = beside / "results" if options.results is None else Path(options.results)
+    document = home(path, console.progress, folder)
     pose, std = document["start_pose"], document["start_pose_std"]
     for key, unit, scale in (("position_m", "mm", 1e3), ("angles_rad", "mrad", 1e3)):
         values = ", ".join(f"{scale * value:.3f}" for value in pose[key])
@@ -57,8 +61,7 @@ def _home(path: Path, console: Console) -> None:
         console.say(
             f"the readings differ {ratio:.1f} times more (in square) than their stated noise"
         )
-    folder = path if path.is_dir() else path.parent
-    result = folder / "results" / "homing.json"
+    result = folder / "homing.json"
     console.say(str(result))
     console.show_file(result)
 

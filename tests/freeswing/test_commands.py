@@ -65,7 +65,7 @@ def test_simulate_says_what_is_wrong(
 
 def test_simulate_refuses_lengths_of_another_robot(tmp_path: Path) -> None:
     assert simulate(tmp_path / "a.csv", lengths="1.2,1.3") == 2
-    assert simulate(tmp_path / "a.csv", lengths="0.01,0.01,9.0") == 1
+    assert simulate(tmp_path / "a.csv", "--amplitude-m", "1e-3", lengths="0.01,0.01,9.0") == 1
 
 
 def test_board_has_its_size_and_its_tags(tmp_path: Path) -> None:

@@ -1,0 +1,60 @@
+"""Plan the swings that tell most about a robot's inertia, before recording them."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+
+from freeswing.commands.arguments import add_results
+from freeswing.console import Console
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """The robot and the limits."""
+    parser.add_argument("robot", metavar="ROBOT", help="robot.toml with nominal inertia and mass")
+    add_results(parser, "ROBOT's folder/results")
+    parser.add_argument("--swings", type=int, default=12, metavar="N", help="default 12")
+    parser.add_argument("--duration-s", type=float, default=10.0, help="of a swing, default 10")
+    parser.add_argument(
+        "--tension-n",
+        type=float,
+        nargs=2,
+        default=(20.0, 200.0),
+        metavar=("LOW", "HIGH"),
+        help="cable tensions, default 20 200",
+    )
+    parser.add_argument("--reach-m", type=float, default=0.1, help="displacement, default 0.1")
+    parser.add_argument("--mass-kg", type=float, help="instead of the robot file's")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument(
+        "--criterion",
+        choices=("cost", "information"),
+        default="cost",
+        help="conditioning of FIDIM, or information of the maximum-likelihood fit",
+    )
+
+
+def run(options: Namespace, console: Console) -> None:
+    """Plan, and say what the plan is worth."""
+    from ident.excitation import ExcitationOptions, SwingLimits, excite
+
+    path = Path(options.robot)
+    limits = SwingLimits(tension_N=tuple(options.tension_n), reach_m=options.reach_m)
+    asked = ExcitationOptions(
+        n_swings=options.swings,
+        n_library=max(96, 8 * options.swings),
+        duration_s=options.duration_s,
+        limits=limits,
+        criterion=options.criterion,
+        mass_kg=options.mass_kg,
+        seed=options.seed,
+    )
+    folder = path.parent / "results" if options.results is None else Path(options.results)
+    document = excite(path, asked, console.progress, folder)
+    console.say(f"conditioning cost C {document['cost_C']:.2f} (below 10 is good)")
+    for count, entry in enumerate(document["equilibria"], start=1):
+        lengths = ", ".join(f"{value:.3f}" for value in entry["cable_lengths_m"])
+        low, high = entry["tension_range_N"]
+        console.say(f"  {count:2}: lengths {lengths} m, tensions {low:.0f} to {high:.0f} N")
+    console.say(str(folder / "excitation.json"))
+    console.show_file(folder / "excitation.json")
