@@ -164,7 +164,7 @@ def _fidim_estimates(
             progress(f"FIDIM by {'full poses' if full else 'free coordinates'}", 0.5 * (not full))
         unloaded = _usable(prepared, full, None)
         if not unloaded:
-            failures[name] = "no usable run"
+            failures[name] = _unusable_sentence(_dropped(prepared, full))
             continue
         try:
             raw = fidim([regressor(model, _motion(run, full)) for run in unloaded])
@@ -366,6 +366,12 @@ def _session_notes(model: Model, prepared: PreparedRuns, failures: dict[str, str
             f"{1e3 * np.abs(known).max():.1f} mm: geometry, poses or lengths are off"
         )
     return notes
+
+
+def _unusable_sentence(dropped: tuple[DroppedRun, ...]) -> str:
+    if not dropped:
+        return "no usable run"
+    return f"no usable run; {dropped[-1].run}, for one: {dropped[-1].why}"
 
 
 def _nothing_sentence(prepared: PreparedRuns, failures: dict[str, str]) -> str:

@@ -24,7 +24,7 @@ PAPER_LENGTHS_M = np.array(
         [1.41, 1.76, 1.56, 1.50, 1.72, 1.32, 1.65, 1.59, 1.50, 1.30, 1.28, 1.54],
     ]
 ).T
-# The other three lie where x and y do not settle the pose: their Jacobian block is singular near by.
+# At the other three x and y do not settle the pose: their Jacobian block is nearly singular.
 REGULAR = (2, 3, 5, 6, 7, 8, 9, 10, 11)
 TRUE_INERTIA = np.array([0.002, -0.0025, 0.198, 0.0569, 0.0627, 0.0314, 2e-4, -2e-4, 1.6e-4])
 
