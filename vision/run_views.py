@@ -124,23 +124,24 @@ def instants_of(views: Sequence[CameraViews]) -> Array:
     """Base times at which the platform is sought: those of the camera with most frames, (n_k,).
 
     Gaps in that camera's frames are filled at its usual step, and the grid goes on to both sides
-    as far as any camera saw the platform.
+    as far as two cameras saw the platform (one, when there is but one).
     """
     times = [np.sort(v.middle_times()[v.status == USED]) for v in views]
     reference = max(times, key=len)
     if len(reference) < 2:
         return reference
     step = float(np.median(np.diff(reference)))
-    first = min(float(t[0]) for t in times if len(t))
-    last = max(float(t[-1]) for t in times if len(t))
+    starts, ends = zip(*((float(t[0]), float(t[-1])) for t in times if len(t)), strict=True)
+    first = sorted(starts)[min(1, len(starts) - 1)]  # two cameras, where there are two
+    last = sorted(ends)[-min(2, len(ends))]
     grid: list[Array] = []
-    before = int(max(np.floor((reference[0] - first) / step + 0.5), 0))
+    before = int(max(np.floor((reference[0] - first) / step + 1e-3), 0))
     grid.append(reference[0] - step * np.arange(before, 0, -1))
     for a, b in pairwise(reference):
         count = max(int(np.floor((b - a) / step + 0.5)), 1)
         if b - a > 0.3 * step:
             grid.append(a + (b - a) * np.arange(count) / count)
-    after = int(max(np.floor((last - reference[-1]) / step + 0.5), 0))
+    after = int(max(np.floor((last - reference[-1]) / step + 1e-3), 0))
     grid.append(reference[-1] + step * np.arange(after + 1))
     return np.concatenate(grid)
 

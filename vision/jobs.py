@@ -1,0 +1,63 @@
+"""Independent jobs over processes, with their progress."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from dataclasses import dataclass
+from typing import Any
+
+Progress = Callable[[str, float], None]
+
+_POLL_S = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """A call to be made in some process."""
+
+    label: str
+    function: Callable[..., Any]
+    arguments: tuple[Any, ...]
+
+
+def run_jobs(jobs: Sequence[Job], workers: int, progress: Progress | None) -> list[Any]:
+    """Results of all jobs in their order; the first failure ends the rest and is raised.
+
+    With one worker (or one job) everything happens in this process.
+    """
+    count = min(workers or os.cpu_count() or 1, len(jobs))
+    if count <= 1:
+        return _one_by_one(jobs, progress)
+    context = multiprocessing.get_context("spawn")
+    results: dict[Future[Any], int] = {}
+    with ProcessPoolExecutor(count, mp_context=context) as pool:
+        for index, job in enumerate(jobs):
+            results[pool.submit(job.function, *job.arguments)] = index
+        open_jobs = set(results)
+        try:
+            while open_jobs:
+                done, open_jobs = wait(open_jobs, _POLL_S, return_when=FIRST_COMPLETED)
+                for future in done:
+                    future.result()
+                    if progress is not None:
+                        share = 1.0 - len(open_jobs) / len(jobs)
+                        progress(jobs[results[future]].label, share)
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+    ordered = sorted(results, key=lambda future: results[future])
+    return [future.result() for future in ordered]
+
+
+def _one_by_one(jobs: Sequence[Job], progress: Progress | None) -> list[Any]:
+    found = []
+    for index, job in enumerate(jobs):
+        if progress is not None:
+            progress(job.label, index / len(jobs))
+        found.append(job.function(*job.arguments))
+    if progress is not None and jobs:
+        progress(jobs[-1].label, 1.0)
+    return found

@@ -1,0 +1,141 @@
+"""One run, from its cameras' sightings to its trajectory file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.camera import Camera
+from cdpr.trajectory import Trajectory
+from cdpr.trajectory_files import write_csv
+from vision.follow import STATUS_NAMES, USED
+from vision.fuse import Fit, Poses
+from vision.rig_correct import correct_rig
+from vision.rig_effects import Finding
+from vision.run_views import CameraViews
+from vision.watch import Watch
+
+if TYPE_CHECKING:
+    from vision.track import Settings
+
+Array = NDArray[np.float64]
+
+PROVENANCE = "cameras"
+
+
+@dataclass(frozen=True, slots=True)
+class CameraCount:
+    """One camera's frames in a run: seen, used, and rejected by reason."""
+
+    name: str
+    frames: int
+    used: int
+    rejected: dict[str, int]
+    dropped: int
+
+
+@dataclass(frozen=True, slots=True)
+class RunTrack:
+    """What became of a run; the trajectory itself is in its file."""
+
+    name: str
+    samples: int
+    known: int
+    rate_hz: float
+    std_m: float
+    std_rad: float
+    cameras: tuple[CameraCount, ...]
+    before: Fit
+    after: Fit
+    findings: tuple[Finding, ...]
+    problems: tuple[str, ...]
+
+
+def track_run(
+    name: str,
+    sources: Sequence[tuple[Camera, Sequence[Path]]],
+    watch: Watch,
+    csv: Path,
+    settings: Settings,
+) -> RunTrack:
+    """Fuses a run's sightings, corrects the rig, and writes the trajectory when there is one."""
+    views = [CameraViews(camera, paths) for camera, paths in sources]
+    counts = tuple(_count(view) for view in views)
+    corrected = correct_rig(views, watch, settings.survey_std_m, look=settings.correct_rig)
+    poses = corrected.poses
+    known = int(poses.known.sum())
+    if known:
+        write_csv(csv, trajectory_of(poses))
+    deviations = np.sqrt(np.diagonal(poses.covariances, axis1=1, axis2=2))
+    steps = np.diff(poses.times_s)
+    return RunTrack(
+        name,
+        len(poses.times_s),
+        known,
+        float(1.0 / np.median(steps)) if len(steps) else float("nan"),
+        _median(deviations[poses.known, :3]),
+        _median(deviations[poses.known, 3:]),
+        counts,
+        corrected.before,
+        corrected.after,
+        corrected.findings,
+        tuple(_problems(counts, corrected.after, watch)),
+    )
+
+
+def trajectory_of(poses: Poses) -> Trajectory:
+    """The run's trajectory from its first to its last known pose, NaN in between."""
+    have = np.flatnonzero(poses.known)
+    span = slice(int(have[0]), int(have[-1]) + 1)
+    return Trajectory.from_poses(
+        poses.times_s[span],
+        poses.positions_m[span],
+        poses.rotations[span],
+        poses.covariances[span],
+        PROVENANCE,
+    )
+
+
+def _median(values: Array) -> float:
+    return float(np.median(values)) if values.size else float("nan")
+
+
+def _count(view: CameraViews) -> CameraCount:
+    status = view.status
+    rejected = {
+        STATUS_NAMES[code]: int(np.sum(status == code))
+        for code in range(len(STATUS_NAMES))
+        if code != USED and np.any(status == code)
+    }
+    stamps = view.stamps_s[np.isfinite(view.stamps_s)]
+    dropped = 0
+    if len(stamps) > 2:
+        steps = np.diff(stamps)
+        step = float(np.median(steps))
+        dropped = int(np.sum(np.maximum(np.round(steps / step) - 1, 0))) if step > 0.0 else 0
+    return CameraCount(
+        view.camera.name, len(status), int(np.sum(status == USED)), rejected, dropped
+    )
+
+
+def _problems(counts: Sequence[CameraCount], fit: Fit, watch: Watch) -> list[str]:
+    """What a reader should know, in words."""
+    said = []
+    for count in counts:
+        for reason, number in count.rejected.items():
+            if number > 0.02 * max(count.frames, 1):
+                said.append(f"{count.name}: {number} of {count.frames} frames: {reason}")
+        if count.dropped:
+            said.append(f"{count.name}: {count.dropped} frames missing between the stamps")
+    for (camera, thing), (number, first, worst) in fit.rejected.items():
+        if number >= 3:
+            said.append(
+                f"{counts[camera].name}: {watch.name(thing)} left out {number} times, first in "
+                f"frame {first}, up to {worst:.2f} px from where the other sightings put it"
+            )
+    return said

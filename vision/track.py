@@ -1,0 +1,150 @@
+"""Recorded runs to trajectories: every camera followed, all fused, results written.
+
+The call that the command line makes:
+
+    document = track_session(session.video_runs, read_cameras(session.cameras),
+                             read_target(session.target), base_tags=..., results=session.results,
+                             frame_rate_hz=session.frame_rate_hz, workers=0,
+                             progress=console.progress)
+
+It writes `results/tracks/<run>.csv` and `results/tracking.json`, and keeps each camera's
+sightings under `results/tracks/.sightings`, from where a run that was killed goes on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+from calib.camera import Camera
+from calib.recordings import Recording, find_recordings
+from cdpr.documents import DataError, InputError, write_json
+from cdpr.target import Target
+from vision.jobs import Job, run_jobs
+from vision.run_track import RunTrack, track_run
+from vision.sightings import collect_sightings
+from vision.tracking_report import tracking_document
+from vision.watch import StandingTag, Watch
+
+Progress = Callable[[str, float], None]
+
+SURVEY_STD_M = 0.0003
+_FOLLOWING = 0.85  # share of the time that goes into the images
+
+
+class RecordedRun(Protocol):
+    """What a run has to have: a name and the folder with one recording a camera."""
+
+    @property
+    def name(self) -> str: ...  # noqa: D102
+    @property
+    def video(self) -> Path | None: ...  # noqa: D102
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """How to track.
+
+    Attributes:
+        correct_rig: look for late clocks, rolling shutters and moved cameras, and remove them.
+        refine_layout: fit the tags' places on the platform to the recordings.
+        survey_std_m: standard deviation of the base tags' corners.
+    """
+
+    correct_rig: bool = True
+    refine_layout: bool = False
+    survey_std_m: float = SURVEY_STD_M
+
+
+def track_session(
+    runs: Sequence[RecordedRun],
+    cameras: Sequence[Camera],
+    target: Target,
+    *,
+    results: Path,
+    base_tags: Iterable[StandingTag] = (),
+    frame_rate_hz: float | None = None,
+    settings: Settings | None = None,
+    workers: int = 0,
+    progress: Progress | None = None,
+) -> dict[str, Any]:
+    """Tracks all runs and writes their trajectories and `tracking.json`.
+
+    Args:
+        runs: with `name` and `video`; those without a video are left out.
+        cameras: as calibrated.
+        target: what is on the platform.
+        results: the session's results folder.
+        base_tags: surveyed tags in the base, with `family`, `id`, `corners_base_m`.
+        frame_rate_hz: serves recordings without time stamps.
+        settings: see `Settings`.
+        workers: processes; 0 = one a core.
+        progress: told a label and the fraction done.
+
+    Returns:
+        The document written to `tracking.json`.
+
+    Raises:
+        InputError: a recording is missing, unreadable or of another size than its camera.
+        DataError: in a run the platform was not seen.
+    """
+    settings = settings or Settings()
+    watch = Watch.of(target, base_tags)
+    filmed = [run for run in runs if run.video is not None]
+    if not filmed:
+        raise InputError("no run of the session has a video; there is nothing to track")
+    pairs = [(run.name, _recordings(run, cameras)) for run in filmed]
+    pieces = results / "tracks" / ".sightings"
+    jobs = [
+        Job(
+            f"{name} {camera.name}",
+            collect_sightings,
+            (pieces / name, camera, watch, recording, frame_rate_hz),
+        )
+        for name, found in pairs
+        for camera, recording in found
+    ]
+    paths = run_jobs(jobs, workers, _scaled(progress, 0.0, _FOLLOWING))
+    grouped: list[Job] = []
+    start = 0
+    for name, found in pairs:
+        mine = paths[start : start + len(found)]
+        start += len(found)
+        views = tuple((camera, tuple(p)) for (camera, _), p in zip(found, mine, strict=True))
+        csv = results / "tracks" / f"{name}.csv"
+        grouped.append(Job(f"{name} fused", track_run, (name, views, watch, csv, settings)))
+    tracks: list[RunTrack] = run_jobs(grouped, workers, _scaled(progress, _FOLLOWING, 1.0))
+    document = tracking_document(tracks, watch)
+    write_json(results / "tracking.json", document)
+    _refuse_empty(tracks)
+    return document
+
+
+def _recordings(run: RecordedRun, cameras: Sequence[Camera]) -> list[tuple[Camera, Recording]]:
+    by_name = {camera.name: camera for camera in cameras}
+    found = {r.name: r for r in find_recordings(run.video or Path())}
+    known = [name for name in by_name if name in found]
+    if not known:
+        raise InputError(
+            f"{run.video}: recordings of {', '.join(found)}, but cameras.toml knows "
+            f"{', '.join(by_name)}: name the files as the cameras are named"
+        )
+    return [(by_name[name], found[name]) for name in known]
+
+
+def _scaled(progress: Progress | None, low: float, high: float) -> Progress | None:
+    if progress is None:
+        return None
+    return lambda label, share: progress(label, low + (high - low) * share)
+
+
+def _refuse_empty(tracks: Sequence[RunTrack]) -> None:
+    empty = [track for track in tracks if track.known == 0]
+    if empty:
+        why = empty[0].problems[0] if empty[0].problems else "the platform was not seen"
+        raise DataError(
+            f"run {empty[0].name}: no pose in {empty[0].samples} frames: {why}. "
+            "Check target.toml (family, ids, sizes), the light and the focus"
+        )
