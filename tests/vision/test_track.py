@@ -1,0 +1,183 @@
+"""A whole recorded session: trajectories against truth, effects of the cameras, resumption."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from calib.camera import Camera
+from cdpr.documents import InputError
+from cdpr.rotation import log_rotation
+from cdpr.target import Target
+from cdpr.trajectory_files import read_trajectory
+from tests.vision.scenes import (
+    OPENCV_PARAMS,
+    SurveyedTag,
+    arc_of_cameras,
+    platform_tags,
+    scene_of,
+    standing_tags,
+    swing,
+)
+from vision import pieces, sightings
+from vision.record import record
+from vision.rig_effects import moved_by
+from vision.simulate import Look
+from vision.track import track_session
+
+FRAMES = 60
+STAMPS = 0.3 + np.arange(FRAMES) / 50.0
+TARGET = Target(platform_tags())
+BASE = tuple(SurveyedTag(tag) for tag in standing_tags())
+LATE_S = -0.006
+KNOCK_RAD = np.array([0.0035, -0.0045, 0.002])
+
+
+@dataclass
+class FilmedRun:
+    name: str
+    video: Path
+
+
+def cameras() -> tuple[Camera, ...]:
+    half = [v / 2 for v in OPENCV_PARAMS[:4]] + OPENCV_PARAMS[4:]
+    return arc_of_cameras(3, 1.9, size_px=(360, 288), params=half)
+
+
+def film(folder, true_cameras, frames=FRAMES, **changes) -> FilmedRun:
+    scene = scene_of(TARGET.tags, standing_tags(), **changes)
+    look = Look(noise=2.0, subpixels=3)
+    record(folder / "runs" / "swing", true_cameras, scene, STAMPS[:frames], look, seed=2)
+    return FilmedRun("swing", folder / "runs" / "swing")
+
+
+def track(run, folder, view=None, **settings):
+    return track_session(
+        [run],
+        view or cameras(),
+        TARGET,
+        results=folder / "results",
+        base_tags=BASE,
+        workers=1,
+        **settings,
+    )
+
+
+@pytest.fixture(scope="module")
+def session(tmp_path_factory):
+    """One camera 6 ms late, one knocked by 0.35 degrees after the calibration."""
+    folder = tmp_path_factory.mktemp("session")
+    first, second, third = cameras()
+    truth = (
+        first,
+        moved_by(second, np.concatenate([np.zeros(3), KNOCK_RAD])),
+        replace(third, clock_offset_s=LATE_S),
+    )
+    run = film(folder, truth)
+    return folder, run, track(run, folder)
+
+
+def errors(trajectory) -> np.ndarray:
+    """Position and small-rotation errors, (n, 6)."""
+    positions, rotations = swing(trajectory.times_s)
+    turn = log_rotation(trajectory.rotations() @ np.swapaxes(rotations, 1, 2))
+    return np.concatenate([trajectory.positions() - positions, turn], axis=1)
+
+
+def test_poses_scatter_as_they_claim(session) -> None:
+    folder, _, _ = session
+    trajectory = read_trajectory(folder / "results" / "tracks" / "swing.csv")
+    error = errors(trajectory)
+    bias_mm = 1e3 * np.abs(error[:, :3].mean(axis=0)).max()
+    scatter_mm = 1e3 * error[:, :3].std(axis=0).max()
+    scatter_mrad = 1e3 * error[:, 3:].std(axis=0).max()
+    assert len(trajectory) >= FRAMES - 1, f"{len(trajectory)} samples"
+    assert bias_mm < 0.1, f"bias {bias_mm:.3f} mm"
+    assert scatter_mm < 0.05, f"scatter {scatter_mm:.4f} mm"
+    assert scatter_mrad < 0.2, f"scatter {scatter_mrad:.3f} mrad"
+    inner = slice(3, -3)
+    total = np.einsum(
+        "ni,nij,nj->",
+        error[inner],
+        np.linalg.inv(trajectory.covariances[inner]),
+        error[inner],
+    )
+    low, high = chi2.ppf([1e-4, 1 - 1e-4], error[inner].size)
+    assert 0.4 * low < total < 1.5 * high, f"chi-square {total:.0f}, {low:.0f} to {high:.0f}"
+
+
+def test_the_late_and_the_knocked_camera_are_found(session) -> None:
+    document = session[2]
+    found = {(e["effect"], e["camera"]): e for e in document["effects"]}
+    assert set(found) == {("clock_offset", "cam2"), ("camera_moved", "cam1")}, sorted(found)
+    clock = found["clock_offset", "cam2"]["parameters"][0]
+    assert abs(clock["value"] - LATE_S) < 5e-5, f"{clock['value'] * 1e3:.3f} ms"
+    assert clock["std"] < 5e-5, f"std {clock['std'] * 1e3:.4f} ms"
+    turn = found["camera_moved", "cam1"]["parameters"][0]
+    assert abs(turn["value"] - np.linalg.norm(KNOCK_RAD)) < 1e-4, f"{turn['value']} rad"
+    before, after = (
+        found["camera_moved", "cam1"][k]["consistency_mm"] for k in ("before", "after")
+    )
+    assert after < 0.1 * before, f"consistency {before:.3f} -> {after:.3f} mm"
+
+
+def test_tracking_json_counts_every_frame(session) -> None:
+    folder, _, document = session
+    written = json.loads((folder / "results" / "tracking.json").read_text())
+    assert written["format"] == "freeswing-tracking/1"
+    for camera in written["runs"][0]["cameras"]:
+        total = camera["frames_used"] + sum(camera["frames_rejected"].values())
+        assert camera["frames_seen"] == FRAMES == total, f"{camera['camera']}: {total}"
+        assert camera["reprojection_px"] < 0.05, camera["reprojection_px"]
+    assert written["runs"] == json.loads(json.dumps(document["runs"])), "document differs"
+
+
+def test_killed_and_resumed_gives_the_same_bytes(session, tmp_path, monkeypatch) -> None:
+    _, run, _ = session
+    monkeypatch.setattr(pieces, "FRAMES_A_PIECE", 16)
+    monkeypatch.setattr(sightings, "FRAMES_A_PIECE", 16)
+    whole, cut = tmp_path / "whole", tmp_path / "cut"
+    track(run, whole)
+    saved = sightings.save_piece
+    count = 0
+
+    def dies(path, piece, follower) -> None:
+        nonlocal count
+        count += 1
+        if count > 5:
+            raise KeyboardInterrupt
+        saved(path, piece, follower)
+
+    monkeypatch.setattr(sightings, "save_piece", dies)
+    with pytest.raises(KeyboardInterrupt):
+        track(run, cut)
+    assert len(list((cut / "results").rglob("*.npz"))) == 5
+    monkeypatch.setattr(sightings, "save_piece", saved)
+    track(run, cut)
+    for name in ("tracking.json", "tracks/swing.csv"):
+        one = (whole / "results" / name).read_bytes()
+        other = (cut / "results" / name).read_bytes()
+        assert one == other, f"{name} differs"
+
+
+def test_one_camera_alone_gives_poses_at_its_own_covariance(session, tmp_path) -> None:
+    _, run, _ = session
+    track(run, tmp_path, view=cameras()[:1])
+    trajectory = read_trajectory(tmp_path / "results" / "tracks" / "swing.csv")
+    error = errors(trajectory)
+    claimed = np.sqrt(np.diagonal(trajectory.covariances, axis1=1, axis2=2))
+    ratio = np.sqrt(np.mean((error / claimed) ** 2))
+    assert len(trajectory) == FRAMES, f"{len(trajectory)} poses"
+    assert 0.5 < ratio < 1.6, f"errors are {ratio:.2f} times what is claimed"
+
+
+def test_a_recording_of_another_size_is_refused(session, tmp_path) -> None:
+    _, run, _ = session
+    wrong = tuple(replace(c, size_px=(640, 480)) for c in cameras())
+    with pytest.raises(InputError, match="360 x 288 pixels, but cameras.toml has 640 x 480"):
+        track(run, tmp_path, view=wrong)
