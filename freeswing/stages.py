@@ -15,7 +15,8 @@ from freeswing.provenance import is_current, provenance
 from freeswing.session import Session
 from freeswing.swings import trajectory_path
 
-Make = Callable[[Session, Console, dict[str, Any]], list[tuple[str, dict[str, Any]]]]
+Documents = list[tuple[str, dict[str, Any]]]
+Make = Callable[[Session, Console, dict[str, Any], int], Documents]
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,8 +24,8 @@ class Stage:
     """One step that a command of the same name takes.
 
     Attributes:
-        name: of the command, whose module holds `make(session, console, settings)`: it gives the
-            result documents, by their file's name, the main one first.
+        name: of the command, whose module holds `make(session, console, settings, workers)`:
+            it gives the result documents, by their file's name, the main one first.
         result: main result file below the results folder.
         inputs: what it reads.
         due: whether a session needs it at all.
@@ -43,14 +44,21 @@ class Stage:
         return is_current(result, session.folder, self.inputs(session), self.settings)
 
     def take(
-        self, session: Session, console: Console, settings: dict[str, Any] | None = None
+        self,
+        session: Session,
+        console: Console,
+        settings: dict[str, Any] | None = None,
+        workers: int = 0,
     ) -> Path:
-        """Make the result from scratch and write it with its provenance."""
+        """Make the result from scratch and write it with its provenance.
+
+        `workers` processes serve, 0 for one a core; they do not change the result.
+        """
         chosen = self.settings | (settings or {})
         # Inputs are hashed first: what changes meanwhile makes the result out of date.
         made_of = provenance(session.folder, self.inputs(session), chosen)
         make: Make = importlib.import_module(f"freeswing.commands.{self.name}").make
-        documents = make(session, console, chosen)
+        documents = make(session, console, chosen, workers)
         for name, document in reversed(documents):
             write_json(session.results / name, {**document, "provenance": made_of})
         return session.results / self.result
@@ -98,7 +106,13 @@ CALIBRATE = Stage(
     _needs_calibration,
     {"model": "OPENCV"},
 )
-TRACK = Stage("track", "tracking.json", _tracking_files, lambda session: bool(session.video_runs))
+TRACK = Stage(
+    "track",
+    "tracking.json",
+    _tracking_files,
+    lambda session: bool(session.video_runs),
+    {"correct_rig": True, "refine_layout": False},
+)
 IDENTIFY = Stage(
     "identify",
     "identification.json",
@@ -106,4 +120,11 @@ IDENTIFY = Stage(
     lambda session: True,
     {"weighting": "published", "likelihood": True},
 )
-STAGES: tuple[Stage, ...] = (CALIBRATE, IDENTIFY)
+DIAGNOSE = Stage(
+    "diagnose",
+    "diagnosis.json",
+    _motion_files,
+    lambda session: any(run.role == "validate" for run in session.runs),
+    {"only": None},
+)
+STAGES = (CALIBRATE, TRACK, IDENTIFY, DIAGNOSE)

@@ -21,6 +21,13 @@ def add_results(parser: ArgumentParser, usual: str) -> None:
     parser.add_argument("--results", metavar="DIR", help=text)
 
 
+def add_workers(parser: ArgumentParser) -> None:
+    """How many processes work side by side."""
+    parser.add_argument(
+        "--workers", type=int, default=0, metavar="N", help="processes; default one a core"
+    )
+
+
 def open_session(options: Namespace) -> Session:
     """The session that the flags of `add_session` name."""
     from freeswing.session import read_session

@@ -28,7 +28,7 @@ def run(options: Namespace, console: Console) -> None:
 
 
 def make(
-    session: Session, console: Console, settings: dict[str, Any]
+    session: Session, console: Console, settings: dict[str, Any], workers: int
 ) -> list[tuple[str, dict[str, Any]]]:
     """cameras.toml on disk, and calibration.json as a document."""
     from calib.calibrate import calibrate_session

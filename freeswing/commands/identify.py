@@ -36,7 +36,7 @@ def run(options: Namespace, console: Console) -> None:
 
 
 def make(
-    session: Session, console: Console, settings: dict[str, Any]
+    session: Session, console: Console, settings: dict[str, Any], workers: int
 ) -> list[tuple[str, dict[str, Any]]]:
     """identification.json and motion.json as documents."""
     from freeswing.motions import predicted_motions

@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING
 
-from freeswing.commands.arguments import add_session, open_session
+from freeswing.commands.arguments import add_session, add_workers, open_session
 from freeswing.console import Console
 
 if TYPE_CHECKING:
@@ -15,16 +15,17 @@ if TYPE_CHECKING:
 def add_arguments(parser: ArgumentParser) -> None:
     """The session."""
     add_session(parser)
+    add_workers(parser)
 
 
 def run(options: Namespace, console: Console) -> None:
     """Take each step that is due; the page is always written anew."""
     session = open_session(options)
-    run_session(session, console)
+    run_session(session, console, options.workers)
     console.show_file(session.results / "identification.json")
 
 
-def run_session(session: Session, console: Console) -> None:
+def run_session(session: Session, console: Console, workers: int = 0) -> None:
     """All steps of a session, then the report, whose path is said last."""
     from freeswing.commands.report import write_report
     from freeswing.stages import STAGES
@@ -36,5 +37,5 @@ def run_session(session: Session, console: Console) -> None:
             console.say(f"{stage.name}: up to date")
         else:
             console.say(f"{stage.name}:")
-            stage.take(session, console)
+            stage.take(session, console, workers=workers)
     console.say(str(write_report(session)))

@@ -10,6 +10,8 @@ from freeswing.report.figures import AFTER, FAINT, figure
 from freeswing.report.material import Document, Material
 from freeswing.report.words import number, plain
 
+ORDER = ("accepted", "confounded", "rejected", "not_identifiable")
+
 
 class EffectLadder:
     """The candidates for what the model lacks."""
@@ -18,17 +20,9 @@ class EffectLadder:
     title = "The effect ladder"
 
     def values(self, material: Material) -> dict[str, Any] | None:
-        """Candidates by verdict and gain; the camera effects follow from tracking."""
+        """Candidates by verdict and gain, and what no candidate explains."""
         diagnosis = material.diagnosis
-        candidates = sorted(
-            [
-                *(diagnosis.get("candidates") or []),
-                *((material.tracking.get("effects") or {}).get("candidates") or []),
-            ]
-            if isinstance(material.tracking.get("effects"), dict)
-            else list(diagnosis.get("candidates") or []),
-            key=lambda entry: -_gain(entry),
-        )
+        candidates = sorted(diagnosis.get("candidates") or [], key=_rank)
         if not candidates:
             return None
         unexplained = diagnosis.get("unexplained") or {}
@@ -41,6 +35,11 @@ class EffectLadder:
             "chart": _chart(candidates),
             "unexplained": {**unexplained, "evidence": evidence},
         }
+
+
+def _rank(entry: Document) -> tuple[int, float]:
+    verdict = str(entry.get("verdict", ""))
+    return (ORDER.index(verdict) if verdict in ORDER else len(ORDER), -_gain(entry))
 
 
 def _gain(entry: Document) -> float:
@@ -56,7 +55,7 @@ def _row(entry: Document) -> dict[str, str]:
         "delta_bic": number(entry.get("delta_bic"), 4),
         "gain": number(entry.get("held_out_gain"), 3),
         "confounded": ", ".join(plain(str(n)) for n in entry.get("confounded_with") or []),
-        "why": str(entry.get("why") or entry.get("reason") or entry.get("experiment") or ""),
+        "why": ". ".join(str(entry[key]) for key in ("reason", "experiment") if entry.get(key)),
     }
 
 

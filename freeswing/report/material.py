@@ -11,6 +11,9 @@ from typing import Any
 from cdpr.documents import InputError
 
 RESULTS = ("calibration", "tracking", "identification", "diagnosis", "motion")
+FILES = {kind: (f"{kind}.json",) for kind in RESULTS} | {
+    "motion": ("diagnosis_motion.json", "motion.json")
+}
 ESTIMATE_ORDER = ("ml_full", "ml_free", "fidim_full", "fidim_free")
 Document = Mapping[str, Any]
 
@@ -25,7 +28,8 @@ class Material:
         tracking: `results/tracking.json`.
         identification: `results/identification.json`.
         diagnosis: `results/diagnosis.json`.
-        motion: `results/motion.json`, measured and predicted samples of the validation runs.
+        motion: measured and predicted samples of the validation runs, by diagnosis
+            (`results/diagnosis_motion.json`) or else by identification (`results/motion.json`).
         notes: findings to show beside the results, such as those of `freeswing check`.
     """
 
@@ -55,7 +59,10 @@ def read_material(title: str, results: Path, notes: tuple[str, ...] = ()) -> Mat
     Raises:
         InputError: where a result file is not one that this version wrote.
     """
-    found = {kind: read_result(results / f"{kind}.json", kind) for kind in RESULTS}
+    found = {
+        kind: next((one for name in names if (one := read_result(results / name, kind))), {})
+        for kind, names in FILES.items()
+    }
     return Material(title, **found, notes=notes)
 
 

@@ -21,10 +21,12 @@ class SigmaByRun:
 
     def values(self, material: Material) -> dict[str, Any] | None:
         """Bars and a table over the validation runs."""
-        before = list(material.identification.get("validation") or [])
+        diagnosed = material.diagnosis.get("before") or {}
+        before = list(diagnosed.get("runs") or material.identification.get("validation") or [])
         if not before:
             return None
-        after = {str(r["run"]): r for r in material.diagnosis.get("validation_after") or []}
+        found = material.diagnosis if material.diagnosis.get("accepted") else {}
+        after = {str(r["run"]): r for r in (found.get("after") or {}).get("runs") or []}
         rows = [_row(entry, after.get(str(entry["run"]), {})) for entry in before]
         return {"rows": rows, "chart": _chart(before, after), "has_after": bool(after)}
 

@@ -1,0 +1,76 @@
+"""Find what the model lacks, judged on held-out runs: an effect, a group of them, or none."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from typing import Any
+
+from freeswing.commands.arguments import add_session, add_workers, open_session
+from freeswing.console import Console
+from freeswing.session import Session
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """The session and the candidates."""
+    add_session(parser)
+    add_workers(parser)
+    parser.add_argument(
+        "--only",
+        metavar="EFFECT",
+        action="append",
+        help="consider this effect; may be repeated (default: the whole catalogue)",
+    )
+
+
+def run(options: Namespace, console: Console) -> None:
+    """Diagnose and say before and after."""
+    from freeswing.stages import DIAGNOSE
+
+    session = open_session(options)
+    result = DIAGNOSE.take(session, console, {"only": options.only}, options.workers)
+    console.say(str(result))
+    console.show_file(result)
+
+
+def make(
+    session: Session, console: Console, settings: dict[str, Any], workers: int
+) -> list[tuple[str, dict[str, Any]]]:
+    """diagnosis.json and diagnosis_motion.json as documents."""
+    import os
+
+    from cdpr.documents import InputError
+    from cdpr.effects import catalogue
+    from freeswing.motions import ladder_motions
+    from freeswing.swings import load_robot, load_swings, load_target
+    from ident.diagnose.diagnose import diagnose
+
+    only = settings["only"]
+    for name in only or ():
+        if name not in catalogue():
+            raise InputError(f"--only {name}: not one of {', '.join(sorted(catalogue()))}")
+    robot = load_robot(session)
+    swings = list(load_swings(session, robot, load_target(session)))
+    candidates = None if only is None else tuple(only)
+    count = workers or os.cpu_count() or 1
+    found = diagnose(swings, robot, console.progress, count, candidates)
+    document = found.document()
+    _summarise(document, console)
+    return [("diagnosis.json", document), ("diagnosis_motion.json", ladder_motions(found.ladder))]
+
+
+def _summarise(document: dict[str, Any], console: Console) -> None:
+    from freeswing.report.answer import verdict
+    from freeswing.report.material import Material
+    from freeswing.report.words import millimetres
+
+    for entry in document["accepted"]:
+        values = ", ".join(f"{p['name']} {p['value']:.4g}" for p in entry["parameters"])
+        console.say(f"  accepted: {entry['effect'].replace('_', ' ')} ({values})")
+    for sentence in verdict(Material("", diagnosis=document)):
+        console.say(f"  {sentence}")
+    before, after = document["before"], document["after"]
+    console.say(
+        f"  held-out runs: off by {millimetres(before['prediction_rmse_m'])} before, "
+        f"{millimetres(after['prediction_rmse_m'])} after "
+        f"(noise floor {millimetres(after['noise_floor_m'])})"
+    )

@@ -1,0 +1,78 @@
+"""Follow the platform through the videos: a trajectory with covariance for each run."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from typing import Any
+
+from freeswing.commands.arguments import add_session, add_workers, open_session
+from freeswing.console import Console
+from freeswing.session import Session
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """The session and how to track."""
+    add_session(parser)
+    add_workers(parser)
+    parser.add_argument(
+        "--trust-cameras",
+        action="store_true",
+        help="do not look for late clocks, rolling shutters and moved cameras",
+    )
+    parser.add_argument(
+        "--refine-layout", action="store_true", help="fit the tags' places to the recordings"
+    )
+
+
+def run(options: Namespace, console: Console) -> None:
+    """Track, write results/tracks/*.csv and results/tracking.json."""
+    from freeswing.stages import TRACK
+
+    session = open_session(options)
+    settings = {"correct_rig": not options.trust_cameras, "refine_layout": options.refine_layout}
+    result = TRACK.take(session, console, settings, options.workers)
+    console.say(str(result))
+    console.show_file(result)
+
+
+def make(
+    session: Session, console: Console, settings: dict[str, Any], workers: int
+) -> list[tuple[str, dict[str, Any]]]:
+    """The tracks on disk, and tracking.json as a document."""
+    from calib.cameras_file import read_cameras
+    from cdpr.documents import DataError, InputError
+    from freeswing.swings import load_target
+    from vision.track import Settings, track_session
+
+    if not session.cameras.is_file():
+        raise DataError(f"{session.cameras}: no such file; run freeswing calibrate first")
+    target = load_target(session)
+    if target is None:
+        raise InputError(f"{session.path}: target: missing; it says what is on the platform")
+    document = track_session(
+        session.video_runs,
+        read_cameras(session.cameras),
+        target,
+        results=session.results,
+        base_tags=session.calibration.base_tags if session.calibration else (),
+        frame_rate_hz=session.frame_rate_hz,
+        settings=Settings(**settings),
+        workers=workers,
+        progress=console.progress,
+    )
+    _summarise(document, console)
+    return [("tracking.json", document)]
+
+
+def _summarise(document: dict[str, Any], console: Console) -> None:
+    for run in document["runs"]:
+        console.say(
+            f"  {run['run']}: {run['known']} of {run['samples']} samples, "
+            f"{run['reprojection_px']:.3f} px, cameras agree to {run['consistency_mm']:.3f} mm"
+        )
+        for problem in run["problems"]:
+            console.say(f"    {problem}")
+    for effect in document["effects"]:
+        values = ", ".join(f"{p['name']} {p['value']:.4g}" for p in effect["parameters"])
+        where = f"{effect['run']} {effect['camera']}"
+        console.say(f"  {where}: {effect['effect'].replace('_', ' ')} removed ({values})")
