@@ -67,6 +67,7 @@ class Problem:
         samples: of the runs.
         free: which of the 9 + k shared unknowns to estimate; None for all.
         estimate_scales: whether noise scales follow the residuals.
+        tolerance_m: local error of the simulated motions.
     """
 
     def __init__(
@@ -75,6 +76,7 @@ class Problem:
         samples: Sequence[Samples],
         free: np.ndarray | None = None,
         estimate_scales: bool = True,
+        tolerance_m: float = TOLERANCE_M,
     ) -> None:
         parameters = model.parameters
         self.model = model
@@ -82,6 +84,7 @@ class Problem:
         count = 9 + len(parameters)
         self.free = np.ones(count, dtype=bool) if free is None else np.asarray(free, dtype=bool)
         self.estimate_scales = estimate_scales
+        self.tolerance_m = tolerance_m
         self.prior_centre = model.start_values
         self.prior_std = np.array([max(p.high - p.start, p.start - p.low) for p in parameters])
         self.unit = np.concatenate([INERTIA_UNIT, [p.scale for p in parameters]])
@@ -103,7 +106,7 @@ class Problem:
         zeta, inertia, values, span = start[:6], state.inertia, state.values, samples.span_s
         rates = admissible_rates(self.model, zeta, start[6:], inertia, values, span[0])
         try:
-            return simulate(self.model, zeta, rates, span, inertia, values, TOLERANCE_M)
+            return simulate(self.model, zeta, rates, span, inertia, values, self.tolerance_m)
         except (ValueError, np.linalg.LinAlgError) as error:
             raise ValueError(f"run {samples.name}: {error}") from error
 

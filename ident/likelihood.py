@@ -16,7 +16,7 @@ import numpy as np
 from cdpr.model import Model
 from cdpr.robot import Array
 from cdpr.simulation import Motion
-from ident.joint import Problem, State, Step
+from ident.joint import TOLERANCE_M, Problem, State, Step
 from ident.likelihood_run import Samples, predicted, residuals
 
 Progress = Callable[[str, float], None]
@@ -101,6 +101,7 @@ def fit(
     grow: bool = True,
     steps: int = STEPS,
     tolerance: float = CONVERGED_DECREASE,
+    accuracy_m: float = TOLERANCE_M,
 ) -> LikelihoodFit:
     """Fit inertia, effect values, initial states and lengths to the samples of the runs.
 
@@ -114,6 +115,7 @@ def fit(
         grow: False when the start is close over the whole length of the runs already.
         steps: at most so many Gauss-Newton steps on the whole runs.
         tolerance: converged when an undamped step lowers the cost by less.
+        accuracy_m: local error of the simulated motions.
 
     Raises:
         ValueError: when no run is given, or a start cannot be simulated, with the reason.
@@ -139,7 +141,7 @@ def fit(
             if any(run.lengths_m is not None and run.lengths_std_m < std for run in samples):
                 problem = Problem(model, [s.loosened(std) for s in samples], free, estimate_scales)
                 state = _minimised(problem, state, STEPS, ROUGH_DECREASE)[0]
-    problem = Problem(model, samples, free, estimate_scales)
+    problem = Problem(model, samples, free, estimate_scales, accuracy_m)
     state, step, taken, reason = _minimised(problem, state, steps, tolerance)
     if progress:
         progress("maximum likelihood", 1.0)

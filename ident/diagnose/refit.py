@@ -15,6 +15,7 @@ from ident.joint import State
 from ident.likelihood import LikelihoodFit, fit
 
 RANKING_STEPS = 8
+RANKING_ACCURACY_M = 3e-7
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,6 +102,7 @@ def _fitted(model: Model, current: LikelihoodFit, state: State) -> LikelihoodFit
         grow=False,
         steps=RANKING_STEPS,
         tolerance=max(1.0, 1e-4 * current.cost),
+        accuracy_m=RANKING_ACCURACY_M,
     )
 
 

@@ -27,6 +27,7 @@ from ident.likelihood import LikelihoodFit, correlation_factor
 Progress = Callable[[str, float], None]
 
 REFITTED = 5
+NEARLY_AS_GOOD = 0.5
 MOST_ROUNDS = 4
 SIGNIFICANCE = 1e-3
 LEAST_SHARE_IMPROVED = 0.6
@@ -91,6 +92,8 @@ class Search:
         self._tell("base dynamics", 0.0)
         current = rescored(base, self.noise_scales)
         for index in range(MOST_ROUNDS):
+            if index and _excess(current) < LEAST_EXCESS_LATER:
+                break
             done = self._round(current, index)
             self.rounds.append(done)
             if done.winner is None:
@@ -181,7 +184,7 @@ def _start_of(one: Screen, name: str) -> tuple[Array, Array]:
 def _promising(ranked: Sequence[str], linear: dict[str, float], current: Refit) -> list[str]:
     """The candidates worth fitting: the linear best and those that are not far behind."""
     gain = current.held_out - linear[ranked[0]]
-    within = [n for n in ranked if current.held_out - linear[n] > max(0.3 * gain, 10.0)]
+    within = [n for n in ranked if current.held_out - linear[n] > max(NEARLY_AS_GOOD * gain, 10.0)]
     return within[:REFITTED]
 
 
@@ -248,7 +251,7 @@ def _complaint(
     better = float((gains > 0.0).mean())
     if gains.sum() <= 0.0 or better < LEAST_SHARE_IMPROVED:
         return f"only {100 * better:.0f} % of the left-out runs are predicted better"
-    excess = (current.held_out - count) / count
+    excess = _excess(current)
     gain = float(gains.sum()) / max(current.held_out - count, LEAST_EXCESS * count)
     if index and (excess < LEAST_EXCESS_LATER or gain < LEAST_GAIN_LATER):
         return (
@@ -256,6 +259,11 @@ def _complaint(
             "noise: too little to claim another effect"
         )
     return ""
+
+
+def _excess(current: Refit) -> float:
+    """How much more than the noise predicts the left-out runs' squares are, as a share."""
+    return current.held_out / float(current.evidence.counts.sum()) - 1.0
 
 
 def _winner(passed: dict[str, Refit], current: Refit) -> tuple[Refit | None, tuple[str, ...]]:
