@@ -82,7 +82,7 @@ def smoother(
             f"{nyquist:.4g} Hz; lower pass_hz or record faster"
         )
     half = taps_for(period_s, pass_hz, stop_hz, attenuation_db) // 2
-    reach = period_s * np.arange(-half, half + 1)
+    reach: Array = np.arange(-half, half + 1) * np.float64(period_s)
     omega = np.pi / period_s * (np.arange(_GRID) + 0.5) / _GRID
     inside, outside = omega <= 2.0 * np.pi * pass_hz, omega >= 2.0 * np.pi * stop_hz
     weight = np.where(inside | outside, 1.0, 0.0)

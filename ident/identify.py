@@ -3,31 +3,29 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 from cdpr.documents import DataError
 from cdpr.model import Model, build_model
-from cdpr.robot import Array, Robot
+from cdpr.robot import Robot
 from ident.comparison import ParameterComparison, compare
-from ident.estimate import Estimate, fidim_entry
-from ident.fidim import FidimEstimate, fidim
+from ident.estimate import Estimate
+from ident.fidim_stage import Weighting, fidim_estimates
 from ident.maximum_likelihood import ml_estimate
-from ident.motion import SwingMotion, lowest_tension, regressor
-from ident.payload import LoadedCentre, MassEstimate, mass_from_payloads
 from ident.prepare import (
-    PreparedRun,
+    LARGEST_AMPLIFICATION,
     PreparedRuns,
     Progress,
+    fittable,
+    left_out,
     length_differences,
     prepare_runs,
-    without,
 )
-from ident.runs import DroppedRun, Payload, SwingRun
+from ident.runs import SwingRun
 from ident.signals import SignalSettings
 from ident.validate import ValidatedRun, validate_run
-from ident.weighted import UNEVEN, noisy_regressor, unevenness, weighted_fidim
 
 FORMAT = "freeswing-identification/1"
 _THINNED = 10  # samples skipped where only an impression of the regressor's noise is wanted
@@ -45,7 +43,7 @@ class IdentifySettings:
     """
 
     signals: SignalSettings = field(default_factory=SignalSettings)
-    weighting: Literal["published", "covariance"] = "published"
+    weighting: Weighting = "published"
     maximum_likelihood: bool = True
     predict: bool = True
 
@@ -126,7 +124,7 @@ def identify(
         prepared = prepare_runs(runs, model, settings.signals, progress)
     except ValueError as error:
         raise DataError(str(error)) from error
-    prepared, by_fidim, failures = _fidim_estimates(model, prepared, settings, progress)
+    prepared, by_fidim, failures = fidim_estimates(model, prepared, settings.weighting, progress)
     if not by_fidim:
         raise DataError(_nothing_sentence(prepared, failures))
     estimates = dict(by_fidim)
@@ -152,93 +150,6 @@ def identify(
     )
 
 
-def _fidim_estimates(
-    model: Model, prepared: PreparedRuns, settings: IdentifySettings, progress: Progress | None
-) -> tuple[PreparedRuns, dict[str, Estimate], dict[str, str]]:
-    """FIDIM by full poses and by free coordinates; slack runs found with its result leave."""
-    found: dict[str, Estimate] = {}
-    failures: dict[str, str] = {}
-    for full in (True, False):
-        name = "fidim_full" if full else "fidim_free"
-        if progress:
-            progress(f"FIDIM by {'full poses' if full else 'free coordinates'}", 0.5 * (not full))
-        unloaded = _usable(prepared, full, None)
-        if not unloaded:
-            failures[name] = _unusable_sentence(_dropped(prepared, full))
-            continue
-        try:
-            raw = fidim([regressor(model, _motion(run, full)) for run in unloaded])
-            slack = _slack_runs(model, prepared, raw.values, full)
-            if slack:
-                prepared = without(prepared, slack)
-                unloaded = _usable(prepared, full, None)
-                raw = fidim([regressor(model, _motion(run, full)) for run in unloaded])
-            found[name] = _completed(model, prepared, unloaded, raw, full, settings)
-        except (ValueError, np.linalg.LinAlgError) as error:
-            failures[name] = str(error)
-    # A full-pose problem is quiet where poses were not measured: that is no failure.
-    if not any(run.full is not None for run in prepared.runs):
-        failures.pop("fidim_full", None)
-    return prepared, found, failures
-
-
-def _completed(
-    model: Model,
-    prepared: PreparedRuns,
-    unloaded: list[PreparedRun],
-    raw: FidimEstimate,
-    full: bool,
-    settings: IdentifySettings,
-) -> Estimate:
-    """The entry of one FIDIM solution: weighting, noise check, mass."""
-    notes: list[str] = []
-    weighted = None
-    asked = settings.weighting == "covariance"
-    noisy = [
-        noisy_regressor(model, _signals(run, full), _motion(run, full), 1 if asked else _THINNED)
-        for run in (unloaded if asked else unloaded[:3])
-    ]
-    if asked:
-        weighted = weighted_fidim(noisy, raw.values)
-    elif (ratio := unevenness(noisy)) > UNEVEN:
-        notes.append(
-            f"plain total least squares takes the regressor's columns to be equally noisy; theirs "
-            f"differs up to {ratio:.0f} times, so values and standard deviations may be off; "
-            'weighting = "covariance" gives the weighted form'
-        )
-    mass = _mass(model, prepared, raw, full, notes)
-    entry = fidim_entry(raw, _dropped(prepared, full), tuple(notes), weighted)
-    return replace(entry, mass=mass)
-
-
-def _mass(
-    model: Model, prepared: PreparedRuns, raw: FidimEstimate, full: bool, notes: list[str]
-) -> MassEstimate | None:
-    """Mass from payload runs, each payload identified by itself (eqs. 23, 24)."""
-    payloads = {
-        (run.run.payload.mass_kg, tuple(run.run.payload.position_m)): run.run.payload
-        for run in prepared.runs
-        if run.run.payload is not None and run.run.role == "identify"
-    }
-    loaded: list[LoadedCentre] = []
-    for payload in payloads.values():
-        runs = _usable(prepared, full, payload)
-        try:
-            one = fidim([regressor(model, _motion(run, full)) for run in runs])
-        except (ValueError, np.linalg.LinAlgError) as error:
-            notes.append(f"payload of {payload.mass_kg:g} kg not used: {error}")
-            continue
-        covariance = one.solution.covariance[:3, :3]
-        loaded.append(LoadedCentre(payload, one.values[:3], covariance))
-    if not loaded:
-        return None
-    try:
-        return mass_from_payloads(raw.values[:3], raw.solution.covariance[:3, :3], loaded)
-    except ValueError as error:
-        notes.append(str(error))
-        return None
-
-
 def _likelihood_estimates(
     model: Model,
     prepared: PreparedRuns,
@@ -250,7 +161,7 @@ def _likelihood_estimates(
     failures: dict[str, str] = {}
     for full in (True, False):
         name = "ml_full" if full else "ml_free"
-        runs = _fittable(prepared, full)
+        runs = fittable(prepared, full)
         start = by_fidim.get("fidim_full") or by_fidim.get("fidim_free")
         if not runs or start is None:
             continue
@@ -294,70 +205,15 @@ def _validated(
     return tuple(found)
 
 
-def _motion(run: PreparedRun, full: bool) -> SwingMotion:
-    motion = run.full if full else run.free
-    if motion is None:
-        raise ValueError(f"run {run.name}: {run.why_not_free or 'full poses were not measured'}")
-    return motion
-
-
-def _signals(run: PreparedRun, full: bool):
-    return run.signals if full or run.free_signals is None else run.free_signals
-
-
-def _usable(prepared: PreparedRuns, full: bool, payload: Payload | None) -> list[PreparedRun]:
-    """Runs to identify from, with this payload, that have the motion asked for."""
-    return [
-        run
-        for run in prepared.runs
-        if run.run.role == "identify"
-        and _same_payload(run.run.payload, payload)
-        and (run.full if full else run.free) is not None
-    ]
-
-
-def _fittable(prepared: PreparedRuns, full: bool) -> list[PreparedRun]:
-    """Runs whose samples can be fitted: a singularity of the free coordinates is no obstacle."""
-    return [
-        run
-        for run in prepared.runs
-        if run.run.role == "identify"
-        and run.run.payload is None
-        and (run.full is not None if full else set(prepared.free) <= set(run.signals.coordinates))
-    ]
-
-
-def _same_payload(one: Payload | None, other: Payload | None) -> bool:
-    if one is None or other is None:
-        return one is other
-    return one.mass_kg == other.mass_kg and bool((one.position_m == other.position_m).all())
-
-
-def _slack_runs(model: Model, prepared: PreparedRuns, inertia: Array, full: bool) -> dict[str, str]:
-    """Runs along which a cable pushes, by the estimated inertia: name and sentence."""
-    slack = {}
-    for run in prepared.runs:
-        motion = run.full if full else run.free
-        if motion is None or run.run.payload is not None:
-            continue
-        lowest, cable = lowest_tension(model, motion, inertia)
-        if lowest < 0.0:
-            slack[run.name] = (
-                f"cable {cable} goes slack: its tension falls to {lowest:.2f} N per kg of platform"
-            )
-    return slack
-
-
-def _dropped(prepared: PreparedRuns, full: bool) -> tuple[DroppedRun, ...]:
-    """Runs left out of an estimate, those included that lack its motion."""
-    if full:
-        return prepared.dropped
-    own = tuple(DroppedRun(r.name, r.why_not_free) for r in prepared.runs if r.free is None)
-    return prepared.dropped + own
-
-
 def _session_notes(model: Model, prepared: PreparedRuns, failures: dict[str, str]) -> list[str]:
     notes = [f"{name} is absent: {why}" for name, why in failures.items()]
+    if prepared.amplification > LARGEST_AMPLIFICATION:
+        notes.append(
+            f"the free coordinates {', '.join(prepared.free)} do not settle the pose everywhere: "
+            f"it moves up to {prepared.amplification:.3g} times more than they do; full poses "
+            'projected on them (fidim_full, sigma_perp) suffer too; free_coordinates = "auto" '
+            "chooses better ones"
+        )
     differences = [length_differences(model, run) for run in prepared.runs]
     known = np.array([d for d in differences if d is not None])
     if len(known) and np.abs(known).max() > 0.002:
@@ -368,15 +224,9 @@ def _session_notes(model: Model, prepared: PreparedRuns, failures: dict[str, str
     return notes
 
 
-def _unusable_sentence(dropped: tuple[DroppedRun, ...]) -> str:
-    if not dropped:
-        return "no usable run"
-    return f"no usable run; {dropped[-1].run}, for one: {dropped[-1].why}"
-
-
 def _nothing_sentence(prepared: PreparedRuns, failures: dict[str, str]) -> str:
     lines = [f"{name}: {why}" for name, why in failures.items()]
-    lines += [f"run {run.run}: {run.why}" for run in _dropped(prepared, False)]
+    lines += [f"run {run.run}: {run.why}" for run in left_out(prepared, False)]
     return "\n  ".join(["no inertial parameter can be identified from these runs", *lines])
 
 

@@ -13,7 +13,7 @@ from cdpr.model import Model
 from cdpr.robot import POSE_COORDINATES, Array, Robot
 from ident.guess import taut_equilibrium
 from ident.motion import SwingMotion, free_motion, full_motion
-from ident.runs import DroppedRun, SwingRun
+from ident.runs import DroppedRun, Payload, SwingRun
 from ident.signals import Signals, SignalSettings, UnusableRunError, signals_of
 
 Progress = Callable[[str, float], None]
@@ -232,3 +232,56 @@ def without(prepared: PreparedRuns, names: dict[str, str]) -> PreparedRuns:
         runs=tuple(run for run in prepared.runs if run.name not in names),
         dropped=prepared.dropped + tuple(DroppedRun(run, why) for run, why in names.items()),
     )
+
+
+def motion_of(run: PreparedRun, full: bool) -> SwingMotion:
+    """The motion by full poses or by free coordinates.
+
+    Raises:
+        ValueError: where the run has none, with the reason.
+    """
+    motion = run.full if full else run.free
+    if motion is None:
+        raise ValueError(f"run {run.name}: {run.why_not_free or 'full poses were not measured'}")
+    return motion
+
+
+def signals_used(run: PreparedRun, full: bool) -> Signals:
+    """What that motion was made from."""
+    return run.signals if full or run.free_signals is None else run.free_signals
+
+
+def usable(prepared: PreparedRuns, full: bool, payload: Payload | None) -> list[PreparedRun]:
+    """Runs to identify from, with this payload, that have the motion asked for."""
+    return [
+        run
+        for run in prepared.runs
+        if run.run.role == "identify"
+        and _same_payload(run.run.payload, payload)
+        and (run.full if full else run.free) is not None
+    ]
+
+
+def fittable(prepared: PreparedRuns, full: bool) -> list[PreparedRun]:
+    """Runs whose samples can be fitted: a singularity of the free coordinates is no obstacle."""
+    return [
+        run
+        for run in prepared.runs
+        if run.run.role == "identify"
+        and run.run.payload is None
+        and (run.full is not None if full else set(prepared.free) <= set(run.signals.coordinates))
+    ]
+
+
+def _same_payload(one: Payload | None, other: Payload | None) -> bool:
+    if one is None or other is None:
+        return one is other
+    return one.mass_kg == other.mass_kg and bool((one.position_m == other.position_m).all())
+
+
+def left_out(prepared: PreparedRuns, full: bool) -> tuple[DroppedRun, ...]:
+    """Runs left out of an estimate, those included that lack its motion."""
+    if full:
+        return prepared.dropped
+    own = tuple(DroppedRun(r.name, r.why_not_free) for r in prepared.runs if r.free is None)
+    return prepared.dropped + own

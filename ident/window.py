@@ -100,7 +100,8 @@ def _stretches(times_s: Array) -> list[slice]:
 
 def _law(value: Array, velocity: Array, acceleration: Array, where: slice) -> Array:
     """Least-squares coefficients of acceleration on the terms of the law, (n_terms, k)."""
-    return np.linalg.lstsq(_terms(value, velocity)[where], acceleration[where], rcond=None)[0]
+    found = np.linalg.lstsq(_terms(value, velocity)[where], acceleration[where], rcond=None)
+    return np.asarray(found[0], dtype=np.float64)
 
 
 def _terms(value: Array, velocity: Array) -> Array:
