@@ -8,6 +8,17 @@ MuJoCo; it shares no equation with the product's model, simulation or effects.
 - `newton_euler.simulate`, `mujoco_swing.mujoco_swing`: one free motion from a pose and a twist.
 - `equilibrium.settle`, `runs.draw_run`: rest poses, releases, runs with all cables taut.
 
-Compiled functions are cached beside the files. The cache of a caller does not notice a change in
-another file that it compiled in: delete `__pycache__` after editing compiled functions.
+Compiled functions are cached in `__pycache__`, in a folder named after the source of all of them:
+numba itself would not notice a change in another file that a function has compiled in.
 """
+
+import hashlib
+from pathlib import Path
+
+import numba
+
+_HERE = Path(__file__).parent
+_COMPILED = ("geometry", "forces", "dynamics", "newton_euler", "equilibrium", "world")
+_SOURCE = b"".join((_HERE / f"{name}.py").read_bytes() for name in _COMPILED)
+_DIGEST = hashlib.sha256(_SOURCE).hexdigest()[:12]
+numba.config.CACHE_DIR = str(_HERE / "__pycache__" / f"compiled-{_DIGEST}")
