@@ -21,6 +21,8 @@ from cdpr.constrained import (
     applied_wrench,
     held_motion,
     length_change,
+    length_rates,
+    stretches,
     total_inertia,
 )
 from cdpr.effects import Instant, Parameter, effect_named
@@ -57,8 +59,8 @@ class Model:
     """One robot with a set of effects, as functions of time t, zeta, rates, inertia and values.
 
     Lengths, cables, energies and what follows from the pose alone serve any number of cables.
-    With six cables or more there is no free motion: `acceleration`, and with effects that need
-    tensions `told` and `slip`, raise a ValueError when they are used.
+    With six cables or more there is no free motion: `acceleration`, and with cables stretched by
+    their tension `told` and `slip`, raise a ValueError when they are used.
 
     Attributes:
         robot: what the model was built from.
@@ -337,12 +339,9 @@ def _winch_functions(
 ) -> dict[str, Function]:
     """What the winches would tell, and how fast a state breaks it."""
     lengths = ca.vertcat(*[cable.length for cable in instant.cables])
-    rates = ca.vertcat(
-        *[ca.dot(cable.direction, instant.velocity_of(cable)) for cable in instant.cables]
-    )
     return {
         "told": _function("told", s.named, {"told": lengths - change}),
-        "slip": _function("slip", s.named, {"slip": rates - change_rate}),
+        "slip": _function("slip", s.named, {"slip": length_rates(instant) - change_rate}),
     }
 
 
@@ -352,7 +351,7 @@ def _refused(robot: Robot, s: _Symbols, instant: Instant, owned: Owned) -> dict[
         f"{n} cables hold the platform: with {LARGEST_SWINGING} or fewer it swings freely; use "
         "lengths, cables, lagrangian or pulled (given tensions) instead"
     )
-    if any(effect.needs_tension for effect, _ in owned):
+    if stretches(owned):
         return {"acceleration": refused, "told": refused, "slip": refused}
     change, change_rate, _ = length_change(robot, instant, owned, needs_tension=False)
     return {"acceleration": refused} | _winch_functions(s, instant, change, change_rate)

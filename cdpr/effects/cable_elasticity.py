@@ -10,7 +10,7 @@ from cdpr.robot import Robot
 
 
 class CableElasticity(Effect):
-    """Each cable is longer by compliance x length x specific tension.
+    """Each cable is stretched by its tension: strain = compliance x specific tension.
 
     The parameter is the platform's mass over the axial stiffness EA, since free motion gives
     tensions per mass: 8 kg on EA = 100 kN is 8e-5 s^2/m.
@@ -25,9 +25,10 @@ class CableElasticity(Effect):
         return (Parameter("mass_over_stiffness_s2_m", 0.0, 0.01, 2e-4),)
 
     def length_change(self, robot: Robot, instant: Instant, values: Expression) -> Expression:
-        """Hooke's law on the whole cable length."""
+        """Hooke's law on the whole cable from D, of which the stretched length is known."""
         lengths = ca.vertcat(*[cable.length for cable in instant.cables])
-        return values[0] * lengths * instant.tensions
+        strains = values[0] * instant.tensions
+        return lengths * strains / (1 + strains)
 
 
 EFFECT = CableElasticity()

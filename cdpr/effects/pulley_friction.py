@@ -26,6 +26,8 @@ class PulleyFriction(Effect):
         """Sum over the cables, r being the wrapped length over the wrap's angle."""
         total = ca.SX.zeros(6)
         for index, cable in enumerate(instant.cables):
+            if cable.is_eyelet:
+                continue
             radius = (cable.length - cable.straight) / (ca.pi - cable.wrap)
             sign = ca.tanh(instant.rate_of(cable.wrap) / SMOOTHING_RAD_S)
             effort = values[0] * radius * instant.tensions[index] * sign

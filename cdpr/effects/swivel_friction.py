@@ -22,7 +22,7 @@ class SwivelFriction(Effect):
         return (Parameter("torque_m2_s2", 0.0, 0.1, 0.002),)
 
     def generalised_force(self, instant: Instant, values: Expression) -> Expression:
-        """Sum over the cables of the torque against the swivel rate."""
+        """Sum over the pulleys of the torque against the swivel rate; eyelets do not swivel."""
         return sum(
             (
                 instant.against(
@@ -30,6 +30,7 @@ class SwivelFriction(Effect):
                     values[0] * ca.tanh(instant.rate_of(cable.swivel) / SMOOTHING_RAD_S),
                 )
                 for cable in instant.cables
+                if not cable.is_eyelet
             ),
             ca.SX.zeros(6),
         )

@@ -20,11 +20,12 @@ class SwivelViscous(Effect):
         return (Parameter("rate_m2_s", 0.0, 1.0, 0.01),)
 
     def generalised_force(self, instant: Instant, values: Expression) -> Expression:
-        """Sum over the cables of the torque against the swivel rate."""
+        """Sum over the pulleys of the torque against the swivel rate; eyelets do not swivel."""
         return sum(
             (
                 instant.against(cable.swivel, values[0] * instant.rate_of(cable.swivel))
                 for cable in instant.cables
+                if not cable.is_eyelet
             ),
             ca.SX.zeros(6),
         )

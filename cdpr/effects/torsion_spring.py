@@ -10,7 +10,11 @@ from cdpr.robot import Robot
 
 
 class TorsionSpring(Effect):
-    """Torque moment - stiffness chi about the base frame's z axis, over the mass."""
+    """Potential stiffness heading^2 / 2 - moment heading, over the mass.
+
+    The heading is that of the platform's x axis about the base frame's z axis: equal to chi when
+    phi and theta are zero, and continuous through +-180 degrees.
+    """
 
     name = "torsion_spring"
     summary = "a torsional spring in yaw"
@@ -22,9 +26,13 @@ class TorsionSpring(Effect):
             Parameter("moment_m2_s2", -1.0, 1.0, 0.01),
         )
 
-    def wrench(self, instant: Instant, values: Expression) -> Expression:
-        """Pure torque in yaw."""
-        return instant.torque(ca.vertcat(0, 0, values[1] - values[0] * instant.zeta[5]))
+    def generalised_force(self, instant: Instant, values: Expression) -> Expression:
+        """The potential's gradient, so that the spring keeps energy at any tilt."""
+        chi, turn = instant.zeta[5], instant.rotation
+        ahead = turn[0, 0] * ca.cos(chi) + turn[1, 0] * ca.sin(chi)
+        aside = turn[1, 0] * ca.cos(chi) - turn[0, 0] * ca.sin(chi)
+        heading = chi + ca.atan2(aside, ahead)
+        return instant.against(heading, values[0] * heading - values[1])
 
 
 EFFECT = TorsionSpring()
