@@ -1,7 +1,8 @@
 """Calibration boards: their numbers, corner coordinates and Kalibr's yaml.
 
 Board frame: x along the columns, y along the rows as the corners are counted, origin at the
-middle of the corners, z = 0 on the print. Corners are numbered as the detectors report them.
+middle of the corners, z = 0 on the print. A ChArUco board and an AprilGrid are known by the corners
+of their tags, four a tag, TL TR BR BL; a chessboard by its inner corners, row by row.
 """
 
 from __future__ import annotations
@@ -63,29 +64,54 @@ class Board:
     @property
     def points_m(self) -> Array:
         """Corners in the board frame, (n, 3)."""
-        if self.kind == "aprilgrid":
-            plane = self._grid_corners()
-        else:
-            less = 1 if self.kind == "charuco" else 0
-            plane = _lattice(self.columns - less, self.rows - less) * self.square_m
+        plane = {
+            "charuco": self._charuco_corners,
+            "chessboard": self._inner_corners,
+            "aprilgrid": self._grid_corners,
+        }[self.kind]()
         plane = plane - 0.5 * (plane.min(axis=0) + plane.max(axis=0))
         return np.column_stack([plane, np.zeros(len(plane))])
 
     @property
-    def lattice(self) -> np.ndarray:
-        """Column and row of every corner, whole numbers, (n, 2)."""
+    def n_tags(self) -> int:
+        """Tags on the board, their ids being 0 ... n_tags - 1."""
         if self.kind == "aprilgrid":
-            tag = _lattice(self.columns, self.rows).astype(int)[:, None, :]
-            return (2 * tag + np.array([[0, 1], [1, 1], [1, 0], [0, 0]])).reshape(-1, 2)
-        less = 1 if self.kind == "charuco" else 0
-        return _lattice(self.columns - less, self.rows - less).astype(int)
+            return self.columns * self.rows
+        return self.columns * self.rows // 2 if self.kind == "charuco" else 0
 
     @property
     def edges(self) -> np.ndarray:
-        """Pairs of neighbouring corners, whose distance is known, (m, 2)."""
-        step = np.abs(self.lattice[:, None] - self.lattice[None]).sum(axis=-1)
-        first, second = np.nonzero(np.triu(step == 1))
-        return np.column_stack([first, second])
+        """Pairs of corners near each other, whose distance is known, (m, 2)."""
+        if self.kind == "chessboard":
+            index = np.arange(self.columns * self.rows).reshape(self.rows, self.columns)
+            right = np.stack([index[:, :-1].ravel(), index[:, 1:].ravel()], axis=-1)
+            down = np.stack([index[:-1].ravel(), index[1:].ravel()], axis=-1)
+            return np.concatenate([right, down])
+        tag = 4 * np.arange(self.n_tags)
+        sides = [np.stack([tag + k, tag + (k + 1) % 4], axis=-1) for k in range(4)]
+        across = [np.stack([tag[:-1] + k, tag[1:] + k], axis=-1) for k in range(4)]
+        pairs = np.concatenate(sides + across)
+        points = self.points_m
+        level = np.abs(points[pairs[:, 0], 1] - points[pairs[:, 1], 1]) < 1.01 * self.square_m
+        return pairs[level]
+
+    def _inner_corners(self) -> Array:
+        return _lattice(self.columns, self.rows) * self.square_m
+
+    def _charuco_corners(self) -> Array:
+        """Marker corners as OpenCV lays the markers out, y downwards, (4 n_tags, 2)."""
+        import cv2
+
+        dictionary = tag_dictionary(self.dictionary)
+        size = (self.columns, self.rows)
+        board = cv2.aruco.CharucoBoard(size, self.square_m, self.marker_m, dictionary)
+        board.setLegacyPattern(self.legacy)
+        middles = [np.mean(corners, axis=0)[:2] for corners in board.getObjPoints()]
+        # OpenCV holds single precision: put the middles back on the lattice
+        middle = np.repeat(np.floor(np.array(middles) / self.square_m) + 0.5, 4, axis=0)
+        middle = middle * self.square_m
+        turn = 0.5 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+        return middle + self.marker_m * np.tile(turn, (len(middle) // 4, 1))
 
     def _grid_corners(self) -> Array:
         """Tag corners TL TR BR BL; id 0 bottom left, ids along x, y upwards (Kalibr)."""

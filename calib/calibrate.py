@@ -15,12 +15,15 @@ from calib.calibration_result import FORMAT, camera_entries, covariance_entry
 from calib.camera import Camera
 from calib.camera_models import Array
 from calib.cameras_file import write_cameras
+from calib.clocks import board_moves, coarse_offsets_s
+from calib.intrinsics import CameraStart
 from calib.recordings import find_recordings
 from calib.rig import Rig, solve_rig, start_cameras, tie_to_base
 from calib.sightings import Sightings, gather, see_boards
 from calib.survey_check import SurveyCheck, check_survey
 from calib.trust import Verdict, judge
 from calib.truth_checks import check_truth
+from calib.views import Views
 from cdpr.documents import DataError, write_json
 
 Progress = Callable[[str, float], None]
@@ -134,15 +137,26 @@ def _board_rig(
                 "check the board's kind and numbers in session.toml, focus and light"
             )
     views, times = gather(sightings, frame_rate_hz)
-    starts = start_cameras(
-        tuple(camera.name for camera in sightings),
-        tuple(camera.size_px for camera in sightings),
-        (model,) * len(sightings),
-        board.points_m,
-        views,
-    )
+    starts = _starts(sightings, board, model, views)
+    offsets = np.zeros(len(sightings))
+    moving = board_moves(views.velocity_px_s, views.camera, len(sightings))
+    if moving:
+        stamps = tuple(times[start.views.moment] + start.views.lag_s for start in starts)
+        offsets = coarse_offsets_s(starts, stamps)
+        views, times = gather(sightings, frame_rate_hz, offsets)
+        views = views.select(np.abs(views.velocity_px_s).max(axis=(1, 2)) > 0.0)
+        starts = _starts(sightings, board, model, views)
     alone = np.array([start.rms_px for start in starts])
-    return solve_rig(board.points_m, starts), alone, len(times)
+    rig = solve_rig(board.points_m, starts, offsets, clocks=moving)
+    return rig, alone, len(times)
+
+
+def _starts(
+    sightings: tuple[Sightings, ...], board: Board, model: str, views: Views
+) -> tuple[CameraStart, ...]:
+    names = tuple(camera.name for camera in sightings)
+    sizes = tuple(camera.size_px for camera in sightings)
+    return start_cameras(names, sizes, (model,) * len(names), board.points_m, views)
 
 
 def _moved_warnings(moved: tuple[tuple[str, float], ...]) -> list[str]:

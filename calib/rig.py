@@ -21,6 +21,7 @@ VIEW_OUTLIER_SIGMAS = 5.0
 VIEW_OUTLIER_FLOOR_PX = 0.5
 CORNER_OUTLIER_SIGMAS = 6.0
 _LEAST_CORNERS = 4
+LINE_TIME_SIGMAS = 5.0
 _MOST_SWEEPS = 3
 _SURVEY_ROUNDS = 3
 _SURVEY_PRIOR = 2.0
@@ -65,21 +66,55 @@ def start_cameras(
     )
 
 
-def solve_rig(board_points_m: Array, starts: tuple[CameraStart, ...]) -> Rig:
+def solve_rig(
+    board_points_m: Array,
+    starts: tuple[CameraStart, ...],
+    offsets_s: Array | None = None,
+    *,
+    clocks: bool = False,
+) -> Rig:
     """All cameras and board poses at once, in the frame of the reference camera.
+
+    Args:
+        board_points_m: the board's corners, (n_points, 3).
+        starts: every camera on its own; equal moments of two cameras are simultaneous.
+        offsets_s: clock offsets to start from, (n_cameras,).
+        clocks: whether clocks are estimated (the board moves); time is then the first camera's.
 
     Raises:
         DataError: when the cameras do not share enough views.
     """
     views = _joined([start.views for start in starts])
     poses = np.concatenate([start.T_camera_boards for start in starts])
-    cameras = tuple(start.camera for start in starts)
+    offsets = np.zeros(len(starts)) if offsets_s is None else offsets_s
+    cameras = tuple(
+        replace(start.camera, clock_offset_s=float(offset))
+        for start, offset in zip(starts, offsets, strict=True)
+    )
     views, _ = views.compacted()
     start = start_rig(cameras, board_points_m, views, poses)
-    free = free_unknowns(cameras, held_pose=start.reference)
+    free = free_unknowns(cameras, held_pose=start.reference, clocks=clocks)
     dropped = tuple(drop for camera in starts for drop in camera.dropped)
     problem = Problem(board_points_m, views, None, free)
-    return refine(start.scene, problem, start.reference, dropped)
+    rig = refine(start.scene, problem, start.reference, dropped)
+    return _without_idle_lines(rig) if clocks else rig
+
+
+def _without_idle_lines(rig: Rig) -> Rig:
+    """Hold line times at zero where they do not stand out: most cameras have a global shutter."""
+    free, scene = rig.problem.free.copy(), rig.adjustment.scene
+    cameras = list(scene.cameras)
+    for index, own in enumerate(camera_slices(scene.cameras)):
+        last = own.stop - 1
+        std = float(np.sqrt(rig.adjustment.covariance[last, last]))
+        if free[last] and abs(cameras[index].line_time_s) < LINE_TIME_SIGMAS * std:
+            free[last] = False
+            cameras[index] = replace(cameras[index], line_time_s=0.0)
+    if np.array_equal(free, rig.problem.free):
+        return rig
+    problem = replace(rig.problem, free=free)
+    start = replace(scene, cameras=tuple(cameras))
+    return refine(start, problem, rig.reference, rig.dropped, rig.n_trimmed)
 
 
 def free_unknowns(
@@ -89,15 +124,19 @@ def free_unknowns(
     n_fixed: int = 0,
     warp: bool = False,
     held_lenses: bool = False,
+    clocks: bool = False,
 ) -> np.ndarray:
-    """Which shared unknowns move: lenses, poses but one, warp if asked, base points; no clocks."""
+    """Which shared unknowns move: lenses, poses but one, base points, and warp if asked.
+
+    With `clocks` every line time is free, and every clock offset but the first camera's.
+    """
     slices = camera_slices(cameras)
     free = np.ones(slices[-1].stop + WARP + 3 * n_fixed, dtype=bool)
     for index, (camera, own) in enumerate(zip(cameras, slices, strict=True)):
         k = len(camera.params)
         free[own.start : own.start + k] = not held_lenses
         free[own.start + k : own.start + k + POSE] = index != held_pose
-        free[own.stop - CLOCK : own.stop] = False
+        free[own.stop - CLOCK : own.stop] = (clocks and index > 0, clocks)
     free[slices[-1].stop : slices[-1].stop + WARP] = warp
     return free
 
@@ -162,7 +201,10 @@ def tie_to_base(rig: Rig, fixed: FixedPoints, *, estimate_survey: bool = True) -
         estimate_survey: measure the survey's noise from how it fits, instead of taking it as given.
     """
     scene = place_in_base(rig.adjustment.scene, fixed)
-    free = free_unknowns(scene.cameras, n_fixed=len(fixed.points_base_m))
+    free = np.concatenate([rig.problem.free, np.ones(3 * len(fixed.points_base_m), dtype=bool)])
+    held = scene.cameras[rig.reference]
+    first = camera_slices(scene.cameras)[rig.reference].start + len(held.params)
+    free[first : first + POSE] = True
     problem = replace(rig.problem, fixed=fixed, free=free)
     result = adjust(scene, problem, rig.adjustment.sigma_px, rounds=1)
     for _ in range(_SURVEY_ROUNDS if estimate_survey else 1):

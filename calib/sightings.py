@@ -18,6 +18,7 @@ Progress = Callable[[str, float], None]
 
 MOST_FRAMES = 600
 BURST = 5
+LEAST_FLOW = 9
 _WORKERS = 2
 
 
@@ -118,7 +119,8 @@ def velocities(sightings: Sightings) -> Array:
     """Image velocity of every corner in px/s, NaN where the frames around do not tell.
 
     Five-point stencil where four neighbours exist, else the central difference; a neighbour that
-    does not continue the motion (a cut, a new pose) gives no velocity. (n, n_points, 2).
+    does not continue the motion (a cut, a new pose) gives no velocity. The moving plane's smooth
+    flow is then fitted to each view, which fills corners that a neighbour lost. (n, n_points, 2).
     """
     at = {int(number): row for row, number in enumerate(sightings.numbers)}
     pixels, stamps = sightings.pixels, sightings.stamps_s
@@ -131,16 +133,32 @@ def velocities(sightings: Sightings) -> Array:
         ahead, behind = pixels[after] - pixels[row], pixels[row] - pixels[before]
         if not (span > 0.0 and _continues(ahead, behind)):
             continue
-        result[row] = (pixels[after] - pixels[before]) / span
-        two_before, two_after = at.get(number - 2), at.get(number + 2)
-        if two_before is None or two_after is None:
-            continue
-        wide = (pixels[two_after] - pixels[two_before]) / (stamps[two_after] - stamps[two_before])
         near = (pixels[after] - pixels[before]) / span
-        finer = (4.0 * near - wide) / 3.0
-        smooth = np.isfinite(finer) & (np.abs(wide - near) < 0.3 * np.abs(near) + 3.0 / span)
-        result[row] = np.where(smooth, finer, result[row])
+        two_before, two_after = at.get(number - 2), at.get(number + 2)
+        if two_before is not None and two_after is not None:
+            span = stamps[two_after] - stamps[two_before]
+            wide = (pixels[two_after] - pixels[two_before]) / span
+            finer = (4.0 * near - wide) / 3.0
+            smooth = np.abs(wide - near) < 0.3 * np.abs(near) + 6.0 / span
+            if np.where(np.isfinite(finer), smooth, True).all():
+                near = finer if np.isfinite(finer[:, 0]).sum() >= LEAST_FLOW else near
+        result[row] = _plane_flow(pixels[row], near)
     return result
+
+
+def _plane_flow(pixels: Array, velocity: Array) -> Array:
+    """Velocity of all seen corners by a quadratic field fitted to the known ones; NaN if too few.
+
+    The image velocity of a moving plane is a quadratic in the pixel (Longuet-Higgins 1984).
+    """
+    known = np.isfinite(velocity[:, 0] + pixels[:, 0])
+    if known.sum() < LEAST_FLOW:
+        return np.full_like(velocity, np.nan)
+    scaled = (pixels - np.nanmean(pixels, axis=0)) / np.nanstd(pixels, axis=0)
+    x, y = scaled[:, 0], scaled[:, 1]
+    basis = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=-1)
+    weights, *_ = np.linalg.lstsq(basis[known], velocity[known], rcond=None)
+    return np.asarray(basis @ weights, dtype=np.float64)
 
 
 def _continues(ahead: Array, behind: Array) -> bool:
@@ -148,22 +166,36 @@ def _continues(ahead: Array, behind: Array) -> bool:
     bend = np.linalg.norm(ahead - behind, axis=-1)
     step = np.linalg.norm(ahead + behind, axis=-1)
     known = np.isfinite(bend)
-    return bool(known.sum() >= 4 and np.median(bend[known]) < 0.35 * np.median(step[known]) + 1.0)
+    if known.sum() < LEAST_FLOW:
+        return False
+    return bool(np.median(bend[known]) < 0.35 * np.median(step[known]) + 1.0)
 
 
 def gather(
-    all_sightings: tuple[Sightings, ...], frame_rate_hz: float | None
+    all_sightings: tuple[Sightings, ...],
+    frame_rate_hz: float | None,
+    offsets_s: Array | None = None,
 ) -> tuple[Views, Array]:
     """Put simultaneous frames of the cameras together.
 
     Frames are matched by stamps to within half a frame where every camera has its own stamps,
     else by frame number.
 
+    Args:
+        all_sightings: one a camera.
+        frame_rate_hz: nominal rate, None when unknown.
+        offsets_s: what is known of each camera's clock offset, zero when None.
+
     Returns:
-        The views, and the time of every moment, NaN when stamps are unknown, (n_moments,).
+        The views, and the base time of every moment, NaN when stamps are unknown, (n_moments,).
+        A view's lag is its own stamp minus that time, so it holds the clock offset too.
     """
     stamped = all(np.isfinite(s.stamps_s).all() for s in all_sightings)
-    keys = [s.stamps_s if stamped else s.numbers.astype(float) for s in all_sightings]
+    offsets = np.zeros(len(all_sightings)) if offsets_s is None or not stamped else offsets_s
+    keys = [
+        s.stamps_s + offset if stamped else s.numbers.astype(float)
+        for s, offset in zip(all_sightings, offsets, strict=True)
+    ]
     joined = np.concatenate(keys) if keys else np.zeros(0)
     reach = 0.5 / frame_rate_hz if stamped and frame_rate_hz else _half_step(keys)
     order = np.argsort(joined, kind="stable")
@@ -176,7 +208,7 @@ def gather(
     count = current + 1
     times = np.bincount(group, joined, count) / np.maximum(np.bincount(group, minlength=count), 1)
     camera = np.repeat(np.arange(len(keys)), [len(key) for key in keys])
-    lag = joined - times[group] if stamped else np.zeros(len(joined))
+    lag = joined - offsets[camera] - times[group] if stamped else np.zeros(len(joined))
     _, first = np.unique(np.stack([camera, group]), axis=1, return_index=True)
     views = make_views(
         camera,

@@ -60,7 +60,7 @@ def judge(
         survey: base tags against the rig, None without.
         alone_px: what each camera reached on its own, each axis, (n_cameras,).
     """
-    reasons: list[str] = list(survey.reasons) if survey else []
+    reasons: list[str] = []
     warnings: list[str] = []
     by_camera = []
     for index in range(len(rig.cameras)):
@@ -70,6 +70,7 @@ def judge(
         entry = _judge_camera(rig, index, coverage, truth, alone_px, reasons, warnings)
         by_camera.append(entry)
     _judge_rig(rig, truth, reasons, warnings)
+    reasons += survey.reasons if survey else ()
     checks = {
         "length_bias": truth.length_bias,
         "length_rms_m": truth.length_rms_m,
