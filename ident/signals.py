@@ -33,6 +33,7 @@ from ident.window import free_window
 
 Processing = Literal["centred", "authors"]
 _ANGLES = ("phi", "theta", "chi")
+_UNUSUAL = 8.0  # times the median extrapolation error that a step must exceed
 _LEAST_OUTPUTS = 10
 _LEVER_M = 0.2  # makes angles comparable to metres where only their relative size matters
 
@@ -234,6 +235,10 @@ def _jumps(
     angular = np.array([name in _ANGLES for name in coordinates])
     limit = np.where(angular, settings.jump_limit_rad, settings.jump_limit_m)
     limit = np.fmax(limit, 8.0 * gain * white_noise_std(filled))
+    # A slowly sampled swing outruns the extrapolation everywhere; a step does so once.
+    known = np.isfinite(sizes).all(axis=1)
+    if known.any():
+        limit = np.fmax(limit, _UNUSUAL * np.median(np.abs(sizes[known]), axis=0))
     magnitude = np.where(np.isfinite(sizes), np.abs(sizes), 0.0) / limit
     worst = magnitude.max(axis=1)
     # One step is felt by several neighbouring estimates: its place is the largest of them.
