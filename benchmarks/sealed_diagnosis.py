@@ -1,0 +1,146 @@
+"""The diagnosis on sealed sessions: what it names, what it misses, what it claims on clean data.
+
+    python benchmarks/sealed_diagnosis.py OUT --tier quick --only drag
+
+makes the sessions of benchmarks/sealed_sessions.py in OUT (those that are not there), runs
+`freeswing diagnose` on each as a user would, and prints the confusion matrix, the false alarms,
+the smallest size found of each effect, and prediction errors before and after beside the noise.
+A session that has a result is not run again. Figures go to OUT/sealed_diagnosis.json too.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+import time
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[1]
+for place in (ROOT, ROOT / "benchmarks"):
+    if str(place) not in sys.path:
+        sys.path.insert(0, str(place))
+
+from sealed_sessions import made, selected  # noqa: E402
+from tests.oracle.cases import TIERS, Case  # noqa: E402
+
+FLOOR_FACTOR = 1.5
+TIMEOUT_S = 1800
+
+
+def diagnosed(case: Case, root: Path) -> dict[str, Any]:
+    """One case's row: its result, made unless it is there."""
+    made(case, root, with_visibility=False)
+    folder = root / case.name
+    result, timing = folder / "results" / "diagnosis.json", folder / "truth" / "diagnosis_s.json"
+    if not result.exists() or not timing.exists():
+        start = time.perf_counter()
+        command = [sys.executable, "-m", "freeswing", "diagnose", str(folder)]
+        done = subprocess.run(
+            command, capture_output=True, text=True, timeout=TIMEOUT_S, check=False
+        )
+        if done.returncode:
+            return {"case": case.name, "kind": case.kind, "failed": done.stderr.strip()[-300:]}
+        timing.write_text(json.dumps(time.perf_counter() - start))
+    document = json.loads(result.read_text())
+    return judged(case, document, json.loads(timing.read_text()))
+
+
+def judged(case: Case, document: dict[str, Any], seconds: float) -> dict[str, Any]:
+    """How a result compares with what was put in."""
+    named = [{entry["effect"], *entry.get("confounded_with", [])} for entry in document["accepted"]]
+    truth = [name for name, _ in case.effects]
+    found = [name for name in truth if any(name in group for group in named)]
+    wrong = [sorted(group) for group in named if not group & set(truth)]
+    after, before = document["after"], document["before"]
+    floor = after["noise_floor_m"]
+    return {
+        "case": case.name,
+        "kind": case.kind,
+        "effects": list(case.effects),
+        "accepted": [sorted(group) for group in named],
+        "found": found,
+        "wrong": wrong,
+        "unexplained": document["unexplained"]["present"],
+        "before_over_floor": before["prediction_rmse_m"] / floor,
+        "after_over_floor": after["prediction_rmse_m"] / floor,
+        "seconds": seconds,
+    }
+
+
+def right(row: dict[str, Any]) -> bool:
+    """Whether a case was answered as it should be."""
+    if "failed" in row:
+        return False
+    if row["kind"] == "outside":
+        return row["unexplained"] or not row["accepted"]
+    return len(row["found"]) == len(row["effects"]) and not row["wrong"]
+
+
+def line(row: dict[str, Any]) -> str:
+    """One line of the table."""
+    if "failed" in row:
+        return f"{row['case']:66s} FAILED {row['failed']}"
+    answer = "; ".join("/".join(group) for group in row["accepted"]) or "none"
+    rest = " + unexplained" if row["unexplained"] else ""
+    return (
+        f"{row['case']:66s} {'ok ' if right(row) else 'NO '} "
+        f"{row['before_over_floor']:8.2f} {row['after_over_floor']:8.2f} "
+        f"{row['seconds']:6.0f} {answer}{rest}"
+    )
+
+
+def summary(rows: list[dict[str, Any]]) -> list[str]:
+    """Confusion matrix, false alarms, smallest sizes and floors, as lines."""
+    lines = ["", "put in -> named (single effects; how often):"]
+    pairs = Counter(
+        (row["effects"][0][0], "/".join(sum(row["accepted"], [])) or "none")
+        for row in rows
+        if row["kind"] == "single" and "failed" not in row
+    )
+    lines += [
+        f"  {put:24s} -> {named:60s} {count}" for (put, named), count in sorted(pairs.items())
+    ]
+    clean = [row for row in rows if row["kind"] == "clean" and "failed" not in row]
+    alarms = sum(bool(row["accepted"]) for row in clean)
+    lines.append(f"false alarms on clean sessions: {alarms} of {len(clean)}")
+    smallest: dict[str, str] = {}
+    for row in rows:
+        if row["kind"] == "single" and "failed" not in row:
+            name, size = row["effects"][0]
+            order = ("small", "medium", "large")
+            if row["found"] and order.index(size) <= order.index(smallest.get(name, "large")):
+                smallest[name] = size
+            smallest.setdefault(name, "large") if row["found"] else None
+    lines.append("smallest size found: " + ", ".join(f"{k} {v}" for k, v in smallest.items()))
+    held = [row for row in rows if row.get("effects") and row["kind"] in ("single", "pair")]
+    near = sum(row["after_over_floor"] <= FLOOR_FACTOR for row in held if "failed" not in row)
+    lines.append(f"prediction within {FLOOR_FACTOR} times the noise after: {near} of {len(held)}")
+    for kind in ("clean", "single", "pair", "outside"):
+        of_kind = [row for row in rows if row["kind"] == kind]
+        if of_kind:
+            lines.append(f"right answers, {kind}: {sum(map(right, of_kind))} of {len(of_kind)}")
+    return lines
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Make, diagnose and judge the sessions."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("out", type=Path)
+    parser.add_argument("--tier", choices=TIERS, default="quick")
+    parser.add_argument("--only", help="cases whose name holds this")
+    options = parser.parse_args(arguments)
+    rows = []
+    print(f"{'case':66s} ok?   before    after      s answer (errors over the noise floor)")
+    for case in selected(options.tier, options.only):
+        rows.append(diagnosed(case, options.out))
+        print(line(rows[-1]), flush=True)
+    print("\n".join(summary(rows)))
+    (options.out / "sealed_diagnosis.json").write_text(json.dumps(rows, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()
