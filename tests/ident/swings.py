@@ -80,3 +80,15 @@ def lengths_of(motion: Motion) -> Array:
     from cdpr.batch import evaluate
 
     return evaluate(motion.model.lengths, motion.zetas[0], motion.values)[0]
+
+
+@cache
+def tilted_swing(equilibrium: int, tilt_rad: float = 0.08, duration_s: float = 10.0) -> Motion:
+    """A release at rest from a tilted pose: also where x and y do not settle the pose."""
+    model = paper_model()
+    lengths = PAPER_LENGTHS_M[equilibrium]
+    rest = taut_equilibrium(model, lengths, TRUE_INERTIA, f"equilibrium {equilibrium}").zeta
+    share = np.linspace(0.0, 1.0, 40)[:, None]
+    path = rest[3:5] + share * tilt_rad * np.array([0.7, 1.0])
+    start = assemble(model, ("phi", "theta"), lengths, path, rest).zetas[-1]
+    return simulate(model, start, np.zeros(6), (0.0, duration_s), TRUE_INERTIA)
