@@ -25,6 +25,7 @@ for place in (ROOT, ROOT / "benchmarks"):
         sys.path.insert(0, str(place))
 
 from sealed_sessions import made, selected  # noqa: E402
+
 from tests.oracle.cases import TIERS, Case  # noqa: E402
 
 FLOOR_FACTOR = 1.5
@@ -97,7 +98,7 @@ def summary(rows: list[dict[str, Any]]) -> list[str]:
     """Confusion matrix, false alarms, smallest sizes and floors, as lines."""
     lines = ["", "put in -> named (single effects; how often):"]
     pairs = Counter(
-        (row["effects"][0][0], "/".join(sum(row["accepted"], [])) or "none")
+        (row["effects"][0][0], "/".join(n for group in row["accepted"] for n in group) or "none")
         for row in rows
         if row["kind"] == "single" and "failed" not in row
     )
