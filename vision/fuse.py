@@ -107,7 +107,7 @@ def fuse(
             noise = floors / np.array([v.camera.focal_px.mean() for v in views])
             _solve(
                 block, views, instants_s[span], poses.motions[span], noise, start_position,
-                start_rotation, can, covariances[span], account,
+                start_rotation, can, covariances[span], account, free_of(watch),
             )  # fmt: skip
             positions[span] = np.where(can[:, None], start_position, np.nan)
             rotations[span] = np.where(can[:, None, None], start_rotation, np.nan)
@@ -125,6 +125,11 @@ def fuse(
         if floor_px is None:
             floors = account.floors()
     return poses, fit
+
+
+def free_of(watch: Watch) -> int:
+    """6 where the target gives a pose, 3 where it is a reference point alone."""
+    return 6 if watch.platform_points >= 3 else 3
 
 
 def motion_of_poses(times_s: Array, positions: Array, rotations: Array, known: Mask) -> Array:
@@ -223,6 +228,7 @@ def _solve(
     known: Mask,
     covariances: Array,
     account: _Account,
+    free: int,
 ) -> None:
     instant = np.repeat(np.arange(len(instants_s)), np.diff(block.starts))
     lags = np.ascontiguousarray(block.times_s - instants_s[instant][:, None])
@@ -230,7 +236,7 @@ def _solve(
     scores = np.full(len(block.things), -1.0)
     cameras = camera_matrices(views)
     solve_block(
-        block.starts, rotations, positions, known, np.ascontiguousarray(motions), 6, cameras,
+        block.starts, rotations, positions, known, np.ascontiguousarray(motions), free, cameras,
         block.camera_of, block.points, block.rays, white, lags, block.counts, _ROBUST_LIMIT,
         covariances, scores,
     )  # fmt: skip

@@ -19,6 +19,8 @@ _LEAST_PIXELS = 4
 _MOST_SIDE_PX = 80
 _LEAST_CONTRAST = 30.0
 _LEAST_FILL = 0.55
+_EDGE_LEVEL = 0.35
+_CENTRE_FLOOR_PX = 0.01
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +77,7 @@ def _is_near(centre: Array, near_px: Array) -> bool:
 
 
 def _centroid(image: Image, camera: Camera, box: tuple[int, int, int, int]) -> Blob | None:
-    """Light-weighted centre over the box and its margin, background from the margin's rim."""
+    """Light-weighted centre over the box and its margin, background from its outermost pixels."""
     left, top, width, height = box
     x0, y0 = left - _MARGIN, top - _MARGIN
     x1, y1 = left + width + _MARGIN, top + height + _MARGIN
@@ -85,19 +87,25 @@ def _centroid(image: Image, camera: Camera, box: tuple[int, int, int, int]) -> B
     rim = np.concatenate([part[0], part[-1], part[1:-1, 0], part[1:-1, -1]])
     background = float(np.median(rim))
     noise = max(1.4826 * float(np.median(np.abs(rim - background))), 0.5)
-    light = part - background
+    peak = float(np.percentile(part, 100.0 * (1.0 - 0.2 * width * height / part.size)))
+    # Weights start a third up the edge: what lies behind the ball has no say.
+    light = np.maximum(part - background - _EDGE_LEVEL * (peak - background), 0.0)
     v, u = np.mgrid[y0:y1, x0:x1].astype(np.float64)
-    near = np.hypot(u - (x0 + x1 - 1) / 2, v - (y0 + y1 - 1) / 2) < max(width, height) / 2 + 3
-    light = np.where(near, light, 0.0)
+    reach = max(width, height) / 2 + 2
+    light[np.hypot(u - (x0 + x1 - 1) / 2, v - (y0 + y1 - 1) / 2) > reach] = 0.0
     total = float(light.sum())
     if total <= 0.0:
         return None
     centre = np.array([(u * light).sum(), (v * light).sum()]) / total
-    spread = np.stack([u - centre[0], v - centre[1]], axis=-1)[near]
-    covariance_px = noise**2 * spread.T @ spread / total**2 + 1e-4 * np.eye(2)
-    ray = camera.normalise(centre)
-    if not np.isfinite(ray).all():
+    spread = np.stack([u - centre[0], v - centre[1]], axis=-1)[light > 0.0]
+    covariance_px = noise**2 * spread.T @ spread / total**2 + _CENTRE_FLOOR_PX**2 * np.eye(2)
+    rays = camera.normalise(np.stack([u, v], axis=-1))
+    if not np.isfinite(rays).all():
         return None
+    # An outline's middle is an area's centre on the plane z = 1, not in the bent image.
+    across, down = np.gradient(rays, axis=1), np.gradient(rays, axis=0)
+    weight = light * np.abs(across[..., 0] * down[..., 1] - across[..., 1] * down[..., 0])
+    ray = (rays * weight[..., None]).sum(axis=(0, 1)) / weight.sum()
     slope = camera.project_jacobian(np.append(ray, 1.0))[1][:, :2]
     back = np.linalg.inv(slope)
     covariance = back @ covariance_px @ back.T

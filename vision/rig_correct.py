@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from cdpr.rotation import log_rotation
 from vision.fuse import Fit, Poses, fuse
+from vision.label import label_markers
 from vision.rig_effects import (
     LEAST_CLOCK_S,
     LEAST_LINE_S,
@@ -22,7 +23,6 @@ from vision.rig_effects import (
     RigStep,
     applied,
     moved_cameras,
-    replace_camera,
     repose_by_base_tags,
     rig_step,
 )
@@ -68,14 +68,17 @@ def correct_rig(
         look: False leaves the cameras as calibrated.
     """
     instants = instants_of(views)
-    poses, before = fuse(views, watch, instants)
+    start = None
+    if watch.markers and len(instants):
+        views, start = label_markers(views, watch, instants)
+    poses, before = fuse(views, watch, instants, start=start)
     if not look or int(poses.known.sum()) < _LEAST_KNOWN:
         return Corrected(tuple(views), poses, before, before, ())
     moved = moved_cameras(views, watch)
     current = list(views)
     for index in moved:
-        current[index] = replace_camera(
-            views[index], repose_by_base_tags(views[index], watch, survey_std_m)
+        current[index] = views[index].believed(
+            repose_by_base_tags(views[index], watch, survey_std_m)
         )
     clocks, lines, last = _estimate(current, watch, instants, moved, survey_std_m, poses)
     if not (moved or clocks.any() or lines.any()):
@@ -84,7 +87,7 @@ def correct_rig(
         _decided(view, calibrated, clock, line)
         for view, calibrated, clock, line in zip(current, views, clocks, lines, strict=True)
     ]
-    poses, after = fuse(final, watch, instants_of(final))
+    poses, after = fuse(final, watch, instants_of(final), start=_restarted(final, watch, start))
     findings = _findings(views, final, moved, clocks, lines, last)
     return Corrected(tuple(final), poses, before, after, findings)
 
@@ -112,6 +115,7 @@ def _estimate(
     trial = rig_step(current, watch, poses, fit, with_lines, survey_std_m)
     lines = trial.changes[:, LINE]
     real = np.abs(lines) > np.maximum(LEAST_LINE_S, _SIGMAS * trial.deviations[:, LINE])
+    real &= np.abs(lines) < _longest_lines(current)
     if real.any():
         free[:, LINE] = real
         step = _iterate(current, watch, poses, fit, free, total, survey_std_m)
@@ -143,6 +147,22 @@ def _iterate(
     return step
 
 
+def _longest_lines(views: Sequence[CameraViews]) -> Array:
+    """No image takes longer to read than the time to the next one, (n_c,) in s a row."""
+    steps = [np.diff(v.stamps_s[np.isfinite(v.stamps_s)]) for v in views]
+    return np.array(
+        [
+            float(np.median(step)) / v.camera.size_px[1] if len(step) else 0.0
+            for step, v in zip(steps, views, strict=True)
+        ]
+    )
+
+
+def _restarted(views: Sequence[CameraViews], watch: Watch, start: Poses | None) -> Poses | None:
+    """Rough poses at the instants of the corrected clocks, where markers alone gave them."""
+    return None if start is None else label_markers(views, watch, instants_of(views))[1]
+
+
 def _reference(views: Sequence[CameraViews]) -> int:
     return int(np.argmax([len(v.numbers) for v in views]))
 
@@ -156,7 +176,7 @@ def _decided(view: CameraViews, calibrated: CameraViews, clock: float, line: flo
         clock_offset_s=calibrated.camera.clock_offset_s + float(clock),
         line_time_s=calibrated.camera.line_time_s + float(line),
     )
-    return replace_camera(view, camera)
+    return view.believed(camera)
 
 
 def _findings(

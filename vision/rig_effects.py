@@ -84,21 +84,13 @@ def repose_by_base_tags(view: CameraViews, watch: Watch, survey_std_m: float) ->
     """The camera's pose by its base tags alone: a start, good to some milliradians."""
     camera = view.camera
     for _ in range(10):
-        normal, right = base_equations(replace_camera(view, camera), watch, survey_std_m)
+        normal, right = base_equations(view.believed(camera), watch, survey_std_m)
         normal = normal + np.diag([1e2**2] * 3 + [1e-6] * 3)  # a knock turns more than it shifts
         step = np.asarray(np.linalg.solve(normal, right), dtype=np.float64)
         camera = moved_by(camera, step)
         if np.abs(step).max() < 1e-9:
             break
     return camera
-
-
-def replace_camera(view: CameraViews, camera: Camera) -> CameraViews:
-    """The same sightings by a camera that is believed to be different."""
-    copy = CameraViews(camera, ())
-    copy.paths, copy.numbers, copy.stamps_s = view.paths, view.numbers, view.stamps_s
-    copy.status, copy._bounds = view.status, view._bounds
-    return copy
 
 
 def base_equations(view: CameraViews, watch: Watch, survey_std_m: float) -> tuple[Array, Array]:
@@ -204,4 +196,4 @@ def applied(view: CameraViews, change: Array) -> CameraViews:
         clock_offset_s=camera.clock_offset_s + float(change[CLOCK]),
         line_time_s=camera.line_time_s + float(change[LINE]),
     )
-    return replace_camera(view, camera)
+    return view.believed(camera)

@@ -14,7 +14,7 @@ from calib.camera import Camera
 from cdpr.trajectory import Trajectory
 from cdpr.trajectory_files import write_csv
 from vision.follow import STATUS_NAMES, USED
-from vision.fuse import Fit, Poses
+from vision.fuse import Fit, Poses, free_of
 from vision.rig_correct import correct_rig
 from vision.rig_effects import Finding
 from vision.run_views import CameraViews
@@ -70,7 +70,7 @@ def track_run(
     poses = corrected.poses
     known = int(poses.known.sum())
     if known:
-        write_csv(csv, trajectory_of(poses))
+        write_csv(csv, trajectory_of(poses, watch))
     deviations = np.sqrt(np.diagonal(poses.covariances, axis1=1, axis2=2))
     steps = np.diff(poses.times_s)
     return RunTrack(
@@ -88,10 +88,21 @@ def track_run(
     )
 
 
-def trajectory_of(poses: Poses) -> Trajectory:
-    """The run's trajectory from its first to its last known pose, NaN in between."""
+def trajectory_of(poses: Poses, watch: Watch) -> Trajectory:
+    """The run's trajectory from its first to its last known pose, NaN in between.
+
+    A target of one or two points gives the reference point alone: x, y, z.
+    """
     have = np.flatnonzero(poses.known)
     span = slice(int(have[0]), int(have[-1]) + 1)
+    if free_of(watch) == 3:
+        return Trajectory(
+            poses.times_s[span],
+            ("x", "y", "z"),
+            poses.positions_m[span],
+            poses.covariances[span, :3, :3],
+            PROVENANCE,
+        )
     return Trajectory.from_poses(
         poses.times_s[span],
         poses.positions_m[span],

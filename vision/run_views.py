@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -38,6 +38,7 @@ class Block:
         times_s: base time of each corner, (n_o, 4).
         rows_px: (n_o, 4).
         frames: frame number, (n_o,).
+        index: place among all sightings of its camera, (n_o,).
         guesses: T_base_platform by the camera that sees most, NaN where none, (n_k, 4, 4).
     """
 
@@ -52,6 +53,7 @@ class Block:
     times_s: Array
     rows_px: Array
     frames: Ints
+    index: Ints
     guesses: Array
 
 
@@ -65,6 +67,8 @@ class CameraViews:
         numbers: frame numbers over all pieces, (n_f,).
         stamps_s: (n_f,).
         status: (n_f,).
+        labels: things that replace those of the pieces, once markers have names, (n_o,) or None.
+        shrinks: factors on the rays of labelled balls, (n_o,) or None.
     """
 
     camera: Camera
@@ -72,24 +76,38 @@ class CameraViews:
     numbers: Ints = field(init=False)
     stamps_s: Array = field(init=False)
     status: Ints = field(init=False)
-    base_rays: dict[int, Array] = field(init=False)
-    base_covariances: dict[int, Array] = field(init=False)
+    labels: Ints | None = field(init=False, default=None)
+    shrinks: Array | None = field(init=False, default=None)
+    sightings: int = field(init=False, default=0)
+    _first_sighting: Ints = field(init=False)
     _bounds: Ints = field(init=False)
     _held: tuple[int, Piece] | None = field(init=False, default=None)
 
     def __post_init__(self) -> None:
-        numbers, stamps, status, ends = [], [], [], [0]
+        numbers, stamps, status, ends, sighted = [], [], [], [0], [0]
         for path in self.paths:
             piece = load_piece(path)
             numbers.append(piece.numbers)
             stamps.append(piece.stamps_s)
             status.append(piece.status)
             ends.append(ends[-1] + len(piece.numbers))
+            sighted.append(sighted[-1] + len(piece.things))
         empty = np.zeros(0)
         self.numbers = np.concatenate([empty.astype(np.int64), *numbers])
         self.stamps_s = np.concatenate([empty, *stamps])
         self.status = np.concatenate([empty.astype(np.int64), *status])
         self._bounds = np.array(ends, dtype=np.int64)
+        self._first_sighting = np.array(sighted, dtype=np.int64)
+        self.sightings = sighted[-1]
+
+    def believed(self, camera: Camera) -> CameraViews:
+        """The same sightings by a camera that is believed to be different."""
+        copy = CameraViews(camera, ())
+        copy.paths, copy.numbers, copy.stamps_s = self.paths, self.numbers, self.stamps_s
+        copy.status, copy._bounds = self.status, self._bounds
+        copy._first_sighting, copy.sightings = self._first_sighting, self.sightings
+        copy.labels, copy.shrinks = self.labels, self.shrinks
+        return copy
 
     def middle_times(self) -> Array:
         """Base time of each frame's middle row, (n_f,)."""
@@ -102,8 +120,8 @@ class CameraViews:
         for k in range(len(self.paths)):
             yield int(self._bounds[k]), self._piece(k)
 
-    def rows(self, frames: Ints) -> list[tuple[int, Piece, NDArray[np.bool_]]]:
-        """Pieces that hold the given frames (increasing), with a mask over the piece's frames."""
+    def rows(self, frames: Ints) -> list[tuple[int, int, Piece, NDArray[np.bool_]]]:
+        """Pieces that hold the given frames (increasing): first frame, first sighting, mask."""
         found = []
         for k in range(len(self.paths)):
             low, high = self._bounds[k], self._bounds[k + 1]
@@ -111,8 +129,16 @@ class CameraViews:
             if len(mine):
                 mask = np.zeros(int(high - low), dtype=bool)
                 mask[mine] = True
-                found.append((int(low), self._piece(k), mask))
+                first = int(self._first_sighting[k])
+                found.append((int(low), first, self._named(k, first), mask))
         return found
+
+    def _named(self, index: int, first: int) -> Piece:
+        piece = self._piece(index)
+        if self.labels is None or self.shrinks is None:
+            return piece
+        span = slice(first, first + len(piece.things))
+        return replace(piece, things=self.labels[span], rays=piece.rays * self.shrinks[span, None])
 
     def _piece(self, index: int) -> Piece:
         if self._held is None or self._held[0] != index:
@@ -177,7 +203,7 @@ def _block(
     for index, (view, place) in enumerate(zip(views, nearest, strict=True)):
         frames = np.flatnonzero((place >= first) & (place < last))
         T_base_camera = invert(view.camera.T_camera_base)
-        for low, piece, mask in view.rows(frames):
+        for low, first_sighting, piece, mask in view.rows(frames):
             own = place[low : low + len(mask)] - first
             _take_guesses(piece, mask, own, T_base_camera, watch, guesses, most)
             keep = mask[piece.frame_of] & _on_platform(piece.things, watch)
@@ -194,13 +220,14 @@ def _block(
                     stamps[:, None] + view.camera.line_time_s * rows,
                     rows,
                     piece.numbers[frame_of],
+                    first_sighting + np.flatnonzero(keep),
                 )
             )
     if not parts:
-        parts = [tuple(np.zeros((0, *s)) for s in ((), (), (), (8,), (8, 8), (4,), (4,), ()))]
+        parts = [tuple(np.zeros((0, *s)) for s in ((), (), (), (8,), (8, 8), (4,), (4,), (), ()))]
     columns = [np.concatenate(column) for column in zip(*parts, strict=True)]
     order = np.lexsort((columns[2], columns[1], columns[0]))
-    instant, camera_of, things, rays, covariances, times, rows, frames = (
+    instant, camera_of, things, rays, covariances, times, rows, frames, index = (
         column[order] for column in columns
     )
     things = things.astype(np.int64)
@@ -218,6 +245,7 @@ def _block(
         times,
         rows,
         frames.astype(np.int64),
+        index.astype(np.int64),
         guesses,
     )
 

@@ -170,7 +170,7 @@ def test_one_camera_alone_gives_poses_at_its_own_covariance(session, tmp_path) -
     track(run, tmp_path, view=cameras()[:1])
     trajectory = read_trajectory(tmp_path / "results" / "tracks" / "swing.csv")
     error = errors(trajectory)
-    claimed = np.sqrt(np.diagonal(trajectory.covariances, axis1=1, axis2=2))
+    claimed = trajectory.standard_deviations()
     ratio = np.sqrt(np.mean((error / claimed) ** 2))
     assert len(trajectory) == FRAMES, f"{len(trajectory)} poses"
     assert 0.5 < ratio < 1.6, f"errors are {ratio:.2f} times what is claimed"

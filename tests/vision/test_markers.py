@@ -1,0 +1,103 @@
+"""Round markers: sub-pixel centres, a ball's true centre, names by geometry, one point alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cdpr.rotation import log_rotation
+from cdpr.target import Marker, Target
+from cdpr.trajectory_files import read_trajectory
+from tests.vision.scenes import OPENCV_PARAMS, arc_of_cameras, camera, swing
+from vision.markers import ball_shrink, find_blobs
+from vision.patterns import Sphere
+from vision.record import record
+from vision.simulate import Look, Renderer, Scene, still
+from vision.track import track_session
+
+PLACES = np.array(
+    [
+        [0.0, -0.1, 0.0],
+        [0.22, -0.05, 0.05],
+        [-0.18, -0.12, 0.12],
+        [0.05, -0.2, -0.2],
+        [-0.1, 0, -0.1],
+    ]
+)
+NAMES = ("A", "B", "C", "D", "E")
+
+
+@dataclass
+class FilmedRun:
+    name: str
+    video: Path
+
+
+def track(tmp_path, markers, count=40):
+    half = [v / 2 for v in OPENCV_PARAMS[:4]] + OPENCV_PARAMS[4:]
+    cameras = arc_of_cameras(3, 1.9, size_px=(360, 288), params=half)
+    balls = tuple(Sphere(m.position_m, m.diameter_m) for m in markers)
+    scene = Scene((), swing, balls)
+    record(tmp_path / "run", cameras, scene, np.arange(count) / 50.0, Look(background=50.0))
+    document = track_session(
+        [FilmedRun("run", tmp_path / "run")],
+        cameras,
+        Target((), tuple(markers)),
+        results=tmp_path / "results",
+        workers=1,
+    )
+    return document, read_trajectory(tmp_path / "results" / "tracks" / "run.csv")
+
+
+def test_ball_centre_is_the_ray_of_its_centre() -> None:
+    """A big ball near the image corner: its outline's middle is off, the corrected ray is not."""
+    view = camera()
+    centre = np.array([0.75, 0.0, 0.65])
+    ball = Sphere(centre, 0.08)
+    look = Look(noise=0.5, texture=0.0)
+    image = Renderer(view, Scene((), still(), (ball,)), look).frame(0.0)
+    blobs = find_blobs(image, view)
+    assert len(blobs) == 1, f"{len(blobs)} blobs"
+    place = view.to_camera(centre)
+    truth = place[:2] / place[2]
+    alpha = np.arcsin(0.04 / np.linalg.norm(place))
+    raw = np.linalg.norm(blobs[0].ray - truth) * 900
+    corrected = np.linalg.norm(blobs[0].ray * ball_shrink(blobs[0].ray, alpha) - truth) * 900
+    assert corrected < 0.03, f"{corrected:.4f} px"
+    assert corrected < 0.5 * raw, f"raw {raw:.4f} px, corrected {corrected:.4f} px"
+
+
+def test_markers_without_names_give_the_pose(tmp_path) -> None:
+    markers = [Marker(n, p, 0.03) for n, p in zip(NAMES, PLACES, strict=True)]
+    _, trajectory = track(tmp_path, markers)
+    positions, rotations = swing(trajectory.times_s)
+    known = trajectory.is_known
+    error = (trajectory.positions() - positions)[known]
+    turn = log_rotation((trajectory.rotations() @ np.swapaxes(rotations, 1, 2))[known])
+    assert known.mean() > 0.95, f"{known.mean():.2f} of the samples known"
+    assert 1e3 * np.abs(error).max() < 0.6, f"{1e3 * np.abs(error).max():.3f} mm"
+    assert 1e3 * np.abs(turn).max() < 4.0, f"{1e3 * np.abs(turn).max():.2f} mrad"
+
+
+def test_one_marker_gives_the_reference_point(tmp_path) -> None:
+    _, trajectory = track(tmp_path, [Marker("P", np.zeros(3), 0.03)])
+    positions, _ = swing(trajectory.times_s)
+    error = trajectory.values - positions
+    claimed = trajectory.standard_deviations()
+    assert trajectory.coordinates == ("x", "y", "z"), trajectory.coordinates
+    assert 1e3 * np.abs(error).max() < 0.6, f"{1e3 * np.abs(error).max():.3f} mm"
+    ratio = np.sqrt(np.mean((error / claimed) ** 2))
+    assert 0.3 < ratio < 2.0, f"errors are {ratio:.2f} times what is claimed"
+
+
+@pytest.mark.parametrize("angle", [0.01, 0.05])
+def test_ball_shrink_is_exact_on_the_cone(angle) -> None:
+    theta = 0.6
+    edges = np.tan(theta + angle), np.tan(theta - angle)
+    middle = np.array([sum(edges) / 2, 0.0])
+    truth = np.tan(theta)
+    found = middle[0] * ball_shrink(middle, angle)
+    assert abs(found - truth) < 3e-5, f"{found} for {truth}"
