@@ -1,0 +1,304 @@
+"""Let go by winch instead of by hand: a short motion of the winches that leaves the wanted swing.
+
+The platform rests with its cables at the swing's own lengths. The winches then move out and back in
+smooth strokes and stop where they began, just as the platform arrives at a state of the wanted
+swing: what follows, winches locked, is that swing. The strokes are the gentlest that keep the
+cables taut, found by sequential quadratic programming on the exact sensitivities of the motion;
+nothing has to be measured while they run.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import casadi as ca
+import numpy as np
+
+from cdpr.batch import evaluate, with_jacobian
+from cdpr.effects import Parameter
+from cdpr.model import Model
+from cdpr.robot import Array
+from cdpr.sensitivity import Linearised, linearise
+from cdpr.simulation import Motion, simulate
+from ident.excitation_swings import Bench, Swing
+
+STROKES = 6
+DURATIONS_S = (2.0, 3.0, 4.0)
+_STAGES = (0.3, 0.65, 1.0, 1.0, 1.0)
+_SWEEPS = 8
+_CLOSED_M = 1e-9
+_GRID_S = 0.01
+_COARSE_S = 0.04
+_TENSION_MARGIN = 0.001
+_SLACK_PRICE = 1e3
+_MOST_CUTS = 12
+_CUTS = 6
+_ALLOWED_EXCESS = 1e-4
+
+
+@dataclass(frozen=True, slots=True)
+class WinchRelease:
+    """A motion of the winches that ends, locked, in a wanted swing.
+
+    Attributes:
+        duration_s: of the motion.
+        phase_s: the swing's age at its end, counted from its pose of release.
+        strokes_m: amplitudes of the strokes of each cable, (STROKES, n).
+        times_s: (t,), from the start of the motion.
+        lengths_m: what each winch is told, (t, n).
+        tension_N: smallest and largest tension on the way.
+        fastest_m_s: largest speed of a cable.
+        miss: largest departure from the swing at the end: of the pose, metres and radians, and
+            of its rates, metres and radians a second.
+    """
+
+    duration_s: float
+    phase_s: float
+    strokes_m: Array
+    times_s: Array
+    lengths_m: Array
+    tension_N: tuple[float, float]
+    fastest_m_s: float
+    miss: tuple[float, float]
+
+
+def winch_release(
+    bench: Bench, swing: Swing, durations_s: tuple[float, ...] = DURATIONS_S
+) -> WinchRelease:
+    """The quickest of the given motions that keeps every cable within the tension limits.
+
+    Raises:
+        ValueError: when none does, with the tensions of each.
+    """
+    low, high = bench.limits.tension_N
+    period = 1 / swing.frequencies_hz[0]
+    tried = []
+    for duration in durations_s:
+        for phase in (0.0, 0.25 * period, 0.5 * period, 0.75 * period):
+            try:
+                found = _release(bench, swing, duration, phase)
+            except (ValueError, np.linalg.LinAlgError) as error:
+                tried.append(f"{duration:g} s: {error}")
+                continue
+            least, most = found.tension_N
+            if least >= low and most <= high:
+                return found
+            tried.append(f"{duration:g} s: tensions {least:.0f} to {most:.0f} N")
+    raise ValueError(
+        "no motion of the winches starts this swing within the tension limits: "
+        f"{'; '.join(tried)}; release it by hand, or plan smaller swings"
+    )
+
+
+def stroke_shapes(duration_s: float, times_s: Array) -> Array:
+    """The strokes' shapes at times, (t, STROKES): zero with two derivatives at both ends."""
+    time = ca.SX.sym("t")
+    shapes = ca.Function("shapes", [time], [ca.vertcat(*_shapes(time, duration_s))])
+    return np.array(shapes(np.atleast_2d(times_s))).T
+
+
+def driven_model(model: Model, duration_s: float) -> Model:
+    """The model with winches that follow the strokes; its values are their amplitudes in metres.
+
+    The tensions are those that give the lengths the winches' acceleration.
+    """
+    n = model.robot.n_cables
+    time, zeta, rates = ca.SX.sym("t"), ca.SX.sym("zeta", 6), ca.SX.sym("rates", 6)
+    inertia, strokes = ca.SX.sym("inertia", 9), ca.SX.sym("strokes", STROKES * n)
+    pulls, own = ca.SX.sym("pulls", n), ca.DM(model.start_values)
+    loaded = model.pulled(time, zeta, rates, pulls, inertia, own)
+    loose = ca.substitute(loaded, pulls, ca.SX.zeros(n))
+    by_pulls = ca.jacobian(loaded, pulls)
+    lengths_by = model.cables(zeta, own)[3]
+    drift = model.cable_rates(zeta, rates, own)[0] @ rates
+    shapes = ca.vertcat(*_shapes(time, duration_s))
+    told = ca.reshape(strokes, n, STROKES) @ shapes
+    wanted = ca.jacobian(ca.jacobian(told, time), time)
+    tensions = ca.inv(lengths_by @ by_pulls) @ (wanted - drift - lengths_by @ loose)
+    speed = lengths_by @ rates - ca.jacobian(told, time)
+    state = [time, zeta, rates, inertia, strokes]
+    functions = {
+        "acceleration": (state, [loose + by_pulls @ tensions, tensions]),
+        "slip": (state, [speed]),
+        "domain": ([zeta, strokes], model.domain(zeta, own)),
+        "lengths": ([zeta, strokes], [model.lengths(zeta, own)]),
+        "cables": ([zeta, strokes], model.cables(zeta, own)),
+        "cable_rates": ([zeta, rates, strokes], model.cable_rates(zeta, rates, own)),
+    }
+    built = {
+        name: ca.Function(
+            name,
+            *inputs_and_outputs,
+            getattr(model, name).name_in(),
+            getattr(model, name).name_out(),
+            {"cse": True},
+        )
+        for name, inputs_and_outputs in functions.items()
+    }
+    names = [f"stroke_{k + 1}_{c.name}_m" for k in range(STROKES) for c in model.robot.cables]
+    parameters = tuple(Parameter(name, -1.0, 1.0, 0.05) for name in names)
+    return replace(model, parameters=parameters, names=tuple(names), **built)
+
+
+def _shapes(time: ca.SX, duration_s: float) -> list[ca.SX]:
+    place = time / duration_s
+    bump = 64 * place**3 * (1 - place) ** 3
+    turn = 1 - 2 * place
+    return [bump * turn**k for k in range(STROKES)]
+
+
+def _release(bench: Bench, swing: Swing, duration_s: float, phase_s: float) -> WinchRelease:
+    """Gentlest strokes that end in the swing's state at a phase, by continuation from rest."""
+    drive = _Drive(bench, swing, duration_s)
+    zetas, rates, _ = bench.course(swing.release, phase_s + 0.1).motion.at(np.array([phase_s]))
+    goal = np.concatenate([zetas[0], rates[0]])
+    rest = np.concatenate([swing.equilibrium.zeta, np.zeros(6)])
+    strokes = np.zeros(STROKES * bench.model.robot.n_cables)
+    for share in _STAGES:
+        strokes = drive.towards(rest + share * (goal - rest), strokes)
+    return drive.described(drive.closed(goal, strokes), goal, phase_s)
+
+
+class _Drive:
+    """The platform driven from rest by its winches, and its first order in the strokes."""
+
+    def __init__(self, bench: Bench, swing: Swing, duration_s: float) -> None:
+        n = bench.model.robot.n_cables
+        self.bench, self.swing, self.duration_s = bench, swing, duration_s
+        self.driven = driven_model(bench.model, duration_s)
+        self.grid = np.linspace(0, duration_s, round(duration_s / _COARSE_S) + 1)
+        curves = np.gradient(np.gradient(stroke_shapes(duration_s, self.grid), axis=0), axis=0)
+        effort = curves.T @ curves / _COARSE_S**4 / len(self.grid)
+        self.effort = np.kron(effort, np.eye(n))
+
+    def motion(self, strokes: Array) -> Motion:
+        """From rest, with these strokes."""
+        span = (0.0, self.duration_s)
+        rest = self.swing.equilibrium.zeta
+        return simulate(self.driven, rest, np.zeros(6), span, self.bench.inertia, strokes, 1e-9)
+
+    def towards(self, goal: Array, strokes: Array) -> Array:
+        """One step: least effort, the goal met, tensions within limits, all to first order."""
+        bench, motion = self.bench, self.motion(strokes)
+        linear = linearise(motion)
+        gap, by_strokes = self._end(goal, motion, linear)
+        target = gap + by_strokes @ strokes
+        tensions, tension_by = self._tensions(motion, linear, strokes)
+        base = tensions.ravel() - tension_by @ strokes
+        low, high = bench.limits.tension_N
+        margin = _TENSION_MARGIN * (high - low)
+        return least_effort(
+            self.effort, by_strokes, target, tension_by, low + margin - base, high - margin - base
+        )
+
+    def closed(self, goal: Array, strokes: Array) -> Array:
+        """The nearest strokes that meet the goal exactly, nearest by their effort.
+
+        Raises:
+            ValueError: when they move away from it.
+        """
+        gap = np.full(1, np.inf)
+        for _ in range(_SWEEPS):
+            motion = self.motion(strokes)
+            gap, by_strokes = self._end(goal, motion, linearise(motion))
+            if np.abs(gap).max() < _CLOSED_M:
+                return strokes
+            easy = np.linalg.solve(self.effort, by_strokes.T)
+            strokes = strokes + easy @ np.linalg.solve(by_strokes @ easy, gap)
+        raise ValueError(f"the swing is missed by {np.abs(gap).max():.1e}")
+
+    def _end(self, goal: Array, motion: Motion, linear: Linearised) -> tuple[Array, Array]:
+        """What is missing of the goal at the end, and its derivatives by the strokes.
+
+        The lengths at the end are those at the start whatever the strokes: only the free
+        directions there are left to be met.
+        """
+        from scipy.linalg import null_space
+
+        model = self.bench.model
+        jacobian = evaluate(model.cables, goal[:6], model.start_values)[3]
+        onto = np.kron(np.eye(2), null_space(jacobian).T)
+        states = linear.at(np.array([self.duration_s]))
+        by_strokes = onto @ np.concatenate([part[0][:, 21:] for part in states])
+        return onto @ (goal - _end_state(motion, self.duration_s)), by_strokes
+
+    def _tensions(self, motion: Motion, linear: Linearised, strokes: Array) -> tuple[Array, Array]:
+        """Tensions on the grid (t, n) in N and their derivatives by the strokes, (t n, k)."""
+        zetas, rates, _ = motion.at(self.grid)
+        zetas_by, rates_by = (part[..., 21:] for part in linear.at(self.grid))
+        function = with_jacobian(self.driven.acceleration, (1, 2, 4), 1)
+        value, by = evaluate(function, self.grid, zetas, rates, self.bench.inertia, strokes)
+        moved = by[..., :6] @ zetas_by + by[..., 6:12] @ rates_by + by[..., 12:]
+        mass = self.bench.mass_kg
+        return mass * value, mass * moved.reshape(-1, len(strokes))
+
+    def described(self, strokes: Array, goal: Array, phase_s: float) -> WinchRelease:
+        """What the winches do and where it ends."""
+        n, motion = self.bench.model.robot.n_cables, self.motion(strokes)
+        grid = np.linspace(0, self.duration_s, round(self.duration_s / _GRID_S) + 1)
+        told = stroke_shapes(self.duration_s, grid) @ strokes.reshape(STROKES, n)
+        tensions = self.bench.mass_kg * motion.tensions(grid)
+        gap = np.abs(_end_state(motion, self.duration_s) - goal)
+        return WinchRelease(
+            duration_s=self.duration_s,
+            phase_s=phase_s,
+            strokes_m=strokes.reshape(STROKES, n),
+            times_s=grid,
+            lengths_m=self.swing.equilibrium.lengths_m + told,
+            tension_N=(float(tensions.min()), float(tensions.max())),
+            fastest_m_s=float(np.abs(np.gradient(told, grid, axis=0)).max()),
+            miss=(float(gap[:6].max()), float(gap[6:].max())),
+        )
+
+
+def least_effort(
+    effort: Array, equal: Array, target: Array, rows: Array, low: Array, high: Array
+) -> Array:
+    """Minimiser of x' effort x with equal x = target and low <= rows x <= high, the last softly.
+
+    Rows are taken up as they are broken; one slack, heavily priced, keeps the problem solvable
+    where the limits cannot be met.
+    """
+    scale = np.maximum(high - low, 1e-9)
+    held: list[int] = []
+    step = _quadratic(effort, equal, target, rows[held], low[held], high[held])
+    for _ in range(_MOST_CUTS):
+        moved = rows @ step
+        excess = np.maximum(low - moved, moved - high) / scale
+        worst = [int(k) for k in np.argsort(-excess)[:_CUTS] if excess[k] > _ALLOWED_EXCESS]
+        fresh = [k for k in worst if k not in held]
+        if not fresh:
+            break
+        held += fresh
+        step = _quadratic(effort, equal, target, rows[held], low[held], high[held])
+    return step
+
+
+def _quadratic(
+    effort: Array, equal: Array, target: Array, rows: Array, low: Array, high: Array
+) -> Array:
+    """As `least_effort`, all rows at once, by an active-set method."""
+    size, scale = len(effort), np.trace(effort) / len(effort)
+    hessian = np.zeros((size + 1, size + 1))
+    hessian[:size, :size] = effort / scale
+    hessian[size, size] = 1e-6
+    slope = np.zeros(size + 1)
+    slope[size] = _SLACK_PRICE
+    ones, none = np.ones((len(rows), 1)), np.zeros((len(equal), 1))
+    matrix = np.vstack(
+        [np.hstack([equal, none]), np.hstack([rows, ones]), np.hstack([rows, -ones])]
+    )
+    unbound = np.full(len(rows), np.inf)
+    lower = np.concatenate([target, low, -unbound])
+    upper = np.concatenate([target, unbound, high])
+    options = {"print_iter": False, "print_header": False, "print_info": False}
+    shapes = {"h": ca.Sparsity.dense(size + 1, size + 1), "a": ca.Sparsity.dense(*matrix.shape)}
+    solver = ca.conic("release", "qrqp", shapes, {**options, "error_on_fail": False})
+    floor = np.append(np.full(size, -np.inf), 0.0)
+    found = solver(h=hessian, g=slope, a=matrix, lba=lower, uba=upper, lbx=floor)
+    return np.array(found["x"]).ravel()[:size]
+
+
+def _end_state(motion: Motion, duration_s: float) -> Array:
+    zetas, rates, _ = motion.at(np.array([duration_s]))
+    return np.concatenate([zetas[0], rates[0]])
