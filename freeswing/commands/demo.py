@@ -5,6 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
+from freeswing.commands.arguments import add_workers
 from freeswing.console import Console
 
 
@@ -13,6 +14,10 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "folder", metavar="DIR", nargs="?", default="freeswing-demo", help="default freeswing-demo"
     )
+    parser.add_argument(
+        "--mocap", action="store_true", help="motion capture instead of cameras: quicker"
+    )
+    add_workers(parser)
     parser.add_argument("--seed", type=int, default=1, help="another seed, another session")
 
 
@@ -20,13 +25,22 @@ def run(options: Namespace, console: Console) -> None:
     """Record, solve, and end with the report's path."""
     from cdpr.documents import InputError
     from freeswing.commands.run import run_session
-    from freeswing.demo.mocap import write_mocap_session
     from freeswing.session import read_session
 
     folder = Path(options.folder)
     if folder.exists() and not (folder / "truth.json").is_file() and any(folder.iterdir()):
         raise InputError(f"{folder}: holds other files; name a new folder")
     console.say(f"recording a session into {folder} (its truth.json is not read by what follows)")
-    session = read_session(write_mocap_session(folder, options.seed, console.progress))
-    run_session(session, console)
+    session = read_session(_record(folder, options, console))
+    run_session(session, console, options.workers)
     console.show_file(session.results / "identification.json")
+
+
+def _record(folder: Path, options: Namespace, console: Console) -> Path:
+    if options.mocap:
+        from freeswing.demo.mocap import write_mocap_session
+
+        return write_mocap_session(folder, options.seed, console.progress)
+    from freeswing.demo.filmed import write_filmed_session
+
+    return write_filmed_session(folder, options.seed, console.progress)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from freeswing.report.material import Document, Material
+from freeswing.report.material import Material
 from freeswing.report.words import ESTIMATES
 
 
@@ -21,19 +21,24 @@ class Dropped:
             for name, estimate in material.estimates.items()
             for entry in estimate.get("dropped_runs") or []
         ]
-        for kind in ("calibration", "tracking"):
-            rows += _rows(kind, getattr(material, kind))
+        views = material.calibration.get("dropped_views") or []
+        rows += [{"what": "view", "where": "calibration", "why": str(view)} for view in views]
+        rows += [
+            {"what": f"run {run.get('run', '')}", "where": "tracking", "why": str(problem)}
+            for run in material.tracking.get("runs") or []
+            for problem in run.get("problems") or []
+        ]
         if not material.documents:
             return None
-        return {"rows": rows, "notes": material.notes}
+        told = [*(material.identification.get("notes") or []), *_notes(material)]
+        return {"rows": rows, "notes": list(dict.fromkeys([*told, *material.notes]))}
 
 
-def _rows(kind: str, document: Document) -> list[dict[str, str]]:
-    return [
-        {
-            "what": str(entry.get("what") or entry.get("run") or entry.get("image") or ""),
-            "where": kind,
-            "why": str(entry.get("why", "")),
-        }
-        for entry in document.get("dropped") or []
+def _notes(material: Material) -> list[str]:
+    """What the estimates and the diagnosis say beside their numbers."""
+    of_estimates = [
+        f"{ESTIMATES[name]}: {note}"
+        for name, estimate in material.estimates.items()
+        for note in estimate.get("notes") or []
     ]
+    return [*of_estimates, *(material.diagnosis.get("notes") or [])]

@@ -19,8 +19,8 @@ def whole_material(title: str = "lab-day-1") -> Material:
     kinds = {"fidim_free": 2.0, "fidim_full": 1.5, "ml_free": 0.2, "ml_full": 0.1}
     return Material(
         title,
-        calibration={"format": "freeswing-calibration/1"},
-        tracking={"format": "freeswing-tracking/1"},
+        calibration=_calibration(),
+        tracking=_tracking(),
         identification={
             "format": "freeswing-identification/1",
             "estimates": {name: _estimate(spread, rng) for name, spread in kinds.items()},
@@ -131,3 +131,50 @@ def _motion(k: int, rng: np.random.Generator) -> dict[str, Any]:
         "before": (exact * (1 + 0.02 * times[:, None])).tolist(),
         "after": exact.tolist(),
     }
+
+
+def _calibration() -> dict[str, Any]:
+    camera = {
+        "q_camera_base": [0.7, 0.7, 0.1, 0.1],
+        "frames": 50,
+        "frames_with_board": 30,
+        "coverage": 0.87,
+        "reprojection_px": 0.031,
+        "held_out_px": 0.033,
+        "position_std_m": [1e-4, 2e-4, 1e-4],
+        "rotation_std_rad": [5e-5, 6e-5, 3e-5],
+        "clock_offset_s": 0.0031,
+        "clock_offset_std_s": 1e-5,
+    }
+    places = {"cam0": [0.0, 0.0, 2.0], "cam1": [-1.0, 0.0, 1.5]}
+    return {
+        "format": "freeswing-calibration/1",
+        "verdict": {"usable": True, "reasons": [], "warnings": [f"few views {HOSTILE}"]},
+        "cameras": [{**camera, "name": n, "t_camera_base_m": t} for n, t in places.items()],
+        "checks": {"length_rms_m": 1e-5, "survey_rms_m": 2e-5},
+        "dropped_views": ["cam1/000012.png: 68 px from any board"],
+    }
+
+
+def _tracking() -> dict[str, Any]:
+    cameras = [{"camera": name, "consistency_mm": 0.05} for name in ("cam0", "cam1")]
+    run = {
+        "samples": 200,
+        "known": 198,
+        "reprojection_px": 0.03,
+        "consistency_mm": 0.06,
+        "position_std_mm": 0.007,
+        "rotation_std_mrad": 0.02,
+        "cameras": cameras,
+        "problems": ["cam1: tag36h11 2 left out 31 times"],
+    }
+    late = {
+        "effect": "clock_offset",
+        "run": "swing-01",
+        "camera": "cam1",
+        "parameters": [{"name": "offset_s", "value": 6e-5, "std": 1e-6}],
+        "before": {"consistency_mm": 0.2},
+        "after": {"consistency_mm": 0.06},
+    }
+    runs = [{**run, "run": name} for name in ("swing-01", "check-01")]
+    return {"format": "freeswing-tracking/1", "runs": runs, "effects": [late]}

@@ -28,6 +28,7 @@ FLAGS = (
     "--enable-logging=stderr",
     "--v=0",
 )
+FIGURES = 10
 VOID = {"meta", "link", "br", "img", "hr", "input"}
 
 
@@ -102,7 +103,7 @@ def test_values_from_files_are_escaped(page: str) -> None:
 
 
 def test_every_figure_is_there(page: str) -> None:
-    assert page.count("<figure") == page.count("<svg") == 8, page.count("<figure")
+    assert page.count("<figure") == page.count("<svg") == FIGURES, page.count("<figure")
 
 
 def test_the_same_results_give_the_same_page(page: str) -> None:
@@ -157,5 +158,5 @@ def test_a_browser_shows_it_without_complaint(page: str, tmp_path: Path, size: s
     )
     console = [line for line in done.stderr.splitlines() if "CONSOLE" in line]
     assert len(console) == 1, done.stderr[-2000:]
-    assert "PROBE figures=8 wide=false" in console[0], console
+    assert f"PROBE figures={FIGURES} wide=false" in console[0], console
     assert picture.stat().st_size > 20_000, picture.stat().st_size
