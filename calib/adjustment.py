@@ -19,6 +19,7 @@ from calib.normal_equations import (
     normal_equations,
 )
 from calib.reprojection import Scene, board_residuals, fixed_residuals, moved
+from calib.views import relative_std
 
 MOST_ITERATIONS = 60
 _DECREMENT = 1e-7  # expected fall of the cost, in units where one residual counts 1/2
@@ -33,7 +34,7 @@ class Adjustment:
         scene: the estimate.
         covariance: of the shared unknowns (zero where held), (p, p).
         board_covariances: of the board poses (dt, dr), (n_moments, 6, 6).
-        sigma_px: corner noise of each camera, each axis, (n_cameras,).
+        sigma_px: noise of each camera's typical corner, each axis, (n_cameras,).
         residuals_px: board residuals, NaN where unseen, (n_views, n_points, 2).
         fixed_residuals_px: residuals of the fixed points, (m, 2).
         cost: half the whitened robust sum of squares.
@@ -125,7 +126,8 @@ def _all_residuals(scene: Scene, problem: Problem) -> tuple[Array, Array]:
 def _cost(scene: Scene, problem: Problem, sigma: Array) -> float:
     board, fixed = _all_residuals(scene, problem)
     seen = problem.views.seen
-    errors = [np.hypot(*np.moveaxis(board, -1, 0)) / sigma[problem.views.camera][:, None]]
+    noise = sigma[problem.views.camera][:, None] * relative_std(problem.views)
+    errors = [np.hypot(*np.moveaxis(board, -1, 0)) / noise]
     errors[0] = errors[0][seen]
     prior = 0.0
     if problem.fixed is not None:
@@ -142,11 +144,12 @@ def _cost(scene: Scene, problem: Problem, sigma: Array) -> float:
 
 
 def _noise(scene: Scene, problem: Problem, last: Array | None) -> Array:
-    """Corner noise of each camera: rms of residuals within the knee, freedom-corrected.
+    """Noise of each camera's typical corner: rms of residuals within the knee, freedom-corrected.
 
     The first call has no scale and takes the median; cameras without views get the others' mean.
     """
     board, _ = _all_residuals(scene, problem)
+    board = board / relative_std(problem.views)[..., None]
     count = len(scene.cameras)
     sigma = np.full(count, np.nan)
     for index in range(count):

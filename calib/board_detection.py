@@ -25,6 +25,7 @@ _KALIBR_BORDERS = (2, 1)
 _WINDOW_MARGIN = 0.3
 _WINDOW_MARGIN_PX = 6.0
 _LEAST_EXPLAINED = 0.8
+_LEAST_STD_PX = 0.003
 
 
 @dataclass(slots=True)
@@ -45,9 +46,13 @@ class BoardDetector:
             self._tags = [(border, _tag_detector(cut, border)) for border in borders]
 
     def detect(self, image: Image) -> Array | None:
-        """Corners (n_points, 2) in pixels, NaN where unseen; None when there is no board."""
+        """Corners x, y in pixels and their standard deviation, (n_points, 3), NaN where unseen.
+
+        None when there is no board.
+        """
         if self.board.kind == "chessboard":
-            return self._find_chessboard(image)
+            corners = self._find_chessboard(image)
+            return None if corners is None else np.column_stack([corners, np.ones(len(corners))])
         best: Array | None = None
         for border, detector in self._tags:
             found = self._tag_corners(image, border, detector)
@@ -67,8 +72,8 @@ class BoardDetector:
         return _oriented(image, np.reshape(corners, (*size[::-1], 2)).astype(float))
 
     def _tag_corners(self, image: Image, border: int, detector: cv2.aruco.ArucoDetector) -> Array:
-        """Fitted corners of every tag that is found, (n_points, 2)."""
-        corners = np.full((self._points, 2), np.nan)
+        """Fitted corners of every tag that is found, and their noise, (n_points, 3)."""
+        corners = np.full((self._points, 3), np.nan)
         quads, ids, _ = detector.detectMarkers(image)
         for quad, tag in zip(quads, [] if ids is None else np.ravel(ids).tolist(), strict=True):
             cells = rimmed_cells(
@@ -84,7 +89,7 @@ class BoardDetector:
 
 
 def _fitted(image: Image, quad: Array, cells: Array) -> Array | None:
-    """Corners TL TR BR BL of a tag's pattern fitted around a first guess, in pixels, (4, 2)."""
+    """Corners TL TR BR BL of a tag's pattern fitted around a guess, and their noise, (4, 3)."""
     low, high = quad.min(axis=0), quad.max(axis=0)
     margin = _WINDOW_MARGIN * float((high - low).max()) + _WINDOW_MARGIN_PX
     left, top = np.maximum(np.floor(low - margin), 0).astype(int)
@@ -93,7 +98,10 @@ def _fitted(image: Image, quad: Array, cells: Array) -> Array | None:
     rows, columns = np.indices(window.shape)
     rays = np.stack([columns + left, rows + top], axis=-1).astype(np.float64)
     fit = fit_tag(window, rays, quad, quad - [left, top], cells)
-    return fit.rays if fit is not None and fit.explained > _LEAST_EXPLAINED else None
+    if fit is None or fit.explained < _LEAST_EXPLAINED:
+        return None
+    variance = np.diag(fit.rays_covariance).reshape(4, 2).mean(axis=1)
+    return np.column_stack([fit.rays, np.hypot(np.sqrt(variance), _LEAST_STD_PX)])
 
 
 def _count(corners: Array) -> int:

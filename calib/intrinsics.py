@@ -157,7 +157,13 @@ def _plain_camera(name: str, size_px: tuple[int, int], model: str, focal: float)
 def _alone(views: Views) -> Views:
     """The views as those of camera 0, each its own moment, still."""
     count = len(views)
-    return make_views(np.zeros(count), np.arange(count), views.pixels, label=views.label)
+    return make_views(
+        np.zeros(count),
+        np.arange(count),
+        views.pixels,
+        label=views.label,
+        std_px=views.std_px,
+    )
 
 
 def _require(name: str, count: int, n_dropped: int) -> None:

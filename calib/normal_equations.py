@@ -19,7 +19,7 @@ from calib.reprojection import (
     camera_slices,
     fixed_jacobians,
 )
-from calib.views import FixedPoints, Views
+from calib.views import FixedPoints, Views, relative_std
 
 HUBER_SIGMAS = 3.0
 _RANK_TOLERANCE = 1e-13
@@ -62,12 +62,14 @@ def normal_equations(scene: Scene, problem: Problem, sigma: Array) -> Normal:
     cross, boards = np.zeros((n_moments, p, 6)), np.zeros((n_moments, 6, 6))
     board_slopes = np.zeros((n_moments, 6))
     warp = slice(end, end + WARP)
+    relative = relative_std(problem.views)
     for index, own in enumerate(slices):
-        views = problem.views.select(problem.views.camera == index)
+        views_of = problem.views.camera == index
+        views = problem.views.select(views_of)
         if not len(views):
             continue
         residuals, *blocks = board_jacobians(scene, problem.board_points_m, views, index)
-        scale = _root_weights(residuals, sigma[index])[..., None, None]
+        scale = _root_weights(residuals, sigma[index] * relative[views_of])[..., None, None]
         r, d_camera, d_board, d_warp = (
             _rows(np.where(scale > 0.0, array * scale, 0.0))
             for array in (residuals[..., None], *blocks)

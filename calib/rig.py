@@ -13,7 +13,7 @@ from calib.camera_models import Array
 from calib.intrinsics import CameraStart, DroppedView, start_camera
 from calib.reprojection import CLOCK, POSE, WARP, Scene, camera_slices
 from calib.rig_start import place_in_base, start_rig
-from calib.views import FixedPoints, Views
+from calib.views import FixedPoints, Views, relative_std
 
 Progress = Callable[[str, float], None]
 
@@ -22,6 +22,7 @@ VIEW_OUTLIER_FLOOR_PX = 0.5
 CORNER_OUTLIER_SIGMAS = 6.0
 _LEAST_CORNERS = 4
 LINE_TIME_SIGMAS = 5.0
+LEAST_READOUT_S = 5e-4
 _MOST_SWEEPS = 3
 _SURVEY_ROUNDS = 3
 _SURVEY_PRIOR = 2.0
@@ -107,7 +108,9 @@ def _without_idle_lines(rig: Rig) -> Rig:
     for index, own in enumerate(camera_slices(scene.cameras)):
         last = own.stop - 1
         std = float(np.sqrt(rig.adjustment.covariance[last, last]))
-        if free[last] and abs(cameras[index].line_time_s) < LINE_TIME_SIGMAS * std:
+        readout = cameras[index].size_px[1] * abs(cameras[index].line_time_s)
+        stands_out = abs(cameras[index].line_time_s) > LINE_TIME_SIGMAS * std
+        if free[last] and not (stands_out and readout > LEAST_READOUT_S):
             free[last] = False
             cameras[index] = replace(cameras[index], line_time_s=0.0)
     if np.array_equal(free, rig.problem.free):
@@ -185,7 +188,7 @@ def _views_kept(result: Adjustment, problem: Problem) -> tuple[np.ndarray, Array
 
 def _trimmed(result: Adjustment, problem: Problem) -> Views:
     """The views with far-off corners blanked."""
-    length = np.linalg.norm(result.residuals_px, axis=-1)
+    length = np.linalg.norm(result.residuals_px, axis=-1) / relative_std(problem.views)
     limit = CORNER_OUTLIER_SIGMAS * result.sigma_px[problem.views.camera]
     with np.errstate(invalid="ignore"):
         far = length > limit[:, None]
@@ -239,5 +242,6 @@ def _joined(parts: list[Views]) -> Views:
         np.concatenate([part.pixels for part in parts]),
         np.concatenate([part.velocity_px_s for part in parts]),
         np.concatenate([part.lag_s for part in parts]),
+        np.concatenate([part.std_px for part in parts]),
         tuple(label for part in parts for label in part.label),
     )

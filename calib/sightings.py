@@ -34,6 +34,7 @@ class Sightings:
         stamps_s: their stamps by the camera's own clock, NaN when unknown, (n,).
         labels: how a person finds them, (n,).
         pixels: corners, NaN where unseen, (n, n_points, 2).
+        std_px: what the detector says of each corner's noise, (n, n_points).
         still_frames: a few images spread over the recording, for what does not move.
     """
 
@@ -44,6 +45,7 @@ class Sightings:
     stamps_s: Array
     labels: tuple[str, ...]
     pixels: Array
+    std_px: Array
     still_frames: tuple[np.ndarray, ...] = ()
 
 
@@ -93,10 +95,18 @@ def _see_board(
             labels.append(label)
             pixels.append(corners)
     found = np.array(numbers, dtype=int)
-    stack = np.array(pixels) if pixels else np.zeros((0, len(board.points_m), 2))
+    stack = np.array(pixels) if pixels else np.zeros((0, len(board.points_m), 3))
     stamps = stamps_of(recording, found, frame_rate_hz)
     return Sightings(
-        recording.name, size, count, found, stamps, tuple(labels), stack, tuple(stills)
+        recording.name,
+        size,
+        count,
+        found,
+        stamps,
+        tuple(labels),
+        stack[..., :2],
+        stack[..., 2],
+        tuple(stills),
     )
 
 
@@ -217,6 +227,7 @@ def gather(
         np.concatenate([velocities(s) for s in all_sightings]),
         lag,
         tuple(label for s in all_sightings for label in s.labels),
+        np.concatenate([s.std_px for s in all_sightings]),
     ).select(np.arange(len(first)))
     return views, times if stamped else np.full(count, np.nan)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,6 +19,7 @@ class Views:
         pixels: corners, NaN where unseen, (n, n_points, 2).
         velocity_px_s: image velocity of the corners, zero where unknown, (n, n_points, 2).
         lag_s: the view's own stamp minus the moment's time, (n,).
+        std_px: what the detector says of each corner's noise; only ratios count, (n, n_points).
         label: how a person finds the view: recording and frame, (n,) text.
     """
 
@@ -27,6 +28,7 @@ class Views:
     pixels: Array
     velocity_px_s: Array
     lag_s: Array
+    std_px: Array
     label: tuple[str, ...]
 
     def __len__(self) -> int:
@@ -46,6 +48,7 @@ class Views:
             self.pixels[index],
             self.velocity_px_s[index],
             self.lag_s[index],
+            self.std_px[index],
             tuple(self.label[i] for i in index),
         )
 
@@ -53,7 +56,7 @@ class Views:
         """The same views with moments renumbered from 0 without gaps, and the old numbers."""
         moments, renumbered = np.unique(self.moment, return_inverse=True)
         return (
-            Views(self.camera, renumbered, self.pixels, self.velocity_px_s, self.lag_s, self.label),
+            replace(self, moment=renumbered),
             moments,
         )
 
@@ -65,6 +68,7 @@ def make_views(
     velocity_px_s: Array | None = None,
     lag_s: Array | None = None,
     label: tuple[str, ...] | None = None,
+    std_px: Array | None = None,
 ) -> Views:
     """Views with unknown velocities, lags and labels filled in; order is camera, then moment."""
     cameras, moments = np.asarray(camera, dtype=int), np.asarray(moment, dtype=int)
@@ -73,6 +77,7 @@ def make_views(
     order = np.lexsort((moments, cameras))
     velocity = np.zeros_like(points) if velocity_px_s is None else velocity_px_s
     lag = np.zeros(count) if lag_s is None else np.asarray(lag_s, dtype=np.float64)
+    std = np.ones(points.shape[:2]) if std_px is None else np.asarray(std_px, dtype=np.float64)
     names = label or tuple(f"camera {c} moment {m}" for c, m in zip(cameras, moments, strict=True))
     return Views(
         cameras[order],
@@ -80,8 +85,20 @@ def make_views(
         points[order],
         np.where(np.isfinite(velocity), velocity, 0.0)[order],
         lag[order],
+        std[order],
         tuple(names[i] for i in order),
     )
+
+
+def relative_std(views: Views) -> Array:
+    """Noise of each corner relative to its camera's typical (median) corner, (n, n_points)."""
+    result = np.ones_like(views.std_px)
+    for index in np.unique(views.camera):
+        own = views.camera == index
+        seen = views.seen[own]
+        if seen.any():
+            result[own] = views.std_px[own] / np.median(views.std_px[own][seen])
+    return np.where(np.isfinite(result), np.clip(result, 0.1, 100.0), 1.0)
 
 
 @dataclass(frozen=True, slots=True)
