@@ -60,10 +60,10 @@ def _evaluate_flat(function: Any, flat: list[Array], batch: tuple[int, ...]) -> 
         kept = [np.ascontiguousarray(array[done : done + count]) for array in flat]
         for i, array in enumerate(kept):
             if array.size:
-                buffer.set_arg(i, memoryview(array.reshape(-1)))
+                buffer.set_arg(i, array.reshape(-1).data)
         for i, result in enumerate(results):
             if result.size:
-                buffer.set_res(i, memoryview(result[done : done + count].reshape(-1)))
+                buffer.set_res(i, result[done : done + count].reshape(-1).data)
         run()
         done += count
     return tuple(
@@ -107,9 +107,9 @@ class Bound:
         ]
         for i, array in enumerate(self.inputs):
             if array.size:
-                self._buffer.set_arg(i, memoryview(array.reshape(-1)))
+                self._buffer.set_arg(i, array.reshape(-1).data)
         for i, array in enumerate(self.outputs):
-            self._buffer.set_res(i, memoryview(array.reshape(-1)))
+            self._buffer.set_res(i, array.reshape(-1).data)
 
 
 @lru_cache(maxsize=64)

@@ -48,8 +48,8 @@ def domain_problems(
         values: effect values, (k,).
     """
     values = model.start_values if values is None else np.asarray(values, dtype=np.float64)
-    poses = np.reshape(np.asarray(zetas, dtype=np.float64), (-1, len(POSE_COORDINATES)))
-    finite = np.isfinite(poses).all(axis=1)
+    poses: Array = np.reshape(np.asarray(zetas, dtype=np.float64), (-1, len(POSE_COORDINATES)))
+    finite: Array = np.all(np.isfinite(poses), axis=1)
     found = [
         DomainProblem(int(k), "", f"the pose {poses[k]} holds a number that is not finite")
         for k in np.flatnonzero(~finite)

@@ -11,9 +11,10 @@ from itertools import combinations
 
 import numpy as np
 
-from cdpr.batch import Bound, evaluate
+from cdpr.assembly import Assembly, Follower, follow
+from cdpr.batch import evaluate
 from cdpr.model import Model
-from cdpr.robot import POSE_COORDINATES, Array
+from cdpr.robot import POSE_COORDINATES, Array, finite
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +49,9 @@ def coordinate_indices(names: tuple[str, ...]) -> list[int]:
 def _split(model: Model, free: tuple[str, ...]) -> tuple[list[int], list[int]]:
     chosen = coordinate_indices(free)
     n = model.robot.n_cables
-    if len(set(chosen)) != 6 - n:
+    if n > 5:
+        raise ValueError(f"{n} cables leave no free coordinates; there are some for 1 to 5")
+    if len(chosen) != 6 - n or len(set(chosen)) != 6 - n:
         raise ValueError(f"{n} cables leave {6 - n} free coordinates, got {free}")
     return chosen, [i for i in range(6) if i not in chosen]
 
@@ -140,6 +143,8 @@ def admissible_rates(
 ) -> Array:
     """The rates closest to `rates`, (6,), that the cables allow, creeping ones included.
 
+    Closest in metres and radians per second alike.
+
     Args:
         model: the robot.
         zeta: pose, (6,).
@@ -147,27 +152,17 @@ def admissible_rates(
         inertia: `INERTIA_NAMES` values, (9,).
         values: effect values, (k,).
         time_s: time since the start of the run.
+
+    Raises:
+        ValueError: for wrong shapes or numbers that are not finite.
     """
     values = model.start_values if values is None else values
+    zeta, rates = finite("zeta", zeta, 6), finite("rates", rates, 6)
     jacobian = evaluate(model.cables, zeta, values)[3]
     for _ in range(3):
         slip = evaluate(model.slip, time_s, zeta, rates, inertia, values)[0]
         rates = rates - np.linalg.pinv(jacobian) @ slip
     return rates
-
-
-@dataclass(frozen=True, slots=True)
-class Assembly:
-    """Poses that have given lengths and free coordinates.
-
-    Attributes:
-        zetas: (n_t, 6).
-        determinants: sign-carrying det of the dependent block, scaled, (n_t,): zero at a
-            singularity, where assembly modes meet.
-    """
-
-    zetas: Array
-    determinants: Array
 
 
 def assemble(
@@ -179,62 +174,22 @@ def assemble(
     values: Array | None = None,
     tolerance_m: float = 1e-11,
 ) -> Assembly:
-    """Dependent coordinates at given lengths by Newton, from sample to sample (eq. 44).
+    """Dependent coordinates at given lengths, from sample to sample in one assembly mode (eq. 44).
 
     Args:
         model: the robot.
         free: names of the free coordinates.
-        lengths_m: cable lengths, (n,).
-        free_values: free coordinates, (n_t, 6 - n), finite, closely sampled.
-        start: a pose near the first sample, (6,); it settles the assembly mode.
+        lengths_m: geometric cable lengths, (n,).
+        free_values: free coordinates, (n_t, 6 - n), finite.
+        start: a pose, (6,); its assembly mode is followed to the first sample and on.
         values: effect values, (k,).
         tolerance_m: residual of the lengths.
 
     Raises:
-        ValueError: naming the sample at which Newton fails, or at which the dependent block
-            changes the sign of its determinant (a jump to another assembly mode).
+        ValueError: for wrong shapes or numbers that are not finite, and naming the sample at which
+            the mode ends (at a singularity of the free coordinates); it never jumps to another.
     """
     values = model.start_values if values is None else values
     chosen, dependent = _split(model, free)
-    bound = Bound(model.cables, 1)
-    bound.inputs[1][:] = values
-    zetas = np.empty((len(free_values), 6))
-    determinants = np.empty(len(free_values))
-    zeta = np.array(start, dtype=np.float64)
-    sign = 0.0
-    for sample, wanted in enumerate(free_values):
-        step = wanted - zeta[chosen]
-        jacobian = bound.outputs[3][0].T
-        if sample:
-            zeta[dependent] -= np.linalg.solve(jacobian[:, dependent], jacobian[:, chosen] @ step)
-        zeta[chosen] = wanted
-        residual = _newton(bound, zeta, dependent, lengths_m, tolerance_m)
-        block = bound.outputs[3][0].T[:, dependent]
-        determinants[sample] = float(np.linalg.det(block))
-        sign = sign or np.sign(determinants[sample])
-        if residual > tolerance_m or np.sign(determinants[sample]) != sign:
-            raise ValueError(
-                f"sample {sample}: the cable lengths and the free coordinates {free} = "
-                f"{np.array2string(np.asarray(wanted), precision=5)} give no pose continuous with "
-                f"the last one (length residual {residual:.2e} m, determinant "
-                f"{determinants[sample]:.1e}); the free coordinates pass a singularity there: "
-                'measure others, or set free_coordinates = "auto"'
-            )
-        zetas[sample] = zeta
-    return Assembly(zetas, determinants)
-
-
-def _newton(
-    bound: Bound, zeta: Array, dependent: list[int], lengths_m: Array, tolerance_m: float
-) -> float:
-    """Newton on the dependent coordinates of `zeta`, in place of a copy; the last residual."""
-    residual = np.inf
-    for _ in range(12):
-        bound.inputs[0][0] = zeta
-        bound.run()
-        error = bound.outputs[0][0] - lengths_m
-        residual = float(np.abs(error).max())
-        if not np.isfinite(residual) or residual <= tolerance_m:
-            return residual
-        zeta[dependent] -= np.linalg.solve(bound.outputs[3][0].T[:, dependent], error)
-    return residual
+    follower = Follower(model.cables, values, chosen, dependent, tolerance_m)
+    return follow(follower, tuple(free), lengths_m, free_values, start)

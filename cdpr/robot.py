@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,7 @@ INERTIA_NAMES = (
 )
 STANDARD_GRAVITY_M_S2 = 9.80665
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]
 
 
 def frozen_array(values: object, shape: tuple[int, ...], what: str) -> Array:
@@ -36,6 +37,20 @@ def frozen_array(values: object, shape: tuple[int, ...], what: str) -> Array:
     if not np.isfinite(array).all():
         raise ValueError(f"{what}: {array} holds a number that is not finite")
     array.flags.writeable = False
+    return array
+
+
+def finite(what: str, numbers: Array, size: int) -> Array:
+    """A float copy of `numbers`.
+
+    Raises:
+        ValueError: when the shape is not (size,) or a number is not finite.
+    """
+    array = np.array(numbers, dtype=np.float64)
+    if array.shape != (size,):
+        raise ValueError(f"{what} has shape {array.shape}, must be ({size},)")
+    if not np.isfinite(array).all():
+        raise ValueError(f"{what} is {array}: every number must be finite")
     return array
 
 

@@ -11,7 +11,7 @@ from cdpr.batch import Bound, evaluate, first_output, with_jacobian
 from cdpr.collocation import Table, interpolation, table
 from cdpr.domain import check_domain, domain_problems
 from cdpr.model import Model
-from cdpr.robot import Array
+from cdpr.robot import Array, finite
 
 NODES = 12
 LONGEST_SEGMENT_S = 0.4
@@ -130,8 +130,8 @@ def simulate(
             degrees, or the constraints lose rank).
     """
     values = model.start_values if values is None else values
-    zeta, rates = _checked("zeta", zeta, 6), _checked("rates", rates, 6)
-    inertia, values = _checked("inertia", inertia, 9), _checked("values", values, len(model.names))
+    zeta, rates = finite("zeta", zeta, 6), finite("rates", rates, 6)
+    inertia, values = finite("inertia", inertia, 9), finite("values", values, len(model.names))
     _check_start(model, span_s, zeta, rates, inertia, values, tolerance_m)
     stepper = _Stepper(model, inertia, values, tolerance_m)
     time, end = map(float, span_s)
@@ -156,15 +156,6 @@ def simulate(
         np.array(column) for column in zip(*rows, strict=True)
     )
     return Motion(model, inertia, values, starts, steps, zetas, speeds, accelerations)
-
-
-def _checked(what: str, numbers: Array, size: int) -> Array:
-    array = np.array(numbers, dtype=np.float64)
-    if array.shape != (size,):
-        raise ValueError(f"{what} has shape {array.shape}, must be ({size},)")
-    if not np.isfinite(array).all():
-        raise ValueError(f"{what} is {array}: every number must be finite")
-    return array
 
 
 def _check_start(

@@ -2,7 +2,9 @@
 
 Equilibria are stationary points of potential + multipliers . lengths; at given lengths the
 multipliers are unknown (FIDIM 2022, sec. 4; self-calibration 2019, eqs. 9-13), at given tensions
-they are the tensions. All forces are per unit of platform mass.
+they are the tensions. All forces are per unit of platform mass. Effects count with what they do
+at rest at time zero: constant and spring forces, tilted gravity, cable weight, biased and
+stretched cables.
 """
 
 from __future__ import annotations
@@ -10,11 +12,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import eigh, null_space
 
 from cdpr.batch import Bound, evaluate
 from cdpr.model import Model
-from cdpr.robot import Array
+from cdpr.robot import Array, finite
+from cdpr.rotation import matrix_from_angles
 
 TOLERANCE = 1e-11
 SWEEPS = 60
@@ -26,7 +28,8 @@ class Equilibrium:
 
     Attributes:
         zeta: pose coordinates, (6,).
-        lengths_m: cable lengths, (n,).
+        lengths_m: cable lengths as the winches would tell them, (n,): the geometric ones unless
+            effects lengthen the cables.
         tensions: specific tensions tau / m, (n,), positive when taut.
         stable: whether the energy has a strict minimum under the constraints.
         taut: whether every tension is positive.
@@ -67,14 +70,18 @@ def equilibrium_at_lengths(
 
     Args:
         model: the robot.
-        lengths_m: (n,).
+        lengths_m: as the winches tell them, (n,).
         start: pose, (6,).
         inertia: `INERTIA_NAMES` values, (9,).
         values: effect values, (k,).
+
+    Raises:
+        ValueError: for wrong shapes or numbers that are not finite.
     """
     values = model.start_values if values is None else values
     system = _System(model, inertia, values)
-    lengths_m = np.asarray(lengths_m, dtype=np.float64)
+    n = model.robot.n_cables
+    lengths_m, start = finite("lengths_m", lengths_m, n), finite("start", start, 6)
     zeta, multipliers = np.array(start, dtype=np.float64), None
     for _ in range(SWEEPS):
         gradient, hessian, lengths, jacobian = system.at(zeta, multipliers)
@@ -84,7 +91,7 @@ def equilibrium_at_lengths(
         gap = lengths - lengths_m
         if max(np.abs(gradient).max(), np.abs(gap).max()) < TOLERANCE:
             return _classified(system, zeta, multipliers)
-        free = null_space(jacobian)
+        free = _null_space(jacobian)
         step = -np.linalg.pinv(jacobian) @ gap
         # Along the free directions the energy must fall: flip the eigenvalues that would climb.
         if free.size:
@@ -113,10 +120,14 @@ def equilibrium_at_tensions(
 
     Stability is that of a platform whose winches hold tensions, not lengths: the whole Hessian
     must be positive definite.
+
+    Raises:
+        ValueError: for wrong shapes or numbers that are not finite.
     """
     values = model.start_values if values is None else values
     system = _System(model, inertia, values)
-    tensions = np.asarray(tensions, dtype=np.float64)
+    tensions = finite("tensions", tensions, model.robot.n_cables)
+    start = finite("start", start, 6)
     zeta = np.array(start, dtype=np.float64)
     for _ in range(3 * SWEEPS):
         gradient, hessian, lengths, _ = system.at(zeta, tensions)
@@ -155,13 +166,14 @@ def equilibria(
         ValueError: when not exactly one of lengths and tensions is given.
     """
     if (lengths_m is None) == (tensions is None):
-        raise ValueError("give either lengths_m or tensions")
+        raise ValueError("give either lengths_m or tensions, not both and not neither")
+    given = np.zeros(0) if tensions is None else tensions
     found: list[Equilibrium] = []
     for start in random_poses(model, generator, starts):
         if lengths_m is not None:
             reached = equilibrium_at_lengths(model, lengths_m, start, inertia, values)
         else:
-            reached = equilibrium_at_tensions(model, tensions, start, inertia, values)
+            reached = equilibrium_at_tensions(model, given, start, inertia, values)
         if reached is not None and not any(_same(reached, known) for known in found):
             found.append(reached)
     return tuple(sorted(found, key=lambda e: (not e.stable, not e.taut, e.zeta[2])))
@@ -190,10 +202,14 @@ def modes(
     values = model.start_values if values is None else values
     zeta = equilibrium.zeta
     _, _, hessian = evaluate(model.lagrangian, zeta, equilibrium.tensions, inertia, values)
-    free = null_space(evaluate(model.cables, zeta, values)[3])
+    free = _null_space(evaluate(model.cables, zeta, values)[3])
+    if not free.size:
+        raise ValueError(f"{model.robot.n_cables} cables leave no free motion, hence no modes")
     stiffness = free.T @ hessian @ free
     mass = free.T @ evaluate(model.mass_matrix, zeta, inertia, values)[0] @ free
-    squares, vectors = eigh(stiffness, mass)
+    unit = np.linalg.inv(np.linalg.cholesky(mass)).T
+    squares, vectors = np.linalg.eigh(unit.T @ stiffness @ unit)
+    vectors = unit @ vectors
     if squares[0] <= 0.0:
         raise ValueError(
             f"the equilibrium at {np.array2string(zeta, precision=3)} is not stable "
@@ -202,37 +218,50 @@ def modes(
     return Modes(np.sqrt(squares) / (2 * np.pi), free @ vectors, stiffness, mass)
 
 
+def _null_space(jacobian: Array) -> Array:
+    """Orthonormal directions that no row sees, (6, 6 - rank)."""
+    _, singular, rows = np.linalg.svd(jacobian)
+    return rows[int(np.sum(singular > 1e-12 * singular[0])) :].T
+
+
 def _same(first: Equilibrium, second: Equilibrium) -> bool:
-    return bool(np.abs(first.zeta - second.zeta).max() < 1e-6)
+    """Whether two poses are one; the same orientation may have other angles."""
+    turns = matrix_from_angles(np.array([first.zeta[3:], second.zeta[3:]]))
+    apart = max(np.abs(first.zeta[:3] - second.zeta[:3]).max(), np.abs(turns[0] - turns[1]).max())
+    return bool(apart < 1e-6)
 
 
 def _classified(system: _System, zeta: Array, multipliers: Array) -> Equilibrium:
     _, hessian, lengths, jacobian = system.at(zeta, multipliers)
-    free = null_space(jacobian)
+    free = _null_space(jacobian)
     reduced = np.linalg.eigvalsh(free.T @ hessian @ free) if free.size else np.ones(1)
     stable, taut = bool(reduced[0] > 0.0), bool((multipliers > 0.0).all())
     return Equilibrium(zeta, lengths, multipliers, stable, taut)
 
 
 class _System:
-    """Gradient and Hessian of the Lagrangian, lengths and their Jacobian, at one pose."""
+    """Gradient and Hessian of the Lagrangian, told lengths and Jacobian, at one pose."""
 
     def __init__(self, model: Model, inertia: Array, values: Array) -> None:
         self._lagrangian = Bound(model.lagrangian, 1)
         self._cables = Bound(model.cables, 1)
-        self._lagrangian.inputs[2][:] = inertia
-        self._lagrangian.inputs[3][:] = values
+        self._told = Bound(model.told, 1)
+        inertia = finite("inertia", inertia, 9)
+        values = finite("values", values, len(model.parameters))
+        for bound, place in ((self._lagrangian, 2), (self._told, 3)):
+            bound.inputs[place][:] = inertia
+            bound.inputs[place + 1][:] = values
         self._cables.inputs[1][:] = values
 
     def at(self, zeta: Array, multipliers: Array | None) -> tuple[Array, Array, Array, Array]:
-        lagrangian, cables = self._lagrangian, self._cables
-        lagrangian.inputs[0][0] = cables.inputs[0][0] = zeta
+        lagrangian, cables, told = self._lagrangian, self._cables, self._told
+        lagrangian.inputs[0][0] = cables.inputs[0][0] = told.inputs[1][0] = zeta
         lagrangian.inputs[1][:] = 0.0 if multipliers is None else multipliers
-        lagrangian.run()
-        cables.run()
+        for bound in (lagrangian, cables, told):
+            bound.run()
         return (
             lagrangian.outputs[1][0].copy(),
             lagrangian.outputs[2][0].T.copy(),
-            cables.outputs[0][0].copy(),
+            told.outputs[0][0].copy(),
             cables.outputs[3][0].T.copy(),
         )

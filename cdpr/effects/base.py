@@ -50,7 +50,8 @@ class Instant:
         omega: angular velocity in the base frame, (3,).
         com: P to centre of mass in the base frame, (3,).
         cables: lengths and angles, one a cable.
-        tensions: specific tensions tau / m (n,), without the effects that need them.
+        tensions: specific tensions tau / m (n,), without the effects that need them; None for
+            effects that do not.
     """
 
     time_s: Expression
@@ -60,7 +61,7 @@ class Instant:
     omega: Expression
     com: Expression
     cables: tuple[CableState, ...]
-    tensions: Expression | None = None
+    tensions: Expression = None
 
     @property
     def velocity(self) -> Expression:
