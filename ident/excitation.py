@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +16,7 @@ import numpy as np
 from cdpr.documents import DataError, replace_file, write_json
 from cdpr.free_motion import choose_free_coordinates
 from cdpr.model import build_model
-from cdpr.robot import INERTIA_NAMES, Array, Robot
+from cdpr.robot import Array, Robot
 from cdpr.robot_file import read_robot
 from cdpr.statics import random_poses
 from ident.excitation_choice import (
@@ -30,72 +29,18 @@ from ident.excitation_choice import (
     reduced,
     stacked_cost,
 )
-from ident.excitation_information import MeasurementNoise, predicted_std, swing_information
+from ident.excitation_information import predicted_std, swing_information
+from ident.excitation_options import ExcitationOptions, Plan, check_options
 from ident.excitation_picture import swings_svg
 from ident.excitation_refine import refine
-from ident.excitation_swings import Bench, Swing, SwingLimits, random_swing
+from ident.excitation_release import WinchRelease, winch_release
+from ident.excitation_sampling import random_swing
+from ident.excitation_swings import Bench, Swing, SwingLimits
+from ident.excitation_tables import plan_document, plan_table, release_table
+
+__all__ = ["ExcitationOptions", "Plan", "SwingLimits", "excite", "make_bench", "plan_swings"]
 
 Progress = Callable[[str, float], None]
-
-_GOOD_COST = 10.0
-CRITERIA = ("cost", "information")
-
-
-@dataclass(frozen=True, slots=True)
-class ExcitationOptions:
-    """What is asked of a plan.
-
-    Attributes:
-        n_swings: equilibria n_e.
-        n_samples: samples a swing.
-        duration_s: length of a swing.
-        limits: what every swing keeps.
-        criterion: "cost" for C of eq. (40), "information" for D-optimality of the
-            maximum-likelihood estimate.
-        n_library: random swings to choose from.
-        n_starts: random plans that exchange starts from.
-        rounds: rounds of refinement by gradients ("cost" alone).
-        n_random: random plans to score beside the best one.
-        noise: of the measurements, for the predicted standard deviations.
-        mass_kg: overrules the robot file's.
-        seed: of all chance.
-    """
-
-    n_swings: int = 12
-    n_samples: int = 100
-    duration_s: float = 10.0
-    limits: SwingLimits = field(default_factory=SwingLimits)
-    criterion: str = "cost"
-    n_library: int = 96
-    n_starts: int = 30
-    rounds: int = 6
-    n_random: int = 0
-    noise: MeasurementNoise = field(default_factory=MeasurementNoise)
-    mass_kg: float | None = None
-    seed: int = 0
-
-
-@dataclass(frozen=True, slots=True)
-class Plan:
-    """Swings to record.
-
-    Attributes:
-        swings: in the order of a short way from one to the next.
-        cost: C, from the motions simulated once more to 1e-10 m, W taken as a whole.
-        start_costs: what each start reached by exchange, rising.
-        history: C along the refinement.
-        random: C of random plans, (n_random,).
-        std: predicted standard deviations of the inertia values, (9,).
-        seconds: making the library, all starts, and the refinement.
-    """
-
-    swings: tuple[Swing, ...]
-    cost: float
-    start_costs: tuple[float, ...]
-    history: tuple[float, ...]
-    random: Array
-    std: Array
-    seconds: tuple[float, float, float]
 
 
 def excite(
@@ -105,6 +50,8 @@ def excite(
     results: Path | str | None = None,
 ) -> dict:
     """Plan the swings of a robot; write results/excitation.json, .csv and .svg beside its file.
+
+    With `options.winch`, excitation-release/<swing>.csv tells what each winch is to do.
 
     Args:
         path: robot.toml.
@@ -128,6 +75,10 @@ def excite(
     write_json(results / "excitation.json", document)
     replace_file(results / "excitation.csv", plan_table(bench, plan).encode())
     replace_file(results / "excitation.svg", swings_svg(bench, plan.swings).encode())
+    for k, release in enumerate(plan.releases):
+        if release is not None:
+            table = release_table(bench, release)
+            replace_file(results / "excitation-release" / f"{k + 1:02d}.csv", table.encode())
     say("plan", 1.0)
     return document
 
@@ -159,27 +110,6 @@ def make_bench(robot: Robot, options: ExcitationOptions) -> Bench:
     )
 
 
-def check_options(options: ExcitationOptions) -> None:
-    """Refuse options that make no sense.
-
-    Raises:
-        ValueError: naming the option, its value and its limit.
-    """
-    low, high = options.limits.tension_N
-    if not 0 <= low < high:
-        raise ValueError(f"tension limits {low:g} to {high:g} N: need 0 <= lowest < highest")
-    for name in ("n_swings", "n_samples", "n_starts"):
-        value, least = getattr(options, name), {"n_samples": 10}.get(name, 1)
-        if value < least:
-            raise ValueError(f"{name} is {value}, must be at least {least}")
-    if options.n_library < options.n_swings:
-        raise ValueError(
-            f"n_library is {options.n_library}, must be at least n_swings = {options.n_swings}"
-        )
-    if options.criterion not in CRITERIA:
-        raise ValueError(f"criterion {options.criterion!r} must be one of {', '.join(CRITERIA)}")
-
-
 def plan_swings(bench: Bench, options: ExcitationOptions, progress: Progress) -> Plan:
     """Library, starts, refinement and check.
 
@@ -208,6 +138,7 @@ def plan_swings(bench: Bench, options: ExcitationOptions, progress: Progress) ->
         history=history,
         random=random_costs(grams, options.n_swings, options.n_random, rng),
         std=predicted_std(information),
+        releases=_releases(bench, swings, progress) if options.winch else (),
         seconds=(made - begun, started - made, refined - started),
     )
 
@@ -238,57 +169,6 @@ def checked_cost(bench: Bench, swings: tuple[Swing, ...]) -> float:
     return stacked_cost(np.concatenate(stacked).reshape(-1, 10))
 
 
-def plan_document(bench: Bench, options: ExcitationOptions, plan: Plan) -> dict:
-    """results/excitation.json as a dictionary."""
-    document = {
-        "format": "freeswing-excitation/1",
-        "cost_C": plan.cost,
-        "equilibria": [_entry(bench, swing) for swing in plan.swings],
-        "criterion": options.criterion,
-        "free_coordinates": list(bench.free),
-        "samples_per_swing": bench.n_samples,
-        "duration_s": bench.duration_s,
-        "limits": {
-            "tension_N": list(options.limits.tension_N),
-            "reach_m": options.limits.reach_m,
-            "amplification": options.limits.amplification,
-        },
-        "mass_kg": bench.mass_kg,
-        "predicted_std": dict(zip(INERTIA_NAMES, plan.std.tolist(), strict=True)),
-        "starts": {"count": len(plan.start_costs), "costs": list(plan.start_costs)},
-        "refinement": list(plan.history),
-        "seconds": dict(zip(("library", "starts", "refinement"), plan.seconds, strict=True)),
-        "random_plans": None,
-    }
-    if len(plan.random):
-        quantiles = np.quantile(plan.random, [0.0, 0.1, 0.5, 0.9, 1.0]).tolist()
-        document["random_plans"] = {
-            "count": len(plan.random),
-            "quantiles": dict(zip(("0", "10", "50", "90", "100"), quantiles, strict=True)),
-            "share_below_10": float((plan.random < _GOOD_COST).mean()),
-        }
-    return document
-
-
-def plan_table(bench: Bench, plan: Plan) -> str:
-    """The table to take to the robot: one swing a row, as CSV."""
-    names = [cable.name for cable in bench.model.robot.cables]
-    free = bench.free_indices
-    header = ["swing", *(f"l_{name}_m" for name in names)]
-    header += [f"rest_{c}" for c in bench.free] + [f"displace_{c}" for c in bench.free]
-    header += ["lowest_tension_N", "highest_tension_N"]
-    header += [f"frequency_{k + 1}_hz" for k in range(len(free))]
-    rows = [",".join(header)]
-    for k, swing in enumerate(plan.swings):
-        rest = swing.equilibrium
-        away = (swing.release - rest.zeta)[free]
-        numbers = [*rest.lengths_m, *rest.zeta[free], *away]
-        tail = [*swing.tension_N, *swing.frequencies_hz]
-        cells = [str(k + 1), *(f"{v:.4f}" for v in numbers), *(f"{v:.2f}" for v in tail)]
-        rows.append(",".join(cells))
-    return "\n".join([*rows, ""])
-
-
 def _starts(
     bench: Bench,
     options: ExcitationOptions,
@@ -313,6 +193,20 @@ def _starts(
     return sorted(found, key=lambda choice: choice.cost)
 
 
+def _releases(
+    bench: Bench, swings: tuple[Swing, ...], progress: Progress
+) -> tuple[WinchRelease | None, ...]:
+    """The winches' motion of each swing; None where the limits leave none."""
+    found: list[WinchRelease | None] = []
+    for k, swing in enumerate(swings):
+        progress("releases", k / len(swings))
+        try:
+            found.append(winch_release(bench, swing))
+        except ValueError:
+            found.append(None)
+    return tuple(found)
+
+
 def _in_short_order(swings: tuple[Swing, ...]) -> tuple[Swing, ...]:
     """Each next swing is the nearest by its lengths, from the shortest on."""
     left = sorted(swings, key=lambda s: float(s.equilibrium.lengths_m.sum()))
@@ -322,20 +216,3 @@ def _in_short_order(swings: tuple[Swing, ...]) -> tuple[Swing, ...]:
         gaps = [float(np.abs(s.equilibrium.lengths_m - here).max()) for s in left]
         ordered.append(left.pop(int(np.argmin(gaps))))
     return tuple(ordered)
-
-
-def _entry(bench: Bench, swing: Swing) -> dict:
-    rest = swing.equilibrium
-    return {
-        "cable_lengths_m": rest.lengths_m.tolist(),
-        "equilibrium": _pose_entry(rest.zeta),
-        "release": _pose_entry(swing.release),
-        "tension_range_N": list(swing.tension_N),
-        "frequencies_hz": swing.frequencies_hz.tolist(),
-        "conditioning": swing.amplification,
-        "reach": dict(zip(bench.free, swing.reach.tolist(), strict=True)),
-    }
-
-
-def _pose_entry(pose: Array) -> dict:
-    return {"position_m": pose[:3].tolist(), "angles_rad": pose[3:].tolist()}

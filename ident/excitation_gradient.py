@@ -148,4 +148,4 @@ def equilibrium_by_release(bench: Bench, rest: Equilibrium, release: Array) -> A
     there = evaluate(bench.model.cables, release, values)[3]
     matrix = np.block([[hessian, here.T], [here, np.zeros((n, n))]])
     right = np.vstack([np.zeros((6, 6)), there])
-    return np.linalg.solve(matrix, right)[:6]
+    return np.linalg.solve(matrix, right)[:6].astype(np.float64)

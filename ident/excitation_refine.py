@@ -89,14 +89,14 @@ def subproblem(basis: Array, plan: list[Swing], known: list[SwingSlopes], region
 
     C's extreme eigenvalues are smoothed to p-norms: at the best plans several of them meet.
     """
-    from scipy.optimize import LinearConstraint, minimize
+    from scipy.optimize import minimize
 
     total = reduced(np.sum([swing.gram for swing in plan], axis=0), basis)
     by = np.concatenate([reduced(s.gram.transpose(2, 0, 1), basis) for s in known])
     by = by * np.tile(_SCALE, len(plan))[:, None, None]
     count, width = len(plan), max(len(s.excess) for s in known)
     rows = np.zeros((count * width, 6 * count))
-    bounds = np.full(count * width, np.inf)
+    bounds = np.ones(count * width)
     for k, s in enumerate(known):
         place = slice(k * width, k * width + len(s.excess))
         rows[place, 6 * k : 6 * k + 6] = s.excess_by * _SCALE
@@ -107,7 +107,11 @@ def subproblem(basis: Array, plan: list[Swing], known: list[SwingSlopes], region
         jac=True,
         method="SLSQP",
         bounds=[(-region, region)] * (6 * count),
-        constraints=[LinearConstraint(rows, -np.inf, bounds)],
+        constraints={
+            "type": "ineq",
+            "fun": lambda x: bounds - rows @ x,
+            "jac": lambda _: -rows,
+        },
         options={"maxiter": 40, "ftol": 1e-4},
     )
     steps = np.where(np.isfinite(found.x), found.x, 0.0).reshape(count, 6)
@@ -129,7 +133,8 @@ def smooth_cost(total: Array, by: Array, step: Array) -> tuple[float, Array]:
     weights = 0.5 / (root * (root + 1)) * by_largest - 0.5 / smallest * by_smallest
     gradient_matrix = (vectors * weights) @ vectors.T
     value = np.log(root + 1) - 0.5 * np.log(smallest)
-    return float(value), np.tensordot(by, gradient_matrix, axes=2)
+    slope = np.tensordot(by, gradient_matrix, axes=2)
+    return float(value), np.asarray(slope, dtype=np.float64)
 
 
 def _moved(bench: Bench, swing: Swing, step: Array) -> Swing:

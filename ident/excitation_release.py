@@ -20,6 +20,7 @@ from cdpr.model import Model
 from cdpr.robot import Array
 from cdpr.sensitivity import Linearised, linearise
 from cdpr.simulation import Motion, simulate
+from ident.excitation_quadratic import least_effort
 from ident.excitation_swings import Bench, Swing
 
 STROKES = 6
@@ -30,10 +31,6 @@ _CLOSED_M = 1e-9
 _GRID_S = 0.01
 _COARSE_S = 0.04
 _TENSION_MARGIN = 0.001
-_SLACK_PRICE = 1e3
-_MOST_CUTS = 12
-_CUTS = 6
-_ALLOWED_EXCESS = 1e-4
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,12 +125,13 @@ def driven_model(model: Model, duration_s: float) -> Model:
     built = {
         name: ca.Function(
             name,
-            *inputs_and_outputs,
+            inputs,
+            outputs,
             getattr(model, name).name_in(),
             getattr(model, name).name_out(),
             {"cse": True},
         )
-        for name, inputs_and_outputs in functions.items()
+        for name, (inputs, outputs) in functions.items()
     }
     names = [f"stroke_{k + 1}_{c.name}_m" for k in range(STROKES) for c in model.robot.cables]
     parameters = tuple(Parameter(name, -1.0, 1.0, 0.05) for name in names)
@@ -169,7 +167,7 @@ class _Drive:
         self.grid = np.linspace(0, duration_s, round(duration_s / _COARSE_S) + 1)
         curves = np.gradient(np.gradient(stroke_shapes(duration_s, self.grid), axis=0), axis=0)
         effort = curves.T @ curves / _COARSE_S**4 / len(self.grid)
-        self.effort = np.kron(effort, np.eye(n))
+        self.effort: Array = np.kron(effort, np.eye(n)).astype(np.float64)
 
     def motion(self, strokes: Array) -> Motion:
         """From rest, with these strokes."""
@@ -249,54 +247,6 @@ class _Drive:
             fastest_m_s=float(np.abs(np.gradient(told, grid, axis=0)).max()),
             miss=(float(gap[:6].max()), float(gap[6:].max())),
         )
-
-
-def least_effort(
-    effort: Array, equal: Array, target: Array, rows: Array, low: Array, high: Array
-) -> Array:
-    """Minimiser of x' effort x with equal x = target and low <= rows x <= high, the last softly.
-
-    Rows are taken up as they are broken; one slack, heavily priced, keeps the problem solvable
-    where the limits cannot be met.
-    """
-    scale = np.maximum(high - low, 1e-9)
-    held: list[int] = []
-    step = _quadratic(effort, equal, target, rows[held], low[held], high[held])
-    for _ in range(_MOST_CUTS):
-        moved = rows @ step
-        excess = np.maximum(low - moved, moved - high) / scale
-        worst = [int(k) for k in np.argsort(-excess)[:_CUTS] if excess[k] > _ALLOWED_EXCESS]
-        fresh = [k for k in worst if k not in held]
-        if not fresh:
-            break
-        held += fresh
-        step = _quadratic(effort, equal, target, rows[held], low[held], high[held])
-    return step
-
-
-def _quadratic(
-    effort: Array, equal: Array, target: Array, rows: Array, low: Array, high: Array
-) -> Array:
-    """As `least_effort`, all rows at once, by an active-set method."""
-    size, scale = len(effort), np.trace(effort) / len(effort)
-    hessian = np.zeros((size + 1, size + 1))
-    hessian[:size, :size] = effort / scale
-    hessian[size, size] = 1e-6
-    slope = np.zeros(size + 1)
-    slope[size] = _SLACK_PRICE
-    ones, none = np.ones((len(rows), 1)), np.zeros((len(equal), 1))
-    matrix = np.vstack(
-        [np.hstack([equal, none]), np.hstack([rows, ones]), np.hstack([rows, -ones])]
-    )
-    unbound = np.full(len(rows), np.inf)
-    lower = np.concatenate([target, low, -unbound])
-    upper = np.concatenate([target, unbound, high])
-    options = {"print_iter": False, "print_header": False, "print_info": False}
-    shapes = {"h": ca.Sparsity.dense(size + 1, size + 1), "a": ca.Sparsity.dense(*matrix.shape)}
-    solver = ca.conic("release", "qrqp", shapes, {**options, "error_on_fail": False})
-    floor = np.append(np.full(size, -np.inf), 0.0)
-    found = solver(h=hessian, g=slope, a=matrix, lba=lower, uba=upper, lbx=floor)
-    return np.array(found["x"]).ravel()[:size]
 
 
 def _end_state(motion: Motion, duration_s: float) -> Array:

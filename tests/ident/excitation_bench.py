@@ -8,7 +8,8 @@ import numpy as np
 
 from cdpr.model import build_model
 from cdpr.robot import Cable, Platform, Robot
-from ident.excitation_swings import Bench, Swing, random_swing
+from ident.excitation_sampling import random_swing
+from ident.excitation_swings import Bench, Swing
 
 X, Y, Z = np.eye(3)
 

@@ -12,7 +12,7 @@ from cdpr.documents import DataError
 from cdpr.robot import Platform
 from cdpr.robot_file import write_robot
 from cdpr.statics import equilibrium_at_lengths
-from ident.excitation import ExcitationOptions, check_options, excite, make_bench
+from ident.excitation import ExcitationOptions, excite, make_bench
 from ident.excitation_choice import (
     choose,
     excitation_cost,
@@ -24,6 +24,7 @@ from ident.excitation_gradient import (
     lagrange_regressor,
 )
 from ident.excitation_information import predicted_std, swing_information
+from ident.excitation_options import check_options
 from ident.excitation_refine import plan_cost, refine, smooth_cost
 from ident.excitation_swings import SwingLimits, keeps_limits, released, swing_from
 
@@ -230,7 +231,7 @@ def test_missing_values_are_named():
 
 def test_limits_that_nothing_keeps_are_an_error():
     bench = replace(paper_bench(), limits=SwingLimits(tension_N=(500.0, 600.0)))
-    from ident.excitation_swings import random_swing
+    from ident.excitation_sampling import random_swing
 
     with pytest.raises(ValueError, match="within the limits"):
         random_swing(bench, np.random.default_rng(0), 20)
