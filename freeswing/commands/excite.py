@@ -14,6 +14,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("robot", metavar="ROBOT", help="robot.toml with nominal inertia and mass")
     add_results(parser, "ROBOT's folder/results")
     parser.add_argument("--swings", type=int, default=12, metavar="N", help="default 12")
+    parser.add_argument("--samples", type=int, default=100, metavar="N", help="a swing (100)")
     parser.add_argument("--duration-s", type=float, default=10.0, help="of a swing, default 10")
     parser.add_argument(
         "--tension-n",
@@ -25,7 +26,16 @@ def add_arguments(parser: ArgumentParser) -> None:
     )
     parser.add_argument("--reach-m", type=float, default=0.1, help="displacement, default 0.1")
     parser.add_argument("--mass-kg", type=float, help="instead of the robot file's")
+    parser.add_argument("--starts", type=int, default=30, metavar="N", help="default 30")
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument(
+        "--random", type=int, default=0, metavar="N", help="score N random plans beside the best"
+    )
+    parser.add_argument(
+        "--winch",
+        action="store_true",
+        help="plan motions of the winches that let the swings go (excitation-release/*.csv)",
+    )
     parser.add_argument(
         "--criterion",
         choices=("cost", "information"),
@@ -43,6 +53,10 @@ def run(options: Namespace, console: Console) -> None:
     asked = ExcitationOptions(
         n_swings=options.swings,
         n_library=max(96, 8 * options.swings),
+        n_samples=options.samples,
+        n_starts=options.starts,
+        n_random=options.random,
+        winch=options.winch,
         duration_s=options.duration_s,
         limits=limits,
         criterion=options.criterion,
@@ -52,9 +66,17 @@ def run(options: Namespace, console: Console) -> None:
     folder = path.parent / "results" if options.results is None else Path(options.results)
     document = excite(path, asked, console.progress, folder)
     console.say(f"conditioning cost C {document['cost_C']:.2f} (below 10 is good)")
+    random = document["random_plans"]
+    if random:
+        console.say(
+            f"{random['count']} random plans: median {random['quantiles']['50']:.2f}, best "
+            f"{random['quantiles']['0']:.2f}, {100 * random['share_below_10']:.0f} % below 10"
+        )
     for count, entry in enumerate(document["equilibria"], start=1):
         lengths = ", ".join(f"{value:.3f}" for value in entry["cable_lengths_m"])
         low, high = entry["tension_range_N"]
-        console.say(f"  {count:2}: lengths {lengths} m, tensions {low:.0f} to {high:.0f} N")
+        winch = entry.get("winch_release", "")
+        told = "; by hand: no winch motion within the limits" if winch is None else ""
+        console.say(f"  {count:2}: lengths {lengths} m, tensions {low:.0f} to {high:.0f} N{told}")
     console.say(str(folder / "excitation.json"))
     console.show_file(folder / "excitation.json")
