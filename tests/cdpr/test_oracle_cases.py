@@ -69,6 +69,7 @@ def test_nothing_is_visible_in_a_clean_session(sessions: dict[str, SessionTruth]
     assert seen < 0.05, f"{seen:.3f} standard deviations of nothing"
 
 
+@pytest.mark.slow
 def test_larger_drag_is_more_visible(sessions: dict[str, SessionTruth]) -> None:
     small, large = (visibility(sessions[size], "bologna-4") for size in ("small", "large"))
     assert small > 1.0, f"small {small:.2f}"

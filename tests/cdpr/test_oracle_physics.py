@@ -53,7 +53,7 @@ def furthest_mm(a: Motion, b: Motion) -> float:
     return 1e3 * float(np.max(np.linalg.norm(a.positions_m - b.positions_m, axis=1)))
 
 
-@pytest.mark.parametrize("name", sorted(START))
+@pytest.mark.parametrize("name", ["bologna-4", pytest.param("three-cable", marks=pytest.mark.slow)])
 def test_mujoco_swings_along(name: str) -> None:
     robot, world, rest = hanging(name, eyelets=True)
     motion = swing(world, rest)

@@ -12,7 +12,7 @@ from tests.oracle.effects import Effect, Scene, changed, random_direction
 OUTSIDE_MAGNITUDES: dict[str, tuple[str, float, float, float]] = {
     "hanging_bob": ("mass_kg", 0.05, 0.15, 0.4),
     "contact": ("stiffness_n_m", 100.0, 400.0, 1500.0),
-    "magnet": ("force_at_0.3_m_n", 1.0, 3.0, 10.0),
+    "magnet": ("force_at_0.3_m_n", 2.0, 8.0, 25.0),
     "winch_hunting": ("amplitude_m", 5e-5, 2e-4, 6e-4),
     "negative_damping": ("rate_1_s", -0.003, -0.01, -0.03),
     "chirp_force": ("amplitude_n", 0.05, 0.15, 0.5),
