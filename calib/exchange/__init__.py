@@ -1,0 +1,83 @@
+"""Cameras to and from other programs' files."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Sequence
+from pathlib import Path
+
+from calib.camera import Camera
+from calib.cameras_file import read_cameras, write_cameras
+from cdpr.documents import InputError
+
+FORMATS = ("freeswing", "opencv", "kalibr", "ros", "anipose", "colmap", "qualisys")
+_MODULES = {
+    "opencv": "opencv_yaml",
+    "kalibr": "kalibr",
+    "ros": "ros",
+    "anipose": "anipose",
+    "colmap": "colmap",
+    "qualisys": "qualisys",
+}
+
+
+def read(path: Path | str, kind: str | None = None) -> tuple[Camera, ...]:
+    """Cameras from a file (COLMAP, several ROS cameras: a folder) of another program.
+
+    Args:
+        path: the file or folder.
+        kind: one of `FORMATS`; guessed from name and content when None.
+
+    Raises:
+        InputError: when it cannot be read as such.
+    """
+    path = Path(path)
+    kind = kind or guess(path)
+    if kind == "freeswing":
+        return read_cameras(path)
+    return _module(kind).read(path)
+
+
+def write(path: Path | str, cameras: Sequence[Camera], kind: str) -> None:
+    """Cameras as another program's file; its pixel convention and units are kept.
+
+    Raises:
+        InputError: when the format cannot hold the lens.
+    """
+    if kind == "freeswing":
+        write_cameras(path, tuple(cameras))
+        return
+    _module(kind).write(Path(path), cameras)
+
+
+def guess(path: Path) -> str:
+    """The format of a file or folder.
+
+    Raises:
+        InputError: when nothing known is there.
+    """
+    if path.is_dir():
+        return "colmap" if (path / "cameras.txt").is_file() else "ros"
+    if not path.is_file():
+        raise InputError(f"{path}: no such file")
+    start = path.read_bytes()[:20000].decode(errors="replace")
+    signs = (
+        ("freeswing", 'format = "freeswing-cameras'),
+        ("opencv", "!!opencv-matrix"),
+        ("qualisys", "<calibration"),
+        ("ros", "camera_matrix:"),
+        ("kalibr", "intrinsics:"),
+        ("anipose", "distortions"),
+    )
+    for kind, sign in signs:
+        if sign in start:
+            return kind
+    if path.name == "cameras.txt":
+        return "colmap"
+    raise InputError(f"{path}: not a camera file known here; name the format: {', '.join(FORMATS)}")
+
+
+def _module(kind: str):
+    if kind not in _MODULES:
+        raise InputError(f"camera format {kind!r} is not one of {', '.join(FORMATS)}")
+    return importlib.import_module(f"calib.exchange.{_MODULES[kind]}")

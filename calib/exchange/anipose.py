@@ -1,0 +1,69 @@
+"""Anipose's and Caliscope's calibration toml; lengths are taken as metres."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from calib.camera import Camera
+from calib.camera_models import FISHEYE
+from calib.exchange.lens import distortion, lens, matrix, shortest
+from cdpr.documents import InputError, dump_toml, read_text
+from cdpr.rotation import exp_rotation, log_rotation, transform
+
+_MOST_BYTES = 1 << 24
+
+
+def read(path: Path) -> tuple[Camera, ...]:
+    """Cameras of `[cam_0]` tables (Anipose) or `[cameras.0]` tables (Caliscope)."""
+    try:
+        document = tomllib.loads(read_text(path, _MOST_BYTES))
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{path}: not toml: {error}") from error
+    tables = document.get("cameras", document)
+    entries = [(k, v) for k, v in tables.items() if isinstance(v, dict) and "matrix" in v]
+    if not entries:
+        raise InputError(f"{path}: holds no camera with a matrix")
+    cameras = []
+    for key, entry in entries:
+        try:
+            cameras.append(_camera(key, entry))
+        except (KeyError, TypeError, ValueError) as error:
+            raise InputError(f"{path}: {key}: {error}") from error
+    return tuple(cameras)
+
+
+def _camera(key: str, entry: dict[str, Any]) -> Camera:
+    K = np.array(entry["matrix"], dtype=np.float64).reshape(3, 3)
+    fisheye = bool(entry.get("fisheye", False))
+    coefficients = np.array(entry["distortions"], dtype=np.float64)
+    model, params = lens(K[[0, 1], [0, 1]], K[:2, 2], coefficients, fisheye=fisheye)
+    turn = np.array(entry.get("rotation", np.zeros(3)), dtype=np.float64)
+    R = turn.reshape(3, 3) if turn.size == 9 else exp_rotation(turn.reshape(3))
+    shift = np.array(entry.get("translation", np.zeros(3)), dtype=np.float64).reshape(3)
+    width, height = (int(size) for size in entry["size"])
+    name = str(entry.get("name", entry.get("cam_id", key)))
+    return Camera(name, (width, height), model, params, transform(R, shift))
+
+
+def write(path: Path, cameras: Sequence[Camera]) -> None:
+    """Anipose's layout, which Caliscope reads too."""
+    table: dict[str, Any] = {}
+    for index, camera in enumerate(cameras):
+        is_fisheye = camera.model == FISHEYE
+        coefficients = distortion(camera) if is_fisheye else shortest(distortion(camera), (5, 8))
+        table[f"cam_{index}"] = {
+            "name": camera.name,
+            "size": list(camera.size_px),
+            "matrix": matrix(camera).tolist(),
+            "distortions": coefficients.tolist(),
+            "rotation": log_rotation(camera.T_camera_base[:3, :3]).tolist(),
+            "translation": camera.T_camera_base[:3, 3].tolist(),
+            "fisheye": is_fisheye,
+        }
+    table["metadata"] = {"adjusted": True}
+    dump_toml(path, table)

@@ -1,0 +1,76 @@
+"""COLMAP's text model: a folder with cameras.txt, images.txt and an empty points3D.txt.
+
+COLMAP puts the corner of the top-left pixel at (0, 0), its centre at (0.5, 0.5): principal points
+are shifted by half a pixel both ways. The base frame is COLMAP's world.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from calib.camera import Camera
+from calib.camera_models import PARAMETER_NAMES
+from cdpr.documents import InputError, read_text, replace_file
+from cdpr.rotation import matrix_from_quaternion, quaternion_from_matrix, transform
+
+HALF_PIXEL = 0.5
+_MOST_BYTES = 1 << 28
+
+
+def read(path: Path) -> tuple[Camera, ...]:
+    """One camera an image, named as the image without suffix; `path` is the folder."""
+    folder = path if path.is_dir() else path.parent
+    lenses: dict[str, tuple[str, tuple[int, int], np.ndarray]] = {}
+    for row in _rows(folder / "cameras.txt"):
+        number, model, width, height, *params = row
+        if model not in PARAMETER_NAMES:
+            raise InputError(f"{folder / 'cameras.txt'}: model {model} is not supported")
+        values = np.array(params, dtype=np.float64)
+        values[_centre(model)] -= HALF_PIXEL
+        lenses[number] = (model, (int(width), int(height)), values)
+    cameras = []
+    for row in _rows(folder / "images.txt"):
+        if len(row) < 10 or not row[0].isdigit() or row[8] not in lenses:
+            continue  # the line of image points that follows each image
+        q, t = np.array(row[1:5], dtype=np.float64), np.array(row[5:8], dtype=np.float64)
+        model, size, params = lenses[row[8]]
+        pose = transform(matrix_from_quaternion(q), t)
+        cameras.append(Camera(Path(" ".join(row[9:])).stem, size, model, params, pose))
+    if not cameras:
+        raise InputError(f"{folder / 'images.txt'}: holds no image with a camera of cameras.txt")
+    return tuple(cameras)
+
+
+def _rows(path: Path) -> list[list[str]]:
+    lines = read_text(path, _MOST_BYTES).splitlines()
+    return [line.split() for line in lines if line.strip() and not line.startswith("#")]
+
+
+def _centre(model: str) -> list[int]:
+    names = PARAMETER_NAMES[model]
+    return [names.index("cx"), names.index("cy")]
+
+
+def write(path: Path, cameras: Sequence[Camera]) -> None:
+    """The folder's three files; each camera is one image `<camera>.png`."""
+    lenses, images = [], []
+    for number, camera in enumerate(cameras, start=1):
+        params = np.array(camera.params)
+        params[_centre(camera.model)] += HALF_PIXEL
+        width, height = camera.size_px
+        lenses.append(f"{number} {camera.model} {width} {height} {_numbers(params)}")
+        q = quaternion_from_matrix(camera.T_camera_base[:3, :3])
+        t = camera.T_camera_base[:3, 3]
+        images += [f"{number} {_numbers(q)} {_numbers(t)} {number} {camera.name}.png", ""]
+    header = "# CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]\n"
+    replace_file(path / "cameras.txt", (header + "\n".join(lenses) + "\n").encode())
+    header = "# IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME\n# POINTS2D[] as (X, Y, ID)\n"
+    replace_file(path / "images.txt", (header + "\n".join(images) + "\n").encode())
+    replace_file(path / "points3D.txt", b"# POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[]\n")
+
+
+def _numbers(values: np.ndarray) -> str:
+    return " ".join(repr(float(value)) for value in values)

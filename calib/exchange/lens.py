@@ -1,0 +1,62 @@
+"""Lens parameters as other programs list them: OpenCV's distortion vector and its kin."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from calib.camera import Camera
+from calib.camera_models import FISHEYE, Array, full_parameters
+from cdpr.documents import InputError
+
+# places of FULL_OPENCV's k1 k2 p1 p2 k3 k4 k5 k6 in both lists are the same
+_MOST_COEFFICIENTS = 8
+
+
+def matrix(camera: Camera) -> Array:
+    """Camera matrix K, (3, 3)."""
+    fx, fy = camera.focal_px
+    cx, cy = camera.centre_px
+    return np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
+
+
+def distortion(camera: Camera) -> Array:
+    """OpenCV's coefficients: k1 k2 p1 p2 k3 k4 k5 k6, or the fisheye's k1 k2 k3 k4."""
+    if camera.model == FISHEYE:
+        return np.array(camera.params[4:])
+    return full_parameters(camera.model, camera.params)[4:]
+
+
+def shortest(coefficients: Array, lengths: tuple[int, ...]) -> Array:
+    """The coefficients without trailing zeros, at one of the lengths that a format takes.
+
+    Raises:
+        InputError: when the lens needs more coefficients than the format has.
+    """
+    used = int(np.flatnonzero(np.append(1.0, coefficients)).max())
+    for length in lengths:
+        if length >= used:
+            return np.pad(coefficients, (0, max(0, length - len(coefficients))))[:length]
+    raise InputError(
+        f"the lens uses {used} distortion coefficients, this format holds {lengths[-1]}; calibrate "
+        "with --model OPENCV or use another format"
+    )
+
+
+def lens(focal: Array, centre: Array, coefficients: Array, *, fisheye: bool) -> tuple[str, Array]:
+    """Model name and params from a camera matrix's entries and OpenCV's coefficients.
+
+    Raises:
+        InputError: for coefficients that no model here holds (thin prism, tilted sensor).
+    """
+    front = np.concatenate([focal, centre])
+    k = np.ravel(coefficients).astype(np.float64)
+    if not np.isfinite(np.concatenate([front, k])).all() or (np.asarray(focal) <= 0.0).any():
+        raise InputError(f"camera matrix or distortion {front.tolist()} {k.tolist()} is not a lens")
+    if fisheye:
+        return FISHEYE, np.concatenate([front, np.pad(k, (0, 4))[:4]])
+    if k[_MOST_COEFFICIENTS:].any():
+        raise InputError(f"{len(k)} distortion coefficients; thin prism and tilt are not supported")
+    k = np.pad(k, (0, _MOST_COEFFICIENTS))[:_MOST_COEFFICIENTS]
+    if k[4:].any():
+        return "FULL_OPENCV", np.concatenate([front, k])
+    return ("OPENCV", np.concatenate([front, k[:4]])) if k.any() else ("PINHOLE", front)

@@ -1,0 +1,80 @@
+"""ROS camera_info yaml: one camera a file, lens only (no pose, no clock)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from calib.camera import Camera
+from calib.camera_models import FISHEYE
+from calib.exchange.lens import distortion, lens, matrix, shortest
+from cdpr.documents import InputError, read_text, replace_file
+
+_MOST_BYTES = 1 << 20
+
+
+def read(path: Path) -> tuple[Camera, ...]:
+    """The camera of a file, or all cameras of a folder's *.yaml, at the identity pose."""
+    files = sorted(path.glob("*.yaml")) if path.is_dir() else [path]
+    if not files:
+        raise InputError(f"{path}: holds no *.yaml")
+    return tuple(_read_one(file) for file in files)
+
+
+def _read_one(path: Path) -> Camera:
+    import yaml
+
+    try:
+        entry: dict[str, Any] = yaml.safe_load(read_text(path, _MOST_BYTES))
+        K = np.array(entry["camera_matrix"]["data"], dtype=np.float64).reshape(3, 3)
+        coefficients = np.array(entry["distortion_coefficients"]["data"], dtype=np.float64)
+        kind = str(entry["distortion_model"])
+        size = (int(entry["image_width"]), int(entry["image_height"]))
+        fisheye = kind in ("equidistant", "fisheye")
+        model, params = lens(K[[0, 1], [0, 1]], K[:2, 2], coefficients, fisheye=fisheye)
+        return Camera(str(entry.get("camera_name", path.stem)), size, model, params, np.eye(4))
+    except (yaml.YAMLError, KeyError, TypeError, ValueError) as error:
+        raise InputError(f"{path}: not a ROS camera_info file ({error})") from error
+
+
+def write(path: Path, cameras: Sequence[Camera]) -> None:
+    """One file for one camera, else a folder with `<camera>.yaml`; poses are not stored."""
+    if len(cameras) == 1 and path.suffix:
+        replace_file(path, _text(cameras[0]).encode())
+        return
+    for camera in cameras:
+        replace_file(path / f"{camera.name}.yaml", _text(camera).encode())
+
+
+def _text(camera: Camera) -> str:
+    if camera.model == FISHEYE:
+        kind, coefficients = "equidistant", distortion(camera)
+    else:
+        coefficients = shortest(distortion(camera), (5, 8))
+        kind = "plumb_bob" if len(coefficients) == 5 else "rational_polynomial"
+    K = matrix(camera)
+    P = np.column_stack([K, np.zeros(3)])
+    parts = [
+        f"image_width: {camera.size_px[0]}",
+        f"image_height: {camera.size_px[1]}",
+        f"camera_name: {camera.name}",
+        *_matrix("camera_matrix", K),
+        f"distortion_model: {kind}",
+        *_matrix("distortion_coefficients", coefficients[None]),
+        *_matrix("rectification_matrix", np.eye(3)),
+        *_matrix("projection_matrix", P),
+    ]
+    return "\n".join(parts) + "\n"
+
+
+def _matrix(key: str, values: np.ndarray) -> list[str]:
+    rows, columns = values.shape
+    return [
+        f"{key}:",
+        f"  rows: {rows}",
+        f"  cols: {columns}",
+        f"  data: {values.ravel().tolist()}",
+    ]
