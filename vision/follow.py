@@ -89,6 +89,8 @@ class Follower:
     def look(self, image: Image, time_s: float) -> FrameView:
         """Everything known in the image taken at `time_s` by the camera's clock."""
         found: dict[int, TagFit] = {}
+        if self.past and time_s <= self.past[-1][0]:
+            self.past.clear()  # a clock that went back predicts nothing
         if self.watch.tags:
             predicted = extrapolate(self.past, time_s)
             if predicted is not None:
