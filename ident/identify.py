@@ -13,7 +13,7 @@ from cdpr.robot import Robot
 from ident.comparison import ParameterComparison, compare
 from ident.estimate import Estimate
 from ident.fidim_stage import Weighting, fidim_estimates
-from ident.maximum_likelihood import ml_estimate
+from ident.maximum_likelihood import best_ml_estimate
 from ident.prepare import (
     LARGEST_AMPLIFICATION,
     PreparedRuns,
@@ -25,6 +25,7 @@ from ident.prepare import (
 )
 from ident.runs import SwingRun
 from ident.signals import SignalSettings
+from ident.starts import likelihood_starts
 from ident.validate import ValidatedRun, validate_run
 
 FORMAT = "freeswing-identification/1"
@@ -125,13 +126,13 @@ def identify(
     except ValueError as error:
         raise DataError(str(error)) from error
     prepared, by_fidim, failures = fidim_estimates(model, prepared, settings.weighting, progress)
-    if not by_fidim:
-        raise DataError(_nothing_sentence(prepared, failures))
     estimates = dict(by_fidim)
     if settings.maximum_likelihood:
         added, more = _likelihood_estimates(model, prepared, by_fidim, progress)
         estimates.update(added)
         failures.update(more)
+    if not estimates:
+        raise DataError(_nothing_sentence(prepared, failures))
     best = next(n for n in ("ml_full", "ml_free", "fidim_full", "fidim_free") if n in estimates)
     comparison = {}
     for method in ("fidim", "ml"):
@@ -156,21 +157,23 @@ def _likelihood_estimates(
     by_fidim: dict[str, Estimate],
     progress: Progress | None,
 ) -> tuple[dict[str, Estimate], dict[str, str]]:
-    """Maximum likelihood, started from FIDIM's result."""
+    """Maximum likelihood, started from FIDIM's result or, where that leads nowhere, elsewhere."""
     found: dict[str, Estimate] = {}
     failures: dict[str, str] = {}
+    results = tuple(by_fidim[n].values for n in ("fidim_full", "fidim_free") if n in by_fidim)
+    starts = likelihood_starts(model, prepared, results)
     for full in (True, False):
         name = "ml_full" if full else "ml_free"
         runs = fittable(prepared, full)
-        start = by_fidim.get("fidim_full") or by_fidim.get("fidim_free")
-        if not runs or start is None:
+        if not runs:
             continue
         free = None if full else prepared.free
         try:
-            entry, _ = ml_estimate(model, runs, free, start.values, prepared.dropped, progress)
+            entry = best_ml_estimate(model, runs, free, starts, prepared.dropped, progress)
         except (ValueError, np.linalg.LinAlgError) as error:
             failures[name] = str(error)
             continue
+        starts = [entry.values, *starts]
         same_way = by_fidim.get("fidim_full" if full else "fidim_free")
         found[name] = replace(entry, mass=None if same_way is None else same_way.mass)
     return found, failures

@@ -13,10 +13,13 @@ from ident.fidim import WELL_IDENTIFIED_PERCENT, near_zero
 from ident.guess import first_state
 from ident.joint import State
 from ident.likelihood import LikelihoodFit, fit
-from ident.likelihood_run import Samples
+from ident.likelihood_run import Samples, predicted
 from ident.prepare import PreparedRun, Progress
 from ident.runs import DroppedRun
 from ident.samples import prepare
+from ident.starts import is_possible
+
+_ASTRAY = 0.5  # a lost swing is out of phase with its samples
 
 
 def ml_estimate(
@@ -46,6 +49,47 @@ def ml_estimate(
     state = State(np.array(inertia), model.start_values, states, np.ones(2))
     found = fit(model, samples, state, progress=progress)
     return _entry(found, dropped), found
+
+
+def best_ml_estimate(
+    model: Model,
+    runs: list[PreparedRun],
+    free: tuple[str, ...] | None,
+    starts: list[Array],
+    dropped: tuple[DroppedRun, ...] = (),
+    progress: Progress | None = None,
+) -> Estimate:
+    """The first fit from several starts that follows the runs, or else the likeliest of all.
+
+    A fit follows when its residuals are small beside the swings and a body can have its inertia.
+
+    Raises:
+        ValueError: when no start leads to a fit: what went wrong from the first.
+    """
+    found: list[tuple[float, Estimate]] = []
+    failure: Exception | None = None
+    for start in starts:
+        try:
+            entry, result = ml_estimate(model, runs, free, start, dropped, progress)
+        except (ValueError, np.linalg.LinAlgError) as error:
+            failure = failure or error
+            continue
+        if is_possible(entry.values) and _astray(result) < _ASTRAY:
+            return entry
+        found.append((result.deviance, entry))
+    if not found:
+        raise ValueError(str(failure)) from failure
+    return min(found, key=lambda pair: pair[0])[1]
+
+
+def _astray(found: LikelihoodFit) -> float:
+    """Largest share of a run's motion that its fit leaves unexplained, root mean square."""
+    shares = []
+    for motion, samples in zip(found.motions, found.samples, strict=True):
+        off = samples.values - predicted(motion, samples.times_s)[:, samples.columns]
+        spread = samples.values - samples.values.mean(axis=0)
+        shares.append(float(np.sqrt(np.sum(off**2) / np.sum(spread**2))))
+    return max(shares)
 
 
 def started(

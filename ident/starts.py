@@ -1,0 +1,63 @@
+"""Where maximum likelihood may start: FIDIM's results, then the nominal inertia."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from cdpr.free_motion import choose_free_coordinates
+from cdpr.model import Model
+from cdpr.robot import Array
+from ident.fidim import fidim
+from ident.motion import regressor
+from ident.prepare import PreparedRuns, guessed_inertia, usable
+
+_POSES_A_RUN = 10
+
+
+def is_possible(inertia: Array) -> bool:
+    """Whether a body can have this specific inertia: its pseudo-inertia is positive definite.
+
+    Args:
+        inertia: `INERTIA_NAMES` values, (9,).
+    """
+    com, (xx, yy, zz, xy, xz, yz) = inertia[:3], inertia[3:]
+    tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    second = 0.5 * np.trace(tensor) * np.eye(3) - tensor
+    return bool(np.linalg.eigvalsh(second - np.outer(com, com))[0] > 0.0)
+
+
+def likelihood_starts(
+    model: Model, prepared: PreparedRuns, by_fidim: tuple[Array, ...]
+) -> list[Array]:
+    """Inertias to start from, in the order in which to try them, each (9,).
+
+    Where poses were measured, FIDIM projected on the free coordinates that serve best comes first:
+    those declared may be near a singularity, which spoils every projection on them.
+
+    Args:
+        model: the robot.
+        prepared: the runs.
+        by_fidim: FIDIM's results.
+    """
+    candidates = [*_by_best_coordinates(model, prepared), *by_fidim]
+    nominal = model.robot.inertia
+    if nominal is not None:
+        candidates.append(nominal)
+    possible = [one for one in candidates if is_possible(one)]
+    return possible or [guessed_inertia(model.robot), *candidates]
+
+
+def _by_best_coordinates(model: Model, prepared: PreparedRuns) -> list[Array]:
+    """FIDIM by full poses on the best conditioned free coordinates; empty where it cannot be."""
+    motions = [run.full for run in usable(prepared, True, None) if run.full is not None]
+    if not motions:
+        return []
+    poses = [m.zetas[:: max(1, len(m.zetas) // _POSES_A_RUN)] for m in motions]
+    free, _ = choose_free_coordinates(model, np.concatenate(poses))
+    try:
+        found = fidim([regressor(model, replace(m, free=free)) for m in motions])
+    except (ValueError, np.linalg.LinAlgError):
+        return []
+    return [found.values]
