@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from cdpr.robot import INERTIA_NAMES, Array
 from ident.fidim import FidimEstimate
+from ident.frozen import freeze
 from ident.payload import MassEstimate
 from ident.runs import DroppedRun
 from ident.weighted import WeightedSolution
@@ -44,6 +45,9 @@ class Estimate:
     mass: MassEstimate | None = None
     reduced: dict[str, Any] | None = None
     extra: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        freeze(self, "values", "covariance", "essential")
 
     @property
     def std(self) -> Array:

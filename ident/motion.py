@@ -12,6 +12,7 @@ from cdpr.free_motion import assemble, free_basis
 from cdpr.model import Model
 from cdpr.robot import Array
 from cdpr.rotation import matrix_from_angles
+from ident.frozen import freeze
 from ident.signals import Signals, UnusableRunError
 
 LENGTH_LIMIT_M = 0.005
@@ -39,6 +40,9 @@ class SwingMotion:
     rates: Array
     accelerations: Array
     lengths_m: Array
+
+    def __post_init__(self) -> None:
+        freeze(self, "times_s", "zetas", "rates", "accelerations", "lengths_m")
 
 
 def mean_lengths(model: Model, signals: Signals) -> Array:

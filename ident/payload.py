@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdpr.robot import Array
+from ident.frozen import freeze
 from ident.runs import Payload
 
 _SWEEPS = 8
@@ -25,6 +26,9 @@ class LoadedCentre:
     payload: Payload
     com_m: Array
     covariance: Array
+
+    def __post_init__(self) -> None:
+        freeze(self, "com_m", "covariance")
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,6 +17,7 @@ from cdpr.robot import Array
 from cdpr.rotation import angle_rate_matrix
 from ident.band import LOWEST_PASS_HZ, best_pass_hz
 from ident.filters import Smoother, forward_difference_smoother, smoother
+from ident.frozen import freeze
 from ident.runs import SwingRun
 from ident.sampling import (
     Bridge,
@@ -111,6 +112,10 @@ class Signals:
     pass_hz: float
     missing: float
     jumps: int
+
+    def __post_init__(self) -> None:
+        freeze(self, "times_s", "values", "velocities", "accelerations", "covariances")
+        freeze(self, "noise_std")
 
     def select(self, coordinates: tuple[str, ...]) -> Signals:
         """The same signals of some of the coordinates, in the order asked for."""

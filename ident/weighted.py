@@ -17,6 +17,7 @@ from cdpr.batch import evaluate
 from cdpr.free_motion import free_basis
 from cdpr.model import Model
 from cdpr.robot import Array, frozen_array
+from ident.frozen import freeze
 from ident.motion import SwingMotion, free_motion, regressor
 from ident.signals import Signals
 
@@ -40,6 +41,9 @@ class NoisyRegressor:
     answers: Array
     covariances: Array
     period_s: float
+
+    def __post_init__(self) -> None:
+        freeze(self, "W", "answers", "covariances")
 
     def column_std(self) -> Array:
         """Root mean square noise of each column of W, (10,)."""
