@@ -41,9 +41,10 @@ def plain_regressor(bench, swing):
     motion = simulate(world, swing.release[:3], quaternion, bench.duration_s, rate_hz=RATE_HZ)
     gap = round(RATE_HZ * bench.duration_s / bench.n_samples)
     at = np.arange(bench.n_samples) * gap
-    at = at[(at >= 2) & (at < len(motion.twists) - 2)]
+    # From rest the motion is even in time: what comes before the release mirrors what follows.
+    v = np.concatenate([-motion.twists[2:0:-1], motion.twists])
+    slope = (v[at] - 8 * v[at + 1] + 8 * v[at + 3] - v[at + 4]) * RATE_HZ / 12
     v = motion.twists
-    slope = (v[at - 2] - 8 * v[at - 1] + 8 * v[at + 1] - v[at + 2]) * RATE_HZ / 12
     rotations = motion.rotations[at]
     angles = angles_from_matrix(rotations)
     rates = np.linalg.solve(angle_rate_matrix(angles), v[at, 3:, None])[..., 0]
