@@ -109,6 +109,8 @@ class Search:
         share = 1.0 / MOST_ROUNDS
         self._tell(f"round {index + 1}: screening", index * share)
         left = [n for n in self.candidates if n not in current.effects]
+        if not left:
+            return Round(current, (), None, ())
         screens = self._screens(current.fit, left)
         linear = {name: _linear_held_out(screens[name], name) for name in left}
         ranked = sorted(linear, key=lambda name: linear[name])
