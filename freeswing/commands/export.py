@@ -20,7 +20,7 @@ SUFFIXES = {"urdf": ".urdf", "mjcf": ".xml", "plain": ".json"}
 def add_arguments(parser: ArgumentParser) -> None:
     """The session, the format and the mass."""
     add_session(parser)
-    kinds = parser.add_mutually_exclusive_group(required=True)
+    kinds = parser.add_mutually_exclusive_group()
     kinds.add_argument("--urdf", dest="kind", action="store_const", const="urdf")
     kinds.add_argument("--mjcf", dest="kind", action="store_const", const="mjcf")
     kinds.add_argument("--plain", dest="kind", action="store_const", const="plain", help="JSON")
@@ -31,18 +31,22 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(options: Namespace, console: Console) -> None:
     """Write results/platform.urdf, .xml or .json."""
-    from cdpr.documents import replace_file, write_json
+    from cdpr.documents import InputError, replace_file, write_json
     from freeswing import exports
     from freeswing.swings import load_robot
 
+    # `--json` names the format here, besides its use in every command: the file on stdout.
+    kind = options.kind or ("plain" if options.json else None)
+    if kind is None:
+        raise InputError("freeswing export: choose one of --urdf, --mjcf and --json")
     session = open_session(options)
     robot = load_robot(session)
     inertia = _inertia(options, session.results, robot)
-    path = session.results / f"platform{SUFFIXES[options.kind]}"
-    if options.kind == "plain":
+    path = session.results / f"platform{SUFFIXES[kind]}"
+    if kind == "plain":
         write_json(path, exports.plain(robot, inertia))
     else:
-        text = getattr(exports, options.kind)(robot, inertia)
+        text = getattr(exports, kind)(robot, inertia)
         replace_file(path, text.encode("utf-8"))
     console.say(str(path))
     console.show_file(path)
