@@ -83,7 +83,8 @@ def _assembled_start(model: Model, samples: Samples, rest: Equilibrium) -> Array
     home = rest.zeta[samples.columns]
     path = np.vstack([home + fractions * (free[0] - home), free])
     names = samples.coordinates
-    poses = assemble(model, names, samples.lengths_m, path, rest.zeta).zetas[LEAD_IN:]
+    lengths = rest.lengths_m if samples.lengths_m is None else samples.lengths_m
+    poses = assemble(model, names, lengths, path, rest.zeta).zetas[LEAD_IN:]
     return np.concatenate(_smoothed_start(samples.times_s[inside], poses))
 
 

@@ -133,7 +133,7 @@ class Problem:
         scaled = rows[:, :-1][:, free] * self.unit[free]
         shared = np.zeros(len(free))
         n_free = int(free.sum())
-        full = np.linalg.qr(np.column_stack([scaled, rows[:, -1]]), mode="r")
+        full = np.asarray(np.linalg.qr(np.column_stack([scaled, rows[:, -1]]), mode="r"))
         triangle, right = full[:n_free, :n_free], full[:n_free, -1]
         left, singular, back = np.linalg.svd(triangle)
         largest = singular.max(initial=0.0)

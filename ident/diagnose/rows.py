@@ -34,7 +34,7 @@ class Evidence:
     def subset(self, columns: np.ndarray) -> Evidence:
         """The evidence with only some of the unknowns, the others held."""
         kept = np.append(columns, self.triangles.shape[-1] - 1)
-        reduced = np.linalg.qr(self.triangles[:, :, kept], mode="r")
+        reduced = np.asarray(np.linalg.qr(self.triangles[:, :, kept], mode="r"))
         prior = self.prior_rows[:, kept]
         prior = prior[np.abs(prior[:, :-1]).sum(axis=1) > 0]
         return Evidence(self.runs, reduced, self.counts, prior)

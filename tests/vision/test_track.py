@@ -179,5 +179,5 @@ def test_one_camera_alone_gives_poses_at_its_own_covariance(session, tmp_path) -
 def test_a_recording_of_another_size_is_refused(session, tmp_path) -> None:
     _, run, _ = session
     wrong = tuple(replace(c, size_px=(640, 480)) for c in cameras())
-    with pytest.raises(InputError, match="360 x 288 pixels, but cameras.toml has 640 x 480"):
+    with pytest.raises(InputError, match=r"360 x 288 pixels, but cameras\.toml has 640 x 480"):
         track(run, tmp_path, view=wrong)
