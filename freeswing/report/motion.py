@@ -28,13 +28,14 @@ class Motion:
         if not runs:
             return None
         return {
-            "figures": [_figure(run) for run in runs[:MAX_RUNS]],
+            "figures": [run_figure(run) for run in runs[:MAX_RUNS]],
             "shown": min(len(runs), MAX_RUNS),
             "total": len(runs),
         }
 
 
-def _figure(run: Document) -> object:
+def run_figure(run: Document) -> object:
+    """Motion, residual and its spectrum for each coordinate of one run."""
     times = np.array(run["times_s"], dtype=np.float64)
     measured = _samples(run["measured"])
     predictions = {key: _samples(run[key]) for key in ("before", "after") if run.get(key)}
