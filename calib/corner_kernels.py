@@ -25,6 +25,7 @@ Array = NDArray[np.float64]
 UNKNOWNS = 11
 BLACK, CONTRAST, BLUR = 8, 9, 10
 _REACH = 4.0
+_FLAT = 4.4  # blur widths from an edge at which nothing of it is left, with a margin
 _STEPS_PER_UNIT = 256
 
 
@@ -48,6 +49,23 @@ def _edge(z: float, step: Array, bell: Array) -> tuple[float, float]:
     k = int(place)
     f = place - k
     return step[k] + f * (step[k + 1] - step[k]), bell[k] + f * (bell[k + 1] - bell[k])
+
+
+@numba.njit(cache=True, nogil=True, inline="always")
+def _blur_at_centre(h: Array, ray_step: Array, half: float, blur: float) -> tuple[float, float]:
+    """How many cells across and down `blur` pixels are in the middle of the tag, and a margin."""
+    back = np.linalg.inv(h)
+    w = 1.0 / (back[2, 0] * half + back[2, 1] * half + back[2, 2])
+    x = (back[0, 0] * half + back[0, 1] * half + back[0, 2]) * w
+    y = (back[1, 0] * half + back[1, 1] * half + back[1, 2]) * w
+    w = 1.0 / (h[2, 0] * x + h[2, 1] * y + h[2, 2])
+    across = np.empty(2)
+    for row in range(2):
+        gx, gy = (h[row, 0] - half * h[2, 0]) * w, (h[row, 1] - half * h[2, 1]) * w
+        u = gx * ray_step[0, 0] + gy * ray_step[1, 0]
+        v = gx * ray_step[0, 1] + gy * ray_step[1, 1]
+        across[row] = blur * math.sqrt(u * u + v * v)
+    return across[0], across[1]
 
 
 @numba.njit(cache=True, nogil=True)
@@ -77,7 +95,7 @@ def accumulate(
         cells: the tag's cells with a rim of one cell, (n + 2, n + 2).
         state: black, contrast, blur in px.
         box: left, top, right, bottom (exclusive).
-        stride: use every stride-th pixel both ways.
+        stride: use one pixel in so many, spread over a lattice.
         scale: noise level beyond four times which a pixel loses weight.
         step: table of the Gaussian's integral.
         bell: table of its density.
@@ -99,13 +117,46 @@ def accumulate(
     design = np.empty(UNKNOWNS)
     h = pattern_from_ray
     limit = 4.0 * scale
-    for v in range(box[1], box[3], stride):
-        for u in range(box[0], box[2], stride):
+    flat_c, flat_r = _blur_at_centre(h, ray_step, half, _FLAT * blur)
+    skew = max(1, int(stride * 0.618 + 0.5))
+    for v in range(box[1], box[3]):
+        for u in range(box[0] + (v * skew) % stride, box[2], stride):
             rx, ry = rays[v, u, 0], rays[v, u, 1]
             w = 1.0 / (h[2, 0] * rx + h[2, 1] * ry + h[2, 2])
             c = (h[0, 0] * rx + h[0, 1] * ry + h[0, 2]) * w
             r = (h[1, 0] * rx + h[1, 1] * ry + h[1, 2]) * w
             if not (c > -1.0 and r > -1.0 and c < n + 1.0 and r < n + 1.0):
+                continue
+            k, m = math.floor(c) + 1, math.floor(r) + 1
+            from_c, from_r = c - (k - 1), r - (m - 1)
+            grey = float(image[v, u])
+            if (
+                from_c > flat_c
+                and from_c < 1.0 - flat_c
+                and from_r > flat_r
+                and from_r < 1.0 - flat_r
+                and k > 0
+                and m > 0
+                and k <= n
+                and m <= n
+            ):
+                if (u + 2 * v) & 3:  # inside a cell a quarter of the pixels says as much
+                    continue
+                value = cells[m, k]
+                residual = grey - black - contrast * value
+                size = abs(residual)
+                weight = 1.0 if size <= limit else (limit / size) ** 2
+                histogram[min(int(size * 4.0), 255)] += 1
+                squares += weight * residual * residual
+                weights += weight
+                count += 1.0
+                total += grey
+                total_squares += grey * grey
+                normal[8, 8] += weight
+                normal[8, 9] += weight * value
+                normal[9, 9] += weight * value * value
+                right[8] += weight * residual
+                right[9] += weight * residual * value
                 continue
             cx, cy = (h[0, 0] - c * h[2, 0]) * w, (h[0, 1] - c * h[2, 1]) * w
             dx, dy = (h[1, 0] - r * h[2, 0]) * w, (h[1, 1] - r * h[2, 1]) * w
@@ -123,7 +174,6 @@ def accumulate(
             rim_r = max(1.0 - 3.5 * blur_r, 0.2)
             if c < -rim_c or c > n + rim_c or r < -rim_r or r > n + rim_r:
                 continue
-            k, m = math.floor(c) + 1, math.floor(r) + 1
             z0, z1 = (c - (k - 1)) / blur_c, (c - k) / blur_c
             y0, y1 = (r - (m - 1)) / blur_r, (r - m) / blur_r
             s0, g0 = _edge(z0, step, bell)
@@ -158,7 +208,6 @@ def accumulate(
             value += rho * twist
             grad_c = (g0 * (middle - left) + g1 * (after - middle)) / blur_c
             grad_r = (b0 * (centre - upper) + b1 * (lower - centre)) / blur_r
-            grey = float(image[v, u])
             residual = grey - black - contrast * value
             size = abs(residual)
             weight = 1.0
@@ -237,12 +286,16 @@ def fit_pattern(
     blurs: Array,
     box: NDArray[np.int64],
     noise: float,
+    most_pixels: float,
+    guess: Array,
     tables: Array,
 ) -> tuple[Array, Array, Array, Array]:
     """Gauss-Newton from coarse to fine.
 
     `blurs` lists blur widths held on the first passes, which widen the catch; then the blur is
-    free, started at the last of them.
+    free, started at the last of them. `guess` holds black, contrast and noise of a good
+    prediction (contrast 0: none): the first pass is then also the last, if it moves little. The
+    last pass takes about `most_pixels` of the box, spread evenly.
 
     Returns:
         The map (3, 3), covariance of the small homography (8, 8), state (black, contrast, blur),
@@ -259,9 +312,14 @@ def fit_pattern(
     figures = np.zeros(5)
     covariance = np.zeros((8, 8))
     step, bell = tables[0], tables[1]
-    side = math.sqrt(max((box[2] - box[0]) * (box[3] - box[1]), 1.0))
-    coarse = max(1, int(side / 40.0))
+    area = max((box[2] - box[0]) * (box[3] - box[1]), 1.0)
+    fine = max(1, int(area / most_pixels + 0.5))
+    coarse = max(fine, int(area / 1600.0))
     scale = 1e6
+    predicted = guess[1] > 0.0
+    if predicted:
+        state[0], state[1] = guess[0], guess[1]
+        scale = 2.0 * guess[2] + 2.0
     held = len(blurs) - 1
     last = 1e9
     for iteration in range(held + 10):
@@ -269,8 +327,9 @@ def fit_pattern(
         if iteration <= held:
             state[2] = blurs[iteration]
         settled = free and last < 0.02
-        stride = 1 if settled or (iteration > held + 3) else coarse
-        if iteration == 0:
+        at_once = predicted and iteration == 0
+        stride = fine if settled or at_once or iteration > held + 3 else coarse
+        if iteration == 0 and not predicted:
             _levels(
                 image,
                 rays,
@@ -337,7 +396,7 @@ def fit_pattern(
         figures[1] = 1.0 - after / max(about, 1e-9)
         figures[2] = count
         figures[3] = last
-        if free and stride == 1 and last < 0.006:
+        if free and stride == fine and last < 0.006:
             inverse = np.linalg.inv(normal)
             covariance[:] = inverse[:8, :8] * max(variance, noise * noise)
             return h, covariance, state, figures
@@ -385,6 +444,39 @@ def _levels(
         state[1] += (a * right[9] - b * right[8]) / determinant
     if state[1] < 10.0:
         state[1] = 10.0
+
+
+@numba.njit(cache=True, nogil=True)
+def corners_of_map(
+    pattern_from_ray: Array, covariance: Array, n: int
+) -> tuple[Array, Array, float]:
+    """Corner rays TL TR BR BL (4, 2), their covariance (8, 8) and the shortest side in rays."""
+    back = np.linalg.inv(pattern_from_ray)
+    rays = np.empty((4, 2))
+    jacobian = np.zeros((8, 8))
+    for k in range(4):
+        x = 1.0 if k == 1 or k == 2 else -1.0
+        y = 1.0 if k >= 2 else -1.0
+        c, r = (x + 1.0) * n / 2.0, (y + 1.0) * n / 2.0
+        w = back[2, 0] * c + back[2, 1] * r + back[2, 2]
+        rays[k, 0] = (back[0, 0] * c + back[0, 1] * r + back[0, 2]) / w
+        rays[k, 1] = (back[1, 0] * c + back[1, 1] * r + back[1, 2]) / w
+        for i in range(2):
+            by_c = (back[i, 0] - rays[k, i] * back[2, 0]) / w
+            by_r = (back[i, 1] - rays[k, i] * back[2, 1]) / w
+            line = jacobian[2 * k + i]
+            line[0], line[1], line[2] = by_c * x, by_c * y, by_c
+            line[3], line[4], line[5] = by_r * x, by_r * y, by_r
+            line[6] = -(by_c * x + by_r * y) * x
+            line[7] = -(by_c * x + by_r * y) * y
+    shortest = 1e300
+    for k in range(4):
+        dx = rays[k, 0] - rays[(k + 1) % 4, 0]
+        dy = rays[k, 1] - rays[(k + 1) % 4, 1]
+        shortest = min(shortest, math.sqrt(dx * dx + dy * dy))
+    spread = np.zeros((8, 8))
+    spread[:] = jacobian @ covariance @ jacobian.T
+    return rays, spread, shortest
 
 
 TABLES = np.stack([_STEP, _BELL])

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.camera import Camera
-from calib.corner_kernels import TABLES, fit_pattern
+from calib.corner_kernels import TABLES, corners_of_map, fit_pattern
 from calib.tag_patterns import tag_cells
 
 Array = NDArray[np.float64]
@@ -23,6 +23,8 @@ Image = NDArray[np.uint8]
 
 FIRST_BLURS_PX = (2.0, 1.2, 0.8)
 NEAR_BLURS_PX = (0.8,)
+ALL_PIXELS = 10_000_000
+_NO_GUESS = np.zeros(3)
 _LEAST_EXPLAINED = 0.75
 _LEAST_CONTRAST = 8.0
 # Cells narrower than 2.8 blur widths see their neighbours' neighbours, which the kernel leaves
@@ -120,6 +122,8 @@ def fit_tag(
     *,
     blurs_px: tuple[float, ...] = FIRST_BLURS_PX,
     noise: float = 1.0,
+    most_pixels: int = ALL_PIXELS,
+    before: tuple[float, float, float, float] | None = None,
 ) -> TagFit | None:
     """Fits a tag near a first guess of its corners; None where the pattern is not there.
 
@@ -132,6 +136,9 @@ def fit_tag(
         blurs_px: blur widths from coarse to fine (`FIRST_BLURS_PX` catches a guess 2 px off,
             `NEAR_BLURS_PX` is for a good prediction); the last also starts the free blur.
         noise: least standard deviation of a pixel; the fit's own residual counts when larger.
+        most_pixels: of the tag's box that take part, spread evenly; fewer are faster.
+        before: black, contrast, blur in px and noise of the same tag in the frame before, for a
+            prediction good to some tenths of a pixel; `blurs_px` then starts with that blur.
     """
     n = cells.shape[0] - 2
     height, width = image.shape
@@ -162,14 +169,16 @@ def fit_tag(
         np.array(blurs_px),
         np.array([left, top, right, bottom], dtype=np.int64),
         noise,
+        float(most_pixels),
+        np.array([before[0], before[1], before[3]]) if before else _NO_GUESS,
         TABLES,
     )
     if figures[1] < _LEAST_EXPLAINED or state[1] < _LEAST_CONTRAST:
         return None
-    found, spread = _corners(pattern_from_ray, covariance, n)
-    pixel_ray = float(np.sqrt(abs(np.linalg.det(ray_step))))
-    sides = np.linalg.norm(found - np.roll(found, 1, axis=0), axis=1) / pixel_ray
-    crowded = _CROWDED_CELLS - float(sides.min()) / n / float(state[2])
+    found, spread, narrowest = corners_of_map(pattern_from_ray, covariance, n)
+    area = ray_step[0, 0] * ray_step[1, 1] - ray_step[0, 1] * ray_step[1, 0]
+    pixel_ray = float(np.sqrt(abs(area)))
+    crowded = _CROWDED_CELLS - narrowest / pixel_ray / n / float(state[2])
     if crowded > 0.0:
         spread = spread + (_CROWDED_PX * crowded * pixel_ray) ** 2 * np.eye(8)
     return TagFit(
@@ -192,23 +201,3 @@ def to_pixels(camera: Camera, rays: Array, covariance: Array) -> tuple[Array, Ar
     for k in range(len(rays)):
         jacobian[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] = d_point[k, :, :2]
     return pixels, jacobian @ covariance @ jacobian.T
-
-
-def _corners(pattern_from_ray: Array, covariance: Array, n: int) -> tuple[Array, Array]:
-    """Corner rays (4, 2) and covariance (8, 8) from the fitted map and its covariance."""
-    back = np.linalg.inv(pattern_from_ray)
-    corners = np.array([[0.0, 0.0], [n, 0.0], [n, n], [0.0, n]])
-    lifted = np.column_stack([corners, np.ones(4)]) @ back.T
-    rays = lifted[:, :2] / lifted[:, 2:]
-    x, y = (corners[:, 0] - n / 2) / (n / 2), (corners[:, 1] - n / 2) / (n / 2)
-    one, zero = np.ones(4), np.zeros(4)
-    moves = np.stack(
-        [
-            np.stack([x, y, one, zero, zero, zero, -x * x, -x * y], axis=-1),
-            np.stack([zero, zero, zero, x, y, one, -x * y, -y * y], axis=-1),
-        ],
-        axis=1,
-    )
-    slopes = (back[None, :2, :2] - rays[:, :, None] * back[None, 2:, :2]) / lifted[:, 2:, None]
-    jacobian = np.matmul(slopes, moves).reshape(8, 8)
-    return rays, jacobian @ covariance @ jacobian.T

@@ -28,6 +28,11 @@ from vision.watch import Watch
 Array = NDArray[np.float64]
 Image = NDArray[np.uint8]
 
+Look = tuple[float, float, float, float]
+"""Black, contrast, blur in px and noise of a tag when it was last seen."""
+
+MOST_PIXELS = 5000
+
 USED, NOTHING, COVERED, OVEREXPOSED, REPEATED, UNSTAMPED = range(6)
 STATUS_NAMES = (
     "used",
@@ -76,7 +81,7 @@ class Follower:
     watch: Watch
     past: list[tuple[float, Pose]] = field(default_factory=list)
     base_rays: dict[int, Array] = field(default_factory=dict)
-    blurs: dict[int, float] = field(default_factory=dict)
+    before: dict[int, Look] = field(default_factory=dict)
     misses: int = 0
     count: int = 0
     _rays: Array = field(init=False, repr=False)
@@ -134,13 +139,21 @@ class Follower:
     ) -> TagFit | None:
         family, tag_id = (*self.watch.tags, *self.watch.base_tags)[thing]
         cells = rimmed_cells(family, tag_id)
-        blur = self.blurs.get(thing)
-        if near and blur is not None:
-            fit = fit_tag(image, self._rays, guess, guess_px, cells, blurs_px=(blur,))
+        before = self.before.get(thing) if near else None
+        fit = fit_tag(
+            image,
+            self._rays,
+            guess,
+            guess_px,
+            cells,
+            blurs_px=FIRST_BLURS_PX if before is None else (before[2],),
+            most_pixels=MOST_PIXELS,
+            before=before,
+        )
+        if fit is None:
+            self.before.pop(thing, None)
         else:
-            fit = fit_tag(image, self._rays, guess, guess_px, cells, blurs_px=FIRST_BLURS_PX)
-        if fit is not None:
-            self.blurs[thing] = fit.blur_px
+            self.before[thing] = (fit.black, fit.contrast, fit.blur_px, fit.noise)
         return fit
 
     def _search(self, image: Image) -> dict[int, TagFit]:

@@ -25,7 +25,7 @@ from vision.watch import Watch
 Array = NDArray[np.float64]
 
 FRAMES_A_PIECE = 400
-_VERSION = b"freeswing-sightings/1"
+_VERSION = b"freeswing-sightings/2"
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,8 +119,8 @@ def save_piece(path: Path, piece: Piece, follower: Follower) -> None:
         past_positions=np.array([p for _, (_, p) in past]).reshape(-1, 3),
         base_things=np.array(list(follower.base_rays), dtype=np.int64),
         base_rays=np.array(list(follower.base_rays.values())).reshape(-1, 4, 2),
-        blur_things=np.array(list(follower.blurs), dtype=np.int64),
-        blurs=np.array(list(follower.blurs.values())),
+        before_things=np.array(list(follower.before), dtype=np.int64),
+        before=np.array(list(follower.before.values())).reshape(-1, 4),
         counters=np.array([follower.misses, follower.count], dtype=np.int64),
     )
     replace_file(path, buffer.getvalue())
@@ -144,7 +144,8 @@ def restore(follower: Follower, path: Path) -> None:
         follower.base_rays = dict(
             zip(map(int, data["base_things"]), data["base_rays"], strict=True)
         )
-        follower.blurs = dict(
-            zip(map(int, data["blur_things"]), map(float, data["blurs"]), strict=True)
-        )
+        follower.before = {
+            int(thing): (float(row[0]), float(row[1]), float(row[2]), float(row[3]))
+            for thing, row in zip(data["before_things"], data["before"], strict=True)
+        }
         follower.misses, follower.count = (int(v) for v in data["counters"])
