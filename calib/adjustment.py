@@ -189,14 +189,14 @@ def _unknowns_per_residual(problem: Problem, index: int) -> float:
 
 
 def named(scene: Scene) -> list[str]:
-    """Names of the shared unknowns, such as `cam0.fx` or `warp.x_m`, in order."""
+    """Names of the shared unknowns, such as `cam0.fx` or `board.sag_x_m`, in order."""
     from calib.camera_models import PARAMETER_NAMES
 
     names = []
     for camera in scene.cameras:
         own = [*PARAMETER_NAMES[camera.model], "tx_m", "ty_m", "tz_m", "rx_rad", "ry_rad", "rz_rad"]
         names += [f"{camera.name}.{name}" for name in (*own, "clock_offset_s", "line_time_s")]
-    names += ["warp.x_m", "warp.y_m"]
+    names += ["board.sag_x_m", "board.sag_y_m", "board.tag_growth_m"]
     points = range(len(scene.base_points_m))
     return names + [f"base_point_{index}.{axis}_m" for index in points for axis in "xyz"]
 

@@ -65,7 +65,7 @@ class BoardDetector:
 
     def _find_chessboard(self, image: Image) -> Array | None:
         size = (self.board.columns, self.board.rows)
-        flags = cv2.CALIB_CB_NORMALIZE_IMAGE + cv2.CALIB_CB_ACCURACY
+        flags = cv2.CALIB_CB_EXHAUSTIVE + cv2.CALIB_CB_ACCURACY
         found, corners = cv2.findChessboardCornersSB(image, size, flags=flags)
         if not found or corners is None:
             return None

@@ -1,7 +1,8 @@
 """Reprojection residuals of a camera rig and their normal equations, block by block.
 
 Unknowns of camera c, in this order: lens parameters (k), pose (dt, dr as in `calib.camera.Camera`),
-clock offset, line time. After the cameras come two numbers of board warp and the base points.
+clock offset, line time. After the cameras come three numbers of the board's shape (`shape_modes`)
+and the base points.
 Every moment has a board pose of its own, tangent (dt, dr) in the base frame: t + dt, exp(dr) R.
 
 A corner seen at stamp t is moved to the moment t_m by its image velocity before it is compared:
@@ -21,7 +22,7 @@ from cdpr.rotation import exp_rotation
 
 POSE = 6
 CLOCK = 2
-WARP = 2
+WARP = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +32,7 @@ class Scene:
     Attributes:
         cameras: the rig.
         T_base_boards: board poses, (n_moments, 4, 4).
-        warp_m: sag of the board along its x and y at the middle, (2,).
+        warp_m: the board's sag along x and along y at its middle, and its tags' growth, (3,).
         base_points_m: the fixed points, (n, 3).
     """
 
@@ -48,22 +49,30 @@ def camera_slices(cameras: tuple[Camera, ...]) -> list[slice]:
     return [slice(int(end - size), int(end)) for size, end in zip(sizes, ends, strict=True)]
 
 
-def warp_shape(board_points_m: Array) -> Array:
-    """Derivative of a board point's height by the two warp numbers, (n, 2).
+def shape_modes(board_points_m: Array) -> Array:
+    """How a board differs from its drawing: derivative of its points by `warp_m`, (n, 3, 3).
 
-    A paraboloid that is zero on the edges' middles: 1 - u^2 with u from -1 to 1 (mrcal's model).
+    Two are a paraboloid, zero on the middles of the edges: z changes by 1 - u^2 with u from -1 to 1
+    (mrcal's model). The third moves every tag's corners away from its middle, half of it along each
+    side: ink that spread, or a marker of another size than stated. It is zero without tags.
     """
     plane = board_points_m[:, :2]
     low, high = plane.min(axis=0), plane.max(axis=0)
     half = np.maximum(0.5 * (high - low), 1e-12)
-    return 1.0 - ((plane - 0.5 * (low + high)) / half) ** 2
+    modes = np.zeros((len(plane), 3, WARP))
+    modes[:, 2, :2] = 1.0 - ((plane - 0.5 * (low + high)) / half) ** 2
+    if len(plane) % 4 == 0:
+        tags = plane.reshape(-1, 4, 2)
+        arms = tags - tags.mean(axis=1, keepdims=True)
+        reach = np.linalg.norm(arms, axis=-1, keepdims=True)
+        if np.allclose(arms[:, :2], -arms[:, 2:]) and np.allclose(reach, reach[0, 0, 0]):
+            modes[:, :2, 2] = (arms / (np.sqrt(2.0) * reach)).reshape(-1, 2)
+    return modes
 
 
 def warped(board_points_m: Array, warp_m: Array) -> Array:
-    """Board points with the warp applied, (n, 3)."""
-    points = board_points_m.copy()
-    points[:, 2] += warp_shape(board_points_m) @ warp_m
-    return points
+    """Board points with the board's true shape applied, (n, 3)."""
+    return board_points_m + shape_modes(board_points_m) @ warp_m
 
 
 def board_residuals(scene: Scene, board_points_m: Array, views: Views, index: int) -> Array:
@@ -119,8 +128,7 @@ def board_jacobians(
     d_board = np.empty((*pixels.shape, POSE))
     d_board[..., :3] = d_base
     d_board[..., 3:] = _cross(turned[..., None, :], d_base)
-    normal = np.einsum("nprc,nc->npr", d_base, poses[:, :3, 2])
-    d_warp = normal[..., None] * warp_shape(board_points_m)[None, :, None, :]
+    d_warp = d_base @ poses[:, None, :3, :3] @ shape_modes(board_points_m)
     return _measured(camera, views) - pixels, d_camera, d_board, d_warp
 
 

@@ -11,7 +11,7 @@ from calib.adjustment import Adjustment, Problem, adjust
 from calib.camera import Camera
 from calib.camera_models import Array
 from calib.intrinsics import CameraStart, DroppedView, start_camera
-from calib.reprojection import CLOCK, POSE, WARP, Scene, camera_slices
+from calib.reprojection import CLOCK, POSE, WARP, Scene, camera_slices, shape_modes
 from calib.rig_start import place_in_base, start_rig
 from calib.views import FixedPoints, Views, relative_std
 
@@ -22,6 +22,8 @@ VIEW_OUTLIER_FLOOR_PX = 0.5
 CORNER_OUTLIER_SIGMAS = 6.0
 _LEAST_CORNERS = 4
 LINE_TIME_SIGMAS = 5.0
+SHAPE_SIGMAS = 6.0
+LEAST_SHAPE_M = 2e-5
 LEAST_READOUT_S = 5e-4
 _MOST_SWEEPS = 3
 _SURVEY_ROUNDS = 3
@@ -98,7 +100,25 @@ def solve_rig(
     dropped = tuple(drop for camera in starts for drop in camera.dropped)
     problem = Problem(board_points_m, views, None, free)
     rig = refine(start.scene, problem, start.reference, dropped)
-    return _without_idle_lines(rig) if clocks else rig
+    return _with_board_shape(_without_idle_lines(rig) if clocks else rig)
+
+
+def _with_board_shape(rig: Rig) -> Rig:
+    """Let the board bend and its tags grow where the views show it beyond doubt."""
+    end = camera_slices(rig.cameras)[-1].stop
+    free = rig.problem.free.copy()
+    free[end : end + WARP] = np.abs(shape_modes(rig.problem.board_points_m)).max(axis=(0, 1)) > 0
+    problem = replace(rig.problem, free=free)
+    trial = adjust(rig.adjustment.scene, problem, rig.adjustment.sigma_px, rounds=1)
+    shape = trial.scene.warp_m
+    std = np.sqrt(np.diag(trial.covariance)[end : end + WARP])
+    shown = (np.abs(shape) > SHAPE_SIGMAS * std) & (np.abs(shape) > LEAST_SHAPE_M)
+    if not shown.any():
+        return rig
+    free[end : end + WARP] &= shown
+    scene = replace(trial.scene, warp_m=np.where(shown, shape, 0.0))
+    problem = replace(rig.problem, free=free)
+    return refine(scene, problem, rig.reference, rig.dropped, rig.n_trimmed)
 
 
 def _without_idle_lines(rig: Rig) -> Rig:

@@ -9,12 +9,12 @@ import numpy as np
 from calib.board_pose import best_poses
 from calib.camera import Camera
 from calib.camera_models import Array
-from calib.reprojection import Scene
+from calib.reprojection import WARP, Scene
 from calib.views import FixedPoints, Views
 from cdpr.documents import DataError
 from cdpr.rotation import invert
 
-LEAST_SHARED = 3
+LEAST_SHARED = 1
 _MOST_CANDIDATES = 40
 _CAP_PX = 20.0
 
@@ -64,7 +64,7 @@ def start_rig(
         replace(camera, T_camera_base=placed[index]) for index, camera in enumerate(cameras)
     )
     boards = _board_poses(rig, board_points_m, views, T_camera_boards)
-    return RigStart(Scene(rig, boards, np.zeros(2), np.zeros((0, 3))), reference, shared)
+    return RigStart(Scene(rig, boards, np.zeros(WARP), np.zeros((0, 3))), reference, shared)
 
 
 def shared_moments(count: int, views: Views) -> np.ndarray:
