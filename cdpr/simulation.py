@@ -19,6 +19,7 @@ SHORTEST_SEGMENT_S = 5e-4
 SWEEPS = 12
 KEPT_ORDERS = 6
 LARGEST_SLIP_M_S = 1e-7
+LARGEST_JUMP_RAD = 1.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,7 +156,23 @@ def simulate(
     starts, steps, zetas, speeds, accelerations = (
         np.array(column) for column in zip(*rows, strict=True)
     )
+    _check_swivels(model, np.append(starts, time), np.vstack([zetas, state[0]]), values)
     return Motion(model, inertia, values, starts, steps, zetas, speeds, accelerations)
+
+
+def _check_swivels(model: Model, times: Array, zetas: Array, values: Array) -> None:
+    """Refuse a motion that has stepped across a swivel axis, where a pulley would have to flip."""
+    swivels = evaluate(model.cables, zetas, values)[1]
+    jumps = np.abs(np.angle(np.exp(1j * np.diff(swivels, axis=0)))) * (model.robot.radii_m > 0.0)
+    if jumps.max(initial=0.0) > LARGEST_JUMP_RAD:
+        sample, cable = np.unravel_index(int(np.argmax(jumps)), jumps.shape)
+        name = model.robot.cables[cable].name
+        raise ValueError(
+            f"the free motion cannot be followed beyond {times[sample]:.4f} s from pose "
+            f"{np.array2string(zetas[sample], precision=4)}: cable {name} "
+            f"crosses its swivel axis (its pulley would turn by {jumps[sample, cable]:.2f} rad in "
+            f"{times[sample + 1] - times[sample]:.4f} s); check swivel_z or take a smaller swing"
+        )
 
 
 def _check_start(

@@ -197,7 +197,8 @@ def modes(
     """Frequencies and shapes of the free motion about an equilibrium at locked winches.
 
     Raises:
-        ValueError: when the equilibrium is not stable.
+        ValueError: when the equilibrium is not stable, nothing can move, or the inertia is that
+            of no body.
     """
     values = model.start_values if values is None else values
     zeta = equilibrium.zeta
@@ -207,6 +208,12 @@ def modes(
         raise ValueError(f"{model.robot.n_cables} cables leave no free motion, hence no modes")
     stiffness = free.T @ hessian @ free
     mass = free.T @ evaluate(model.mass_matrix, zeta, inertia, values)[0] @ free
+    lightest = float(np.linalg.eigvalsh(mass)[0])
+    if not lightest > 0.0:
+        raise ValueError(
+            f"inertia {inertia} is not that of a body: its mass matrix has eigenvalue "
+            f"{lightest:.2e}, must be above 0"
+        )
     unit = np.linalg.inv(np.linalg.cholesky(mass)).T
     squares, vectors = np.linalg.eigh(unit.T @ stiffness @ unit)
     vectors = unit @ vectors

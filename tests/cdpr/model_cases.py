@@ -1,6 +1,9 @@
 """Robots, equilibria and swings that the tests of the model share."""
 
+import sys
+
 import numpy as np
+import pytest
 
 from cdpr.batch import evaluate
 from cdpr.free_motion import admissible_rates, assemble, choose_free_coordinates, coordinate_indices
@@ -23,7 +26,7 @@ MIDDLE = {
     "bologna-4": np.array([1.2, -0.2, -0.6, 0.0, 0.0, 0.0]),
     "three-cable": np.array([-1.36, 0.96, -0.46, 0.0, 0.0, -0.55]),
 }
-ROBOTS = tuple(MIDDLE)
+ROBOTS = ("bologna-4", pytest.param("three-cable", marks=pytest.mark.slow))
 
 
 def robot_named(name, eyelets=False):
@@ -112,3 +115,8 @@ def pose_of(zeta):
 
 def twist_of(model, zeta, rates):
     return evaluate(model.twist_map, zeta, rates)[0] @ rates
+
+
+def report(*parts):
+    """A line that pytest shows with -s, or where a test fails."""
+    sys.stdout.write(" ".join(map(str, parts)) + "\n")

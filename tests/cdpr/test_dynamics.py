@@ -1,4 +1,4 @@
-"""Internal dynamics: W against the model, virtual work, power, batches, derivatives, many cables."""
+"""Internal dynamics: W against the model, virtual work, power, batches, slopes, many cables."""
 
 import numpy as np
 import pytest
