@@ -23,7 +23,7 @@ from calib.views import relative_std
 
 MOST_ITERATIONS = 60
 _DECREMENT = 1e-7  # expected fall of the cost, in units where one residual counts 1/2
-_MAD_OF_RAYLEIGH = 1.1774100225154747  # median length of a 2-D error of unit standard deviation
+MEDIAN_OF_RAYLEIGH = 1.1774100225154747  # median length of a 2-D error of unit standard deviation
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,7 +158,7 @@ def _noise(scene: Scene, problem: Problem, last: Array | None) -> Array:
         length = length[np.isfinite(length)]
         if not length.size:
             continue
-        median = max(float(np.median(length)) / _MAD_OF_RAYLEIGH, 1e-4)
+        median = max(float(np.median(length)) / MEDIAN_OF_RAYLEIGH, 1e-4)
         if last is None:
             sigma[index] = median
             continue

@@ -7,10 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calib.adjustment import Adjustment, Problem, adjust
+from calib.adjustment import MEDIAN_OF_RAYLEIGH, Adjustment, adjust
 from calib.camera import Camera
 from calib.camera_models import Array
 from calib.intrinsics import CameraStart, DroppedView, start_camera
+from calib.normal_equations import Problem
 from calib.reprojection import CLOCK, POSE, WARP, Scene, camera_slices, shape_modes
 from calib.rig_start import place_in_base, start_rig
 from calib.views import FixedPoints, Views, relative_std
@@ -194,9 +195,12 @@ def refine(
 
 
 def _views_kept(result: Adjustment, problem: Problem) -> tuple[np.ndarray, Array, Array]:
-    """Views whose rms error stays near what is usual in their camera; limits and errors, px."""
-    squares = np.sum(result.residuals_px**2, axis=-1)
-    errors = np.sqrt(np.nanmean(squares, axis=1) / 2.0)
+    """Views whose error stays near what is usual in their camera; limits and errors, px.
+
+    The error is the median corner's, each axis: one bad corner is trimmed, not the whole view.
+    """
+    lengths = np.linalg.norm(result.residuals_px, axis=-1)
+    errors = np.nanmedian(lengths, axis=1) / MEDIAN_OF_RAYLEIGH
     limits = np.zeros(len(errors))
     for index in range(len(result.scene.cameras)):
         own = problem.views.camera == index

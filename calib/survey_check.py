@@ -23,8 +23,8 @@ class SurveyCheck:
     Attributes:
         n_points: corners seen by two or more cameras.
         scale: size of the survey over size in the rig, 1 when they agree; NaN when unknown.
-        rms_m: residual of the best rigid fit, proper rotation.
-        mirrored_rms_m: residual of the best rigid fit with a mirror image.
+        rms_m: residual of the best fit by a proper rotation and that scale.
+        mirrored_rms_m: residual of the best fit by a mirror image.
         reasons: what is wrong with the survey, in words.
     """
 
@@ -55,18 +55,18 @@ def check_survey(cameras: tuple[Camera, ...], fixed: FixedPoints) -> SurveyCheck
             f"{1e3 * rms:.1f} mm, mirrored {1e3 * mirrored_rms:.1f} mm): the survey's axes are "
             "left-handed, or one axis has the wrong sign"
         )
+    elif abs(scale - 1.0) > SCALE_LIMIT and rms < TAG_LIMIT_M:
+        reasons.append(
+            f"the survey is {scale:.4f} times as large as the board says: measure the board's "
+            "squares and the tags' corners again, one of them is wrong"
+        )
     else:
         reasons += _wrong_tags(names, survey, seen)
-        if abs(scale - 1.0) > SCALE_LIMIT and not reasons:
-            reasons.append(
-                f"the survey is {scale:.4f} times as large as the board says: measure the board's "
-                "squares and the tags' corners again, one of them is wrong"
-            )
     return SurveyCheck(int(good.sum()), float(scale), rms, mirrored_rms, tuple(reasons))
 
 
 def _fit(survey: Array, seen: Array, *, mirror: bool) -> tuple[Array, float]:
-    """Residuals (n, 3) of the rigid fit of the seen points onto the survey, and the scale."""
+    """Residuals (n, 3) of the scaled rigid fit of seen points onto the survey, and the scale."""
     a, b = seen - seen.mean(axis=0), survey - survey.mean(axis=0)
     left, _, right = np.linalg.svd(a.T @ b)
     sign = np.sign(np.linalg.det(left @ right)) * (-1.0 if mirror else 1.0)
