@@ -23,14 +23,13 @@ from cdpr.simulation import Motion, simulate
 from ident.excitation_quadratic import least_effort
 from ident.excitation_swings import Bench, Swing
 
-STROKES = 6
 DURATIONS_S = (2.0, 3.0, 4.0)
-_STAGES = (0.3, 0.65, 1.0, 1.0, 1.0)
+_STAGES = (0.3, 0.6, 0.85, 1.0, 1.0, 1.0, 1.0)
 _SWEEPS = 8
 _CLOSED_M = 1e-9
 _GRID_S = 0.01
-_COARSE_S = 0.04
-_TENSION_MARGIN = 0.001
+_COARSE_S = 0.02
+_TENSION_MARGIN = 0.002
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +39,7 @@ class WinchRelease:
     Attributes:
         duration_s: of the motion.
         phase_s: the swing's age at its end, counted from its pose of release.
-        strokes_m: amplitudes of the strokes of each cable, (STROKES, n).
+        strokes_m: amplitudes of the strokes of each cable, (count, n).
         times_s: (t,), from the start of the motion.
         lengths_m: what each winch is told, (t, n).
         tension_N: smallest and largest tension on the way.
@@ -87,29 +86,56 @@ def winch_release(
     )
 
 
-def stroke_shapes(duration_s: float, times_s: Array) -> Array:
-    """The strokes' shapes at times, (t, STROKES): zero with two derivatives at both ends."""
-    time = ca.SX.sym("t")
-    shapes = ca.Function("shapes", [time], [ca.vertcat(*_shapes(time, duration_s))])
-    return np.array(shapes(np.atleast_2d(times_s))).T
+@dataclass(frozen=True, slots=True)
+class Strokes:
+    """The shapes that the winches' motions are made of: one bump, and the free modes under it.
+
+    Small strokes in step with a mode build a large swing. All shapes are zero with two derivatives
+    at both ends.
+
+    Attributes:
+        duration_s: of the motion.
+        frequencies_hz: of the modes, (6 - n,).
+    """
+
+    duration_s: float
+    frequencies_hz: tuple[float, ...]
+
+    @property
+    def count(self) -> int:
+        """How many shapes there are."""
+        return 1 + 2 * len(self.frequencies_hz)
+
+    def symbolic(self, time: ca.SX) -> list[ca.SX]:
+        """The shapes as expressions of time."""
+        place = time / self.duration_s
+        bump = 64 * place**3 * (1 - place) ** 3
+        turns = [2 * ca.pi * f * (time - self.duration_s / 2) for f in self.frequencies_hz]
+        waves = [wave(turn) for turn in turns for wave in (ca.cos, ca.sin)]
+        return [bump, *(bump * wave for wave in waves)]
+
+    def at(self, times_s: Array) -> Array:
+        """The shapes at times, (t, count)."""
+        time = ca.SX.sym("t")
+        shapes = ca.Function("shapes", [time], [ca.vertcat(*self.symbolic(time))])
+        return np.array(shapes(np.atleast_2d(times_s))).T
 
 
-def driven_model(model: Model, duration_s: float) -> Model:
+def driven_model(model: Model, shapes: Strokes) -> Model:
     """The model with winches that follow the strokes; its values are their amplitudes in metres.
 
     The tensions are those that give the lengths the winches' acceleration.
     """
     n = model.robot.n_cables
     time, zeta, rates = ca.SX.sym("t"), ca.SX.sym("zeta", 6), ca.SX.sym("rates", 6)
-    inertia, strokes = ca.SX.sym("inertia", 9), ca.SX.sym("strokes", STROKES * n)
+    inertia, strokes = ca.SX.sym("inertia", 9), ca.SX.sym("strokes", shapes.count * n)
     pulls, own = ca.SX.sym("pulls", n), ca.DM(model.start_values)
     loaded = model.pulled(time, zeta, rates, pulls, inertia, own)
     loose = ca.substitute(loaded, pulls, ca.SX.zeros(n))
     by_pulls = ca.jacobian(loaded, pulls)
     lengths_by = model.cables(zeta, own)[3]
     drift = model.cable_rates(zeta, rates, own)[0] @ rates
-    shapes = ca.vertcat(*_shapes(time, duration_s))
-    told = ca.reshape(strokes, n, STROKES) @ shapes
+    told = ca.reshape(strokes, n, shapes.count) @ ca.vertcat(*shapes.symbolic(time))
     wanted = ca.jacobian(ca.jacobian(told, time), time)
     tensions = ca.inv(lengths_by @ by_pulls) @ (wanted - drift - lengths_by @ loose)
     speed = lengths_by @ rates - ca.jacobian(told, time)
@@ -133,16 +159,9 @@ def driven_model(model: Model, duration_s: float) -> Model:
         )
         for name, (inputs, outputs) in functions.items()
     }
-    names = [f"stroke_{k + 1}_{c.name}_m" for k in range(STROKES) for c in model.robot.cables]
+    names = [f"stroke_{k + 1}_{c.name}_m" for k in range(shapes.count) for c in model.robot.cables]
     parameters = tuple(Parameter(name, -1.0, 1.0, 0.05) for name in names)
     return replace(model, parameters=parameters, names=tuple(names), **built)
-
-
-def _shapes(time: ca.SX, duration_s: float) -> list[ca.SX]:
-    place = time / duration_s
-    bump = 64 * place**3 * (1 - place) ** 3
-    turn = 1 - 2 * place
-    return [bump * turn**k for k in range(STROKES)]
 
 
 def _release(bench: Bench, swing: Swing, duration_s: float, phase_s: float) -> WinchRelease:
@@ -151,7 +170,7 @@ def _release(bench: Bench, swing: Swing, duration_s: float, phase_s: float) -> W
     zetas, rates, _ = bench.course(swing.release, phase_s + 0.1).motion.at(np.array([phase_s]))
     goal = np.concatenate([zetas[0], rates[0]])
     rest = np.concatenate([swing.equilibrium.zeta, np.zeros(6)])
-    strokes = np.zeros(STROKES * bench.model.robot.n_cables)
+    strokes = np.zeros(drive.shapes.count * bench.model.robot.n_cables)
     for share in _STAGES:
         strokes = drive.towards(rest + share * (goal - rest), strokes)
     return drive.described(drive.closed(goal, strokes), goal, phase_s)
@@ -163,9 +182,10 @@ class _Drive:
     def __init__(self, bench: Bench, swing: Swing, duration_s: float) -> None:
         n = bench.model.robot.n_cables
         self.bench, self.swing, self.duration_s = bench, swing, duration_s
-        self.driven = driven_model(bench.model, duration_s)
+        self.shapes = Strokes(duration_s, tuple(swing.frequencies_hz.tolist()))
+        self.driven = driven_model(bench.model, self.shapes)
         self.grid = np.linspace(0, duration_s, round(duration_s / _COARSE_S) + 1)
-        curves = np.gradient(np.gradient(stroke_shapes(duration_s, self.grid), axis=0), axis=0)
+        curves = np.gradient(np.gradient(self.shapes.at(self.grid), axis=0), axis=0)
         effort = curves.T @ curves / _COARSE_S**4 / len(self.grid)
         self.effort: Array = np.kron(effort, np.eye(n)).astype(np.float64)
 
@@ -234,13 +254,13 @@ class _Drive:
         """What the winches do and where it ends."""
         n, motion = self.bench.model.robot.n_cables, self.motion(strokes)
         grid = np.linspace(0, self.duration_s, round(self.duration_s / _GRID_S) + 1)
-        told = stroke_shapes(self.duration_s, grid) @ strokes.reshape(STROKES, n)
+        told = self.shapes.at(grid) @ strokes.reshape(self.shapes.count, n)
         tensions = self.bench.mass_kg * motion.tensions(grid)
         gap = np.abs(_end_state(motion, self.duration_s) - goal)
         return WinchRelease(
             duration_s=self.duration_s,
             phase_s=phase_s,
-            strokes_m=strokes.reshape(STROKES, n),
+            strokes_m=strokes.reshape(self.shapes.count, n),
             times_s=grid,
             lengths_m=self.swing.equilibrium.lengths_m + told,
             tension_N=(float(tensions.min()), float(tensions.max())),

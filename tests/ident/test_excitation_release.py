@@ -1,24 +1,25 @@
 """Letting go by winch: the motion ends, locked, in the wanted swing, cables taut throughout."""
 
 import numpy as np
-import pytest
 from excitation_bench import paper_bench, swings
 
 from cdpr.simulation import simulate
-from ident.excitation_release import STROKES, driven_model, stroke_shapes, winch_release
+from ident.excitation_release import Strokes, driven_model, winch_release
+
+SHAPES = Strokes(2.0, (1.2, 2.5))
 
 
 def test_strokes_begin_and_end_at_rest():
     times = np.array([0.0, 1e-3, 2.0 - 1e-3, 2.0])
-    shapes = stroke_shapes(2.0, times)
+    shapes = SHAPES.at(times)
     assert np.allclose(shapes[[0, 3]], 0, atol=1e-15)
     assert np.abs(shapes[[1, 2]]).max() < 1e-7, f"{shapes}"
 
 
 def test_winches_that_stand_still_leave_the_free_motion():
     bench, swing = paper_bench(), swings(1)[0]
-    driven = driven_model(bench.model, 2.0)
-    strokes = np.zeros(STROKES * 4)
+    driven = driven_model(bench.model, SHAPES)
+    strokes = np.zeros(SHAPES.count * 4)
     moved = simulate(driven, swing.release, np.zeros(6), (0, 2.0), bench.inertia, strokes)
     times = np.linspace(0, 2, 50)
     free = bench.course(swing.release, 2.0, 1e-10).motion
@@ -28,17 +29,16 @@ def test_winches_that_stand_still_leave_the_free_motion():
 
 def test_driven_lengths_are_those_told():
     bench, swing = paper_bench(), swings(1)[0]
-    driven = driven_model(bench.model, 2.0)
-    strokes = 0.005 * np.random.default_rng(0).standard_normal(STROKES * 4)
+    driven = driven_model(bench.model, SHAPES)
+    strokes = 0.005 * np.random.default_rng(0).standard_normal(SHAPES.count * 4)
     rest = swing.equilibrium
     motion = simulate(driven, rest.zeta, np.zeros(6), (0, 2.0), bench.inertia, strokes)
     times = np.linspace(0, 2, 80)
-    told = rest.lengths_m + stroke_shapes(2.0, times) @ strokes.reshape(STROKES, 4)
+    told = rest.lengths_m + SHAPES.at(times) @ strokes.reshape(SHAPES.count, 4)
     worst = np.abs(bench.lengths(motion.at(times)[0]) - told).max()
     assert worst < 1e-8, f"cables depart from their commands by {worst:.1e} m"
 
 
-@pytest.mark.slow
 def test_the_release_ends_in_the_wanted_swing():
     bench, swing = paper_bench(), swings(2)[1]
     found = winch_release(bench, swing)
