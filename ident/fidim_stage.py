@@ -84,7 +84,10 @@ def _completed(
         for run in (unloaded if asked else unloaded[:3])
     ]
     if asked:
-        weighted = weighted_fidim(noisy, raw.values)
+        try:
+            weighted = weighted_fidim(noisy, raw.values)
+        except (ValueError, np.linalg.LinAlgError) as error:
+            notes.append(f"as published: the weighted form cannot be had ({error})")
     elif (ratio := unevenness(noisy)) > UNEVEN:
         notes.append(
             f"plain total least squares takes the regressor's columns to be equally noisy; theirs "

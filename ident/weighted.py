@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cdpr.batch import evaluate
-from cdpr.free_motion import free_basis
+from cdpr.free_motion import coordinate_indices, free_basis
 from cdpr.model import Model
 from cdpr.robot import Array, frozen_array
 from ident.frozen import freeze
@@ -124,8 +124,8 @@ def _moved(model: Model, signals: Signals, motion: SwingMotion, j: int, step: fl
 def _held(model: Model, zetas: Array, motion: SwingMotion) -> Array:
     """Poses moved along the free directions, put back on the cable lengths by one Newton step."""
     evaluated = evaluate(model.cables, zetas, model.start_values)
-    basis = free_basis(model, motion.free, zetas, 0.0 * zetas, model.start_values)
-    dependent = [i for i in range(6) if not np.any(basis.zeta_map[0, i] == 1.0)]
+    chosen = coordinate_indices(motion.free)
+    dependent = [i for i in range(6) if i not in chosen]
     corrected = zetas.copy()
     gap = evaluated[0] - motion.lengths_m
     block = evaluated[3][:, :, dependent]

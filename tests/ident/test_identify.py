@@ -204,6 +204,19 @@ def test_the_weighted_form_covers_where_the_published_one_cannot():
     assert 0.6 < spread < 1.6, f"z-scores of the weighted form spread {spread}"
 
 
+def test_samples_without_noise_have_no_weighted_form_and_say_so():
+    runs = [
+        replace(
+            run,
+            trajectory=replace(run.trajectory, covariances=np.zeros((1001, 2, 2))),
+        )
+        for run in nine(noise_m=0.0)
+    ]
+    found = identify(runs, ROBOT, replace(FIDIM, weighting="covariance"))
+    notes = " ".join(found.estimates["fidim_free"].notes)
+    assert "the weighted form cannot be had" in notes, f"{notes!r}"
+
+
 def test_validation_runs_are_never_fitted():
     runs = nine()
     wrong = [replace(run, role="validate") for run in nine(noise_m=5e-4, seed=9)]
