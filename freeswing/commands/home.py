@@ -36,7 +36,7 @@ def run(options: Namespace, console: Console) -> None:
     """Solve the start pose, advise, or simulate."""
     path = Path(options.homing)
     if options.advise:
-        _advise(path, console)
+        _advise(path, options, console)
     elif options.simulate:
         _simulate(path, options, console)
     else:
@@ -66,10 +66,11 @@ def _home(path: Path, options: Namespace, console: Console) -> None:
     console.show_file(result)
 
 
-def _advise(path: Path, console: Console) -> None:
+def _advise(path: Path, options: Namespace, console: Console) -> None:
     from calib.start_pose_advice import advise
 
-    document = advise(path, console.progress)
+    folder = path.parent / "results" if options.results is None else Path(options.results)
+    document = advise(path, console.progress, folder)
     for name in ("declared", "advised"):
         quality = document[name]
         console.say(
@@ -80,7 +81,7 @@ def _advise(path: Path, console: Console) -> None:
         if cable["changed"]:
             axis = ", ".join(f"{value:.3f}" for value in cable["swivel_z"])
             console.say(f"cable {cable['name']}: swivel_z = [{axis}]")
-    result = path.parent / "results" / "homing-advice.json"
+    result = folder / "homing-advice.json"
     console.say(str(result))
     console.show_file(result)
 
