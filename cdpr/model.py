@@ -12,6 +12,7 @@ from typing import Any, NoReturn
 
 import casadi as ca
 import numpy as np
+from numpy.typing import NDArray
 
 from cdpr.body import Expression, Spin, along, rate_matrix, rotation
 from cdpr.constrained import (
@@ -30,6 +31,7 @@ from cdpr.pulley import CableState, Geometry, cable_state
 from cdpr.robot import Array, Robot
 
 Function = Any  # casadi.Function
+IntArray = NDArray[np.intp]
 LARGEST_SWINGING = 5
 
 
@@ -104,6 +106,11 @@ class Model:
     lagrangian: Function
     mass_matrix: Function
     energy: Function
+
+    @property
+    def own_values(self) -> IntArray:
+        """Which of the values each run has for itself, (o,)."""
+        return np.flatnonzero([parameter.per_run for parameter in self.parameters])
 
     @property
     def start_values(self) -> Array:

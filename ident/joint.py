@@ -12,7 +12,7 @@ from cdpr.model import Model
 from cdpr.robot import Array
 from cdpr.sensitivity import linearise
 from cdpr.simulation import Motion, simulate
-from ident.likelihood_run import Samples, lengths_residual, reduce_run, residuals
+from ident.likelihood_run import Samples, lengths_residual, own_prior, reduce_run, residuals
 
 TOLERANCE_M = 1e-8
 INERTIA_UNIT = np.array([0.05, 0.05, 0.05, 0.02, 0.02, 0.02, 0.01, 0.01, 0.01])
@@ -29,6 +29,8 @@ class State:
         starts: initial [zeta; rates] of each run, (runs, 12).
         scales: noise scales of metres and radians, (2,).
         motions: the simulated motions; empty before the first simulation.
+        own_values: of the effect values that each run has for itself, (runs, o); None for those
+            in `values`, which otherwise do not count for them.
     """
 
     inertia: Array
@@ -36,6 +38,14 @@ class State:
     starts: Array
     scales: Array
     motions: tuple[Motion, ...] = ()
+    own_values: Array | None = None
+
+    def values_of(self, run: int, own: np.ndarray) -> Array:
+        """All effect values of a run, (k,)."""
+        values = self.values.copy()
+        if self.own_values is not None:
+            values[own] = self.own_values[run]
+        return values
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +55,7 @@ class Step:
     Attributes:
         shared: change of inertia and values, (9 + k,).
         states: change of each run's initial [zeta; rates], (12,).
+        own: change of each run's own effect values, (o,).
         triangle: R of the scaled joint problem in the free unknowns.
         singular_values: of that triangle, descending.
         rank: how many of them count.
@@ -53,6 +64,7 @@ class Step:
 
     shared: Array
     states: tuple[Array, ...]
+    own: tuple[Array, ...]
     triangle: Array
     singular_values: Array
     rank: int
@@ -83,6 +95,7 @@ class Problem:
         self.samples = tuple(samples)
         count = 9 + len(parameters)
         self.free = np.ones(count, dtype=bool) if free is None else np.asarray(free, dtype=bool)
+        self.free[9 + model.own_values] = False
         self.estimate_scales = estimate_scales
         self.tolerance_m = tolerance_m
         self.prior_centre = model.start_values
@@ -96,14 +109,15 @@ class Problem:
             ValueError: when one cannot be followed, naming the run.
         """
         motions = tuple(
-            self._followed(state, start, samples)
-            for start, samples in zip(state.starts, self.samples, strict=True)
+            self._followed(state, run, start, samples)
+            for run, (start, samples) in enumerate(zip(state.starts, self.samples, strict=True))
         )
         starts = np.array([np.concatenate([one.zetas[0], one.rates[0]]) for one in motions])
         return replace(state, starts=starts, motions=motions)
 
-    def _followed(self, state: State, start: Array, samples: Samples) -> Motion:
-        zeta, inertia, values, span = start[:6], state.inertia, state.values, samples.span_s
+    def _followed(self, state: State, run: int, start: Array, samples: Samples) -> Motion:
+        zeta, inertia, span = start[:6], state.inertia, samples.span_s
+        values = state.values_of(run, self.model.own_values)
         rates = admissible_rates(self.model, zeta, start[6:], inertia, values, span[0])
         try:
             return simulate(self.model, zeta, rates, span, inertia, values, self.tolerance_m)
@@ -116,11 +130,14 @@ class Problem:
         for motion, samples in zip(state.motions, self.samples, strict=True):
             total += float(np.sum(residuals(motion, samples, state.scales) ** 2))
             total += float(np.sum(lengths_residual(motion, samples) ** 2))
+            total += float(np.sum(own_prior(motion) ** 2))
         return total
 
     def prior(self, values: Array) -> Array:
         """Distance of the effect values from where they do nothing, over their range, (k,)."""
-        return (values - self.prior_centre) / self.prior_std
+        prior = (values - self.prior_centre) / self.prior_std
+        prior[self.model.own_values] = 0.0
+        return prior
 
     def step(self, state: State, damping: float) -> Step:
         """A damped Gauss-Newton step at the motions of a state."""
@@ -141,9 +158,10 @@ class Problem:
         gains = np.where(kept, singular / (singular**2 + damping * largest**2 + 1e-300), 0.0)
         shared[free] = -self.unit[free] * (back.T @ (gains * (left.T @ right)))
         shared *= min(1.0, 3.0 / max(np.abs(shared / self.unit).max(initial=0.0), 1e-300))
-        states = tuple(run.state_change(shared) for run in reduced)
+        changes = [run.own_change(shared) for run in reduced]
+        states, own = (tuple(part) for part in zip(*changes, strict=True))
         decrease = float(right @ right)
-        return Step(shared, states, triangle, singular, int(kept.sum()), decrease)
+        return Step(shared, states, own, triangle, singular, int(kept.sum()), decrease)
 
     def _prior_rows(self, state: State) -> Array:
         rows = np.zeros((len(self.prior_std), len(self.free) + 1))
@@ -158,11 +176,17 @@ class Problem:
             inertia=state.inertia + step.shared[:9],
             values=state.values + step.shared[9:],
             starts=state.starts + np.array(step.states),
+            own_values=self._own_of(state) + np.array(step.own),
         )
         try:
             return self.simulated(aimed)
         except ValueError:
             return None
+
+    def _own_of(self, state: State) -> Array:
+        own = self.model.own_values
+        runs = range(len(self.samples))
+        return np.array([state.values_of(run, own)[own] for run in runs])
 
     def rescaled(self, state: State) -> State:
         """The state with noise scales that make the whitened residuals' variance one."""
@@ -174,8 +198,8 @@ class Problem:
             for g in (0, 1):
                 squares[g] += np.sum(white[:, samples.groups == g] ** 2)
                 counts[g] += white[:, samples.groups == g].size
-        own = (12 - self.model.robot.n_cables) * len(self.samples)
-        share = 1.0 - min(0.9, (own + self.free.sum()) / max(counts.sum(), 1.0))
+        own = 12 - self.model.robot.n_cables + len(self.model.own_values)
+        share = 1.0 - min(0.9, (own * len(self.samples) + self.free.sum()) / max(counts.sum(), 1.0))
         factors = np.sqrt(squares / np.maximum(share * counts, 1.0))
         scales = np.where(counts > 0, state.scales * np.maximum(factors, 1e-6), state.scales)
         return replace(state, scales=scales)

@@ -39,7 +39,8 @@ class LikelihoodFit:
     Attributes:
         model: the equations fitted.
         inertia: `INERTIA_NAMES` values, (9,).
-        values: effect values, (k,).
+        values: effect values, (k,); root mean squares over the runs of those that each run has
+            for itself (its motion holds them).
         free: which of the 9 + k shared unknowns were estimated.
         covariance: of all shared unknowns, (9 + k, 9 + k), zero where not estimated, infinite on
             the diagonal where the rank does not suffice; enlarged by `correlation`.
@@ -88,7 +89,8 @@ class LikelihoodFit:
     def state(self) -> State:
         """All unknowns, to start another fit from."""
         starts = np.array([np.concatenate([m.zetas[0], m.rates[0]]) for m in self.motions])
-        return State(self.inertia, self.values, starts, self.scales, self.motions)
+        own = np.array([m.values[self.model.own_values] for m in self.motions])
+        return State(self.inertia, self.values, starts, self.scales, self.motions, own)
 
 
 def fit(
@@ -201,7 +203,7 @@ def _packed(problem: Problem, state: State, step: Step, taken: int, reason: str)
     return LikelihoodFit(
         model=problem.model,
         inertia=state.inertia,
-        values=state.values,
+        values=_values(problem, state),
         free=problem.free,
         covariance=_covariance(problem, step) * max(1.0, correlation if correlation > 1.2 else 1.0),
         correlation=correlation,
@@ -216,6 +218,13 @@ def _packed(problem: Problem, state: State, step: Step, taken: int, reason: str)
         steps=taken,
         reason=reason,
     )
+
+
+def _values(problem: Problem, state: State) -> Array:
+    values, own = state.values.copy(), problem.model.own_values
+    each = np.array([motion.values[own] for motion in state.motions])
+    values[own] = np.sqrt(np.mean(each**2, axis=0))
+    return values
 
 
 def _covariance(problem: Problem, step: Step) -> Array:

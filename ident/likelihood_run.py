@@ -80,8 +80,10 @@ class Reduced:
 
     Attributes:
         rows: triangle over [shared unknowns; residual], (p + 1, p + 1).
-        own: triangle over [own unknowns; shared unknowns; residual], (12 - n, ...).
-        basis: state change by [own; shared; 1], (12, 12 - n + p + 1).
+        own: triangle over [own unknowns; shared unknowns; residual]: 12 - n state directions,
+            then the effect values that are the run's own.
+        basis: state change by [state directions; shared; 1], (12, 12 - n + p + 1).
+        own_columns: where the run's own effect values stand among the shared unknowns, (o,).
         squares: sum of squared whitened residuals of metres and of radians, (2,).
         counts: how many there are of each, (2,).
         lengths_square: whitened squared length residuals.
@@ -91,17 +93,26 @@ class Reduced:
     rows: Array
     own: Array
     basis: Array
+    own_columns: np.ndarray
     squares: Array
     counts: Array
     lengths_square: float
     residuals: Array
 
-    def state_change(self, shared: Array) -> Array:
-        """Change of the initial [zeta; rates] that goes with a change of the shared unknowns."""
+    def own_change(self, shared: Array) -> tuple[Array, Array]:
+        """Change of the initial [zeta; rates], and of the run's own effect values.
+
+        Args:
+            shared: change of the shared unknowns, zero where a run has its own, (p,).
+        """
         n_own = self.own.shape[0]
         right = -(self.own[:, n_own:-1] @ shared + self.own[:, -1])
         own = np.linalg.solve(self.own[:, :n_own], right)
-        return self.basis @ np.concatenate([own, shared, [1.0]])
+        directions = n_own - len(self.own_columns)
+        everything = shared.copy()
+        everything[self.own_columns] = own[directions:]
+        state = self.basis @ np.concatenate([own[:directions], everything, [1.0]])
+        return state, own[directions:]
 
 
 def predicted(motion: Motion, times_s: Array) -> Array:
@@ -142,10 +153,15 @@ def reduce_run(linear: Linearised, samples: Samples, scales: Array) -> Reduced:
     lengths = lengths_residual(motion, samples)
     right = np.concatenate([white.reshape(-1), lengths])
     basis = _allowed_states(motion)
-    n_own = STATE - motion.model.robot.n_cables
+    directions = STATE - motion.model.robot.n_cables
     body = rows[:, :STATE] @ basis
-    shared = body[:, n_own:-1] + rows[:, STATE:]
-    together = np.column_stack([body[:, :n_own], shared, right + body[:, -1]])
+    shared = body[:, directions:-1] + rows[:, STATE:]
+    mine = motion.inertia.size + motion.model.own_values
+    own = np.hstack([body[:, :directions], shared[:, mine]])
+    shared[:, mine] = 0.0
+    n_own = own.shape[1]
+    together = np.column_stack([own, shared, right + body[:, -1]])
+    together = np.vstack([together, _own_priors(motion, directions, together.shape[1])])
     triangle = np.linalg.qr(together, mode="r")
     size = together.shape[1]
     full = np.zeros((size, size))
@@ -153,8 +169,31 @@ def reduce_run(linear: Linearised, samples: Samples, scales: Array) -> Reduced:
     squares = np.array([np.sum(white[:, samples.groups == g] ** 2) for g in (0, 1)])
     counts = np.array([white[:, samples.groups == g].size for g in (0, 1)])
     return Reduced(
-        full[n_own:, n_own:], full[:n_own], basis, squares, counts, float(lengths @ lengths), white
+        full[n_own:, n_own:],
+        full[:n_own],
+        basis,
+        mine,
+        squares,
+        counts,
+        float(lengths @ lengths),
+        white,
     )
+
+
+def own_prior(motion: Motion) -> Array:
+    """A run's own effect values over their plausible size, (o,)."""
+    parameters = motion.model.parameters
+    return np.array([motion.values[k] / parameters[k].high for k in motion.model.own_values])
+
+
+def _own_priors(motion: Motion, directions: int, columns: int) -> Array:
+    """Rows that keep a run's own effect values within their range, (o, columns)."""
+    places = motion.model.own_values
+    rows = np.zeros((len(places), columns))
+    for row, k in enumerate(places):
+        rows[row, directions + row] = 1.0 / motion.model.parameters[k].high
+    rows[:, -1] = own_prior(motion)
+    return rows
 
 
 def _changes_measurement(motion: Motion) -> bool:

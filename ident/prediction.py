@@ -28,6 +28,7 @@ class Prediction:
         coordinates: names of the measured coordinates.
         measured: samples, (n, n_c).
         predicted: (n, n_c).
+        values: effect values of the motion, those that the run has for itself included, (k,).
     """
 
     run: str
@@ -35,6 +36,7 @@ class Prediction:
     coordinates: tuple[str, ...]
     measured: Array
     predicted: Array
+    values: Array
 
     @property
     def rmse_m(self) -> float | None:
@@ -82,13 +84,15 @@ def predict(
     # A start too far off leaves the simulated swing out of phase: grow into the run instead.
     spread = np.sqrt(np.mean((samples.values - samples.values.mean(axis=0)) ** 2))
     if np.sqrt(np.mean((seen - samples.values) ** 2)) > _ASTRAY * spread:
-        seen = _seen(_fitted(model, samples, state, grow=True))
+        found = _fitted(model, samples, state, grow=True)
+        seen = _seen(found)
     return Prediction(
         run.name,
         frozen_array(samples.times_s, samples.times_s.shape, "times"),
         samples.coordinates,
         frozen_array(samples.values, samples.values.shape, "measured"),
         frozen_array(seen, seen.shape, "predicted"),
+        found.motions[0].values,
     )
 
 

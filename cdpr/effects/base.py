@@ -28,6 +28,7 @@ class Parameter:
         start: where a fit starts.
         amplitude: True when the effect vanishes where all its amplitude parameters are zero;
             False for shape parameters (a frequency, a point of application).
+        per_run: True when each run has its own value (a phase that no clock ties to the runs).
     """
 
     name: str
@@ -36,6 +37,7 @@ class Parameter:
     scale: float
     start: float = 0.0
     amplitude: bool = True
+    per_run: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,8 @@ from cdpr.robot import Robot
 class HarmonicForce(Effect):
     """Force at P over the mass, with a cosine and a sine part in each direction.
 
-    The phase counts from the start of each run's time.
+    Recordings are not synchronised with a fan: amplitudes and phases are each run's own, the
+    frequency is shared.
     """
 
     name = "harmonic_force"
@@ -21,7 +22,7 @@ class HarmonicForce(Effect):
     def parameters(self, robot: Robot) -> tuple[Parameter, ...]:
         """Six amplitudes and a frequency."""
         parts = tuple(
-            Parameter(f"{part}_{axis}_m_s2", -3.0, 3.0, 0.05)
+            Parameter(f"{part}_{axis}_m_s2", -3.0, 3.0, 0.05, per_run=True)
             for part in ("cosine", "sine")
             for axis in "xyz"
         )

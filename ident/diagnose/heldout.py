@@ -111,6 +111,8 @@ def _one(
         prediction = predict(model, run, free, inertia, values)
     except (ValueError, np.linalg.LinAlgError):
         prediction = None
+    if prediction is not None:
+        values = prediction.values
     motion = run.full if free is None else run.free
     sigma = np.nan if motion is None else internal_error(model, motion, inertia, values)
     names = POSE_COORDINATES[:3] if free is None else free

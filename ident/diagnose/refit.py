@@ -83,6 +83,7 @@ def refit(
         np.concatenate([start.values + change[BASE:], values]),
         start.starts,
         noise_scales,
+        own_values=_with_new(start.own_values, len(model.own_values)),
     )
     try:
         found = _fitted(model, current, state)
@@ -104,6 +105,13 @@ def _fitted(model: Model, current: LikelihoodFit, state: State) -> LikelihoodFit
         tolerance=max(1.0, 1e-4 * current.cost),
         accuracy_m=RANKING_ACCURACY_M,
     )
+
+
+def _with_new(own_values: Array | None, count: int) -> Array | None:
+    """The runs' own values with zeros for those of the candidate."""
+    if own_values is None:
+        return None
+    return np.pad(own_values, ((0, 0), (0, count - own_values.shape[1])))
 
 
 def _unchanged(values: Array, model: Model) -> Array:

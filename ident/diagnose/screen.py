@@ -28,7 +28,8 @@ class Screen:
         values: at which it was linearised: fitted ones, and candidates that do nothing.
         evidence: over [9 inertia values; effect values].
         base: columns of inertia and accepted effects.
-        columns: of each candidate's amplitudes.
+        columns: of each candidate's amplitudes, but those that each run has for itself: these
+            are eliminated with its state.
     """
 
     model: Model
@@ -66,8 +67,10 @@ def screen(
     for index, (motion, samples) in enumerate(zip(fit.motions, fit.samples, strict=True)):
         if progress:
             progress(f"screening {len(candidates)} candidates", index / len(fit.motions))
+        mine = values.copy()
+        mine[: len(fit.values)] = motion.values
         reduced = reduce_run(
-            linearise(replace(motion, model=model, values=values)), samples, noise_scales
+            linearise(replace(motion, model=model, values=mine)), samples, noise_scales
         )
         triangles.append(reduced.rows)
         counts.append(_count(samples, model))
@@ -82,7 +85,8 @@ def screen(
 
 def _count(samples: Samples, model: Model) -> int:
     n = model.robot.n_cables
-    return samples.values.size - (12 - n) + (0 if samples.lengths_m is None else n)
+    own = 12 - n + len(model.own_values)
+    return samples.values.size - own + (0 if samples.lengths_m is None else n)
 
 
 def _start(
@@ -98,7 +102,7 @@ def _start(
         parameters = effect_named(name).parameters(model.robot)
         for offset, parameter in enumerate(parameters):
             values[used + offset] = shapes.get(name, {}).get(parameter.name, parameter.start)
-        amplitudes = [k for k, parameter in enumerate(parameters) if parameter.amplitude]
+        amplitudes = [k for k, p in enumerate(parameters) if p.amplitude and not p.per_run]
         columns[name] = BASE + used + np.array(amplitudes, dtype=np.int64)
         used += len(parameters)
     return values, columns
@@ -109,6 +113,8 @@ def _priors(model: Model, values: Array) -> Array:
     count = BASE + len(values)
     rows = np.zeros((len(values), count + 1))
     for k, parameter in enumerate(model.parameters):
+        if parameter.per_run:
+            continue
         std = max(parameter.high - parameter.start, parameter.start - parameter.low)
         rows[k, BASE + k] = 1.0 / std
         rows[k, -1] = (values[k] - parameter.start) / std

@@ -10,19 +10,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from multiprocessing import get_context
 
 import numpy as np
 from scipy.stats import chi2
 
 from cdpr.effects import effect_named
-from cdpr.robot import Array
+from cdpr.robot import Array, Robot
 from ident.diagnose.refit import Refit, plausible, refit, rescored
 from ident.diagnose.rows import score
 from ident.diagnose.screen import BASE, Screen, screen
 from ident.diagnose.spectrum import common_frequency
-from ident.likelihood import LikelihoodFit, correlation_factor
+from ident.likelihood import LikelihoodFit, correlation_factor, fit
 
 Progress = Callable[[str, float], None]
 
@@ -116,21 +116,34 @@ class Search:
         ranked = sorted(linear, key=lambda name: linear[name])
         promising = _promising(ranked, linear, current)
         tried = self._refits(current, screens, promising, index)
-        return _decided(current, screens, linear, ranked, tried, index)
+        return self._polished(_decided(current, screens, linear, ranked, tried, index))
 
-    def _screens(self, fit: LikelihoodFit, names: Sequence[str]) -> dict[str, Screen]:
-        """Linear evidence by candidate: those that need tensions apart, they cost more."""
+    def _polished(self, done: Round) -> Round:
+        """The round with its winner fitted to convergence: ranking stops early."""
+        if done.winner is None:
+            return done
+        found = done.winner.fit
+        exact = fit(found.model, found.samples, found.state, estimate_scales=False, grow=False)
+        return replace(done, winner=rescored(exact, self.noise_scales))
+
+    def _screens(self, found: LikelihoodFit, names: Sequence[str]) -> dict[str, Screen]:
+        """Linear evidence by candidate.
+
+        Those that need tensions stand apart because they cost more, those with values for each
+        run because they are eliminated with the runs' states.
+        """
         shapes = {}
-        frequency = common_frequency(fit, self.noise_scales)
+        frequency = common_frequency(found, self.noise_scales)
         if "harmonic_force" in names:
             shapes["harmonic_force"] = {"frequency_hz": frequency}
-        found: dict[str, Screen] = {}
-        for loaded in (False, True):
-            group = [n for n in names if effect_named(n).needs_tension == loaded]
+        screens: dict[str, Screen] = {}
+        robot = found.model.robot
+        for kind in ((False, False), (True, False), (False, True)):
+            group = [n for n in names if _kind(n, robot) == kind]
             if group:
-                together = screen(fit, group, self.noise_scales, shapes)
-                found |= dict.fromkeys(group, together)
-        return found
+                together = screen(found, group, self.noise_scales, shapes)
+                screens |= dict.fromkeys(group, together)
+        return screens
 
     def _refits(
         self, current: Refit, screens: dict[str, Screen], names: Sequence[str], index: int
@@ -155,6 +168,11 @@ class Search:
         return found
 
 
+def _kind(name: str, robot: Robot) -> tuple[bool, bool]:
+    effect = effect_named(name)
+    return effect.needs_tension, any(p.per_run for p in effect.parameters(robot))
+
+
 def _job(
     current: Refit, name: str, values: Array, change: Array, noise_scales: Array
 ) -> Refit | None:
@@ -174,7 +192,7 @@ def _start_of(one: Screen, name: str) -> tuple[Array, Array]:
     columns = one.columns[name]
     n_base = len(one.base)
     parameters = effect_named(name).parameters(one.model.robot)
-    first = int(columns[0]) - BASE - next(i for i, p in enumerate(parameters) if p.amplitude)
+    first = one.model.names.index(f"{name}.{parameters[0].name}")
     values = one.values[first : first + len(parameters)].copy()
     places = columns - BASE - first
     low = np.array([parameters[i].low for i in places])
@@ -221,7 +239,7 @@ def _decided(
     for name in ranked:
         known = tried.get(name)
         held_out = known.held_out if known else linear[name]
-        n_new = len(effect_named(name).parameters(current.fit.model.robot))
+        n_new = _parameter_count(current, name)
         bic = (
             _delta_bic(current, known, n_new, colour, count)
             if known
@@ -244,7 +262,7 @@ def _complaint(
     outside = plausible(one, name)
     if outside:
         return "; ".join(outside)
-    n_new = len(effect_named(name).parameters(current.fit.model.robot))
+    n_new = _parameter_count(current, name)
     drop = (current.score.cost - one.score.cost) / colour
     chance = min(1.0, float(chi2.sf(max(drop, 0.0), n_new)) * n_tried)
     if chance > SIGNIFICANCE or _delta_bic(current, one, n_new, colour, count) > -10.0:
@@ -261,6 +279,13 @@ def _complaint(
             "noise: too little to claim another effect"
         )
     return ""
+
+
+def _parameter_count(current: Refit, name: str) -> int:
+    """Unknowns that an effect brings, those of each run counted."""
+    parameters = effect_named(name).parameters(current.fit.model.robot)
+    own = sum(parameter.per_run for parameter in parameters)
+    return len(parameters) + own * (len(current.fit.samples) - 1)
 
 
 def _excess(current: Refit) -> float:
