@@ -47,7 +47,7 @@ class Follower:
     """Moves along the poses of one assembly mode.
 
     Args:
-        cables: `Model.cables`.
+        cables: (zeta, values) -> lengths (n,) and their Jacobian (n, 6).
         values: effect values, (k,).
         chosen: indices of the free coordinates.
         dependent: indices of the others.
@@ -70,7 +70,7 @@ class Follower:
         """Lengths and Jacobian at a pose."""
         self._bound.inputs[0][0] = zeta
         self._bound.run()
-        jacobian = self._bound.outputs[3][0].T.copy()
+        jacobian = self._bound.outputs[1][0].T.copy()
         determinant = float(np.linalg.det(jacobian[:, self._dependent]))
         return _Pose(zeta.copy(), self._bound.outputs[0][0].copy(), jacobian, determinant)
 

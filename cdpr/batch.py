@@ -131,7 +131,14 @@ def with_jacobian(function: Any, inputs: tuple[int, ...], output: int = 0) -> An
     return ca.Function(name, symbols, results, function.name_in(), names, options)
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=256)
+def only(function: Any, *outputs: int) -> Any:
+    """The function with some of its outputs alone: what the others need is not computed."""
+    names = [function.name_out()[output] for output in outputs]
+    parts = "_".join(str(output) for output in outputs)
+    return function.factory(f"{function.name()}_only_{parts}", function.name_in(), names)
+
+
 def first_output(function: Any) -> Any:
     """The function with its first output alone."""
-    return function.factory(f"{function.name()}_first", function.name_in(), function.name_out()[:1])
+    return only(function, 0)

@@ -12,7 +12,7 @@ from itertools import combinations
 import numpy as np
 
 from cdpr.assembly import Assembly, Follower, follow
-from cdpr.batch import evaluate
+from cdpr.batch import evaluate, only
 from cdpr.model import Model
 from cdpr.robot import POSE_COORDINATES, Array, finite
 
@@ -76,8 +76,8 @@ def free_basis(
             others at one of the poses (singular dependent block).
     """
     chosen, dependent = _split(model, free)
-    jacobian = evaluate(model.cables, zeta, values)[3]
-    jacobian_rate = evaluate(model.cable_rates, zeta, rates, values)[0]
+    jacobian = evaluate(only(model.cables, 3), zeta, values)[0]
+    jacobian_rate = evaluate(only(model.cable_rates, 0), zeta, rates, values)[0]
     block = jacobian[..., dependent]
     zeta_map = np.zeros((*zeta.shape[:-1], 6, len(chosen)))
     zeta_map[..., chosen, :] = np.eye(len(chosen))
@@ -108,7 +108,7 @@ def amplification(
     chosen, dependent = _split(model, free)
     size = float(np.sqrt(np.mean(np.sum(model.robot.attachments_m**2, axis=1))))
     scale = np.array([1.0, 1.0, 1.0, size, size, size])
-    jacobian = evaluate(model.cables, zeta, values)[3] / scale
+    jacobian = evaluate(only(model.cables, 3), zeta, values)[0] / scale
     block = jacobian[..., dependent]
     smallest = np.linalg.svd(block, compute_uv=False)[..., -1]
     singular = smallest < 1e-9 * np.linalg.norm(jacobian, axis=(-2, -1))
@@ -158,7 +158,7 @@ def admissible_rates(
     """
     values = model.start_values if values is None else values
     zeta, rates = finite("zeta", zeta, 6), finite("rates", rates, 6)
-    jacobian = evaluate(model.cables, zeta, values)[3]
+    jacobian = evaluate(only(model.cables, 3), zeta, values)[0]
     for _ in range(3):
         slip = evaluate(model.slip, time_s, zeta, rates, inertia, values)[0]
         rates = rates - np.linalg.pinv(jacobian) @ slip
@@ -191,5 +191,5 @@ def assemble(
     """
     values = model.start_values if values is None else values
     chosen, dependent = _split(model, free)
-    follower = Follower(model.cables, values, chosen, dependent, tolerance_m)
+    follower = Follower(only(model.cables, 0, 3), values, chosen, dependent, tolerance_m)
     return follow(follower, tuple(free), lengths_m, free_values, start)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import legendre
 
-from cdpr.batch import Bound, evaluate, first_output, with_jacobian
+from cdpr.batch import Bound, evaluate, only, with_jacobian
 from cdpr.collocation import Table, interpolation, table
 from cdpr.domain import check_domain, domain_problems
 from cdpr.model import Model
@@ -90,7 +90,7 @@ class Motion:
         """Specific cable tensions tau / m at times (n,), (n, n_cables) in m/s^2."""
         zetas, rates, _ = self.at(times_s)
         arguments = (np.asarray(times_s), zetas, rates, self.inertia, self.values)
-        return evaluate(self.model.acceleration, *arguments)[1]
+        return evaluate(only(self.model.acceleration, 1), *arguments)[0]
 
 
 def simulate(
@@ -162,7 +162,7 @@ def simulate(
 
 def _check_swivels(model: Model, times: Array, zetas: Array, values: Array) -> None:
     """Refuse a motion that has stepped across a swivel axis, where a pulley would have to flip."""
-    swivels = evaluate(model.cables, zetas, values)[1]
+    swivels = evaluate(only(model.cables, 1), zetas, values)[0]
     jumps = np.abs(np.angle(np.exp(1j * np.diff(swivels, axis=0)))) * (model.robot.radii_m > 0.0)
     if jumps.max(initial=0.0) > LARGEST_JUMP_RAD:
         sample, cable = np.unravel_index(int(np.argmax(jumps)), jumps.shape)
@@ -235,7 +235,7 @@ class _Stepper:
         self.table: Table = table(NODES)
         self.integrals = np.vstack([self.table.twice, self.table.once])
         _, self.once_middle, self.twice_middle = interpolation(NODES, np.array([0.5]))
-        self.force = Bound(first_output(model.acceleration), NODES)
+        self.force = Bound(only(model.acceleration, 0), NODES)
         self.slope = Bound(with_jacobian(model.acceleration, (1, 2)), 1)
         for bound in (self.force, self.slope):
             bound.inputs[3][:] = inertia

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdpr.batch import Bound, evaluate
+from cdpr.batch import Bound, evaluate, only
 from cdpr.model import Model
 from cdpr.robot import Array, finite
 from cdpr.rotation import matrix_from_angles
@@ -203,7 +203,7 @@ def modes(
     values = model.start_values if values is None else values
     zeta = equilibrium.zeta
     _, _, hessian = evaluate(model.lagrangian, zeta, equilibrium.tensions, inertia, values)
-    free = _null_space(evaluate(model.cables, zeta, values)[3])
+    free = _null_space(evaluate(only(model.cables, 3), zeta, values)[0])
     if not free.size:
         raise ValueError(f"{model.robot.n_cables} cables leave no free motion, hence no modes")
     stiffness = free.T @ hessian @ free
@@ -250,8 +250,8 @@ class _System:
     """Gradient and Hessian of the Lagrangian, told lengths and Jacobian, at one pose."""
 
     def __init__(self, model: Model, inertia: Array, values: Array) -> None:
-        self._lagrangian = Bound(model.lagrangian, 1)
-        self._cables = Bound(model.cables, 1)
+        self._lagrangian = Bound(only(model.lagrangian, 1, 2), 1)
+        self._cables = Bound(only(model.cables, 3), 1)
         self._told = Bound(model.told, 1)
         inertia = finite("inertia", inertia, 9)
         values = finite("values", values, len(model.parameters))
@@ -267,8 +267,8 @@ class _System:
         for bound in (lagrangian, cables, told):
             bound.run()
         return (
-            lagrangian.outputs[1][0].copy(),
-            lagrangian.outputs[2][0].T.copy(),
+            lagrangian.outputs[0][0].copy(),
+            lagrangian.outputs[1][0].T.copy(),
             told.outputs[0][0].copy(),
-            cables.outputs[3][0].T.copy(),
+            cables.outputs[0][0].T.copy(),
         )
