@@ -13,8 +13,10 @@ from numpy.typing import NDArray
 from calib.camera import Camera
 from cdpr.trajectory import Trajectory
 from cdpr.trajectory_files import write_csv
+from vision.calibration_share import CalibrationNoise, calibration_deviations
 from vision.follow import STATUS_NAMES, USED
 from vision.fuse import Fit, Poses, free_of
+from vision.layout import LayoutSums, layout_sums
 from vision.rig_correct import correct_rig
 from vision.rig_effects import Finding
 from vision.run_views import CameraViews
@@ -49,11 +51,14 @@ class RunTrack:
     rate_hz: float
     std_m: float
     std_rad: float
+    calibration_m: float
+    calibration_rad: float
     cameras: tuple[CameraCount, ...]
     before: Fit
     after: Fit
     findings: tuple[Finding, ...]
     problems: tuple[str, ...]
+    layout: LayoutSums
 
 
 def track_run(
@@ -62,13 +67,21 @@ def track_run(
     watch: Watch,
     csv: Path,
     settings: Settings,
+    noise: CalibrationNoise | None = None,
 ) -> RunTrack:
-    """Fuses a run's sightings, corrects the rig, and writes the trajectory when there is one."""
+    """Fuses a run's sightings, corrects the rig, and writes the trajectory when there is one.
+
+    The trajectory's covariances are those of its scatter. What the calibration's own uncertainty
+    adds is common to the whole run and stated apart, where `noise` tells it.
+    """
     views = [CameraViews(camera, paths) for camera, paths in sources]
     counts = tuple(_count(view) for view in views)
     corrected = correct_rig(views, watch, settings.survey_std_m, look=settings.correct_rig)
     poses = corrected.poses
     known = int(poses.known.sum())
+    shares = np.zeros((0, 6))
+    if noise is not None and known:
+        shares = calibration_deviations(poses, corrected.after, corrected.views, watch, noise)
     if known:
         write_csv(csv, trajectory_of(poses, watch))
     deviations = np.sqrt(np.diagonal(poses.covariances, axis1=1, axis2=2))
@@ -80,11 +93,14 @@ def track_run(
         float(1.0 / np.median(steps)) if len(steps) else float("nan"),
         _median(deviations[poses.known, :3]),
         _median(deviations[poses.known, 3:]),
+        _median(shares[:, :3]),
+        _median(shares[:, 3:]),
         counts,
         corrected.before,
         corrected.after,
         corrected.findings,
         tuple(_problems(counts, corrected.after, watch)),
+        layout_sums(poses, corrected.after, corrected.views, watch),
     )
 
 

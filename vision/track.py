@@ -7,7 +7,8 @@ The call that the command line makes:
                              frame_rate_hz=session.frame_rate_hz, workers=0,
                              progress=console.progress)
 
-It writes `results/tracks/<run>.csv` and `results/tracking.json`, and keeps each camera's
+`results/calibration.json`, where there is one, tells how far the calibration may shift the poses.
+The call writes `results/tracks/<run>.csv` and `results/tracking.json`, and keeps each camera's
 sightings under `results/tracks/.sightings`, from where a run that was killed goes on.
 """
 
@@ -22,7 +23,9 @@ from calib.camera import Camera
 from calib.recordings import Recording, find_recordings
 from cdpr.documents import DataError, InputError, write_json
 from cdpr.target import Target
+from vision.calibration_share import read_calibration_noise
 from vision.jobs import Job, run_jobs
+from vision.layout import layout_change, with_layout
 from vision.run_track import RunTrack, track_run
 from vision.sightings import collect_sightings
 from vision.tracking_report import tracking_document
@@ -31,6 +34,7 @@ from vision.watch import StandingTag, Watch
 Progress = Callable[[str, float], None]
 
 SURVEY_STD_M = 0.0003
+_LAYOUT_ROUNDS = 3
 _FOLLOWING = 0.85  # share of the time that goes into the images
 
 
@@ -107,16 +111,16 @@ def track_session(
         for camera, recording in found
     ]
     paths = run_jobs(jobs, workers, _scaled(progress, 0.0, _FOLLOWING))
-    grouped: list[Job] = []
-    start = 0
-    for name, found in pairs:
-        mine = paths[start : start + len(found)]
-        start += len(found)
-        views = tuple((camera, tuple(p)) for (camera, _), p in zip(found, mine, strict=True))
-        csv = results / "tracks" / f"{name}.csv"
-        grouped.append(Job(f"{name} fused", track_run, (name, views, watch, csv, settings)))
-    tracks: list[RunTrack] = run_jobs(grouped, workers, _scaled(progress, _FOLLOWING, 1.0))
-    document = tracking_document(tracks, watch)
+    sources = _by_run(pairs, paths)
+    told = _scaled(progress, _FOLLOWING, 1.0)
+    tracks = _fuse(sources, watch, results, settings, workers, told)
+    change = layout_change([track.layout for track in tracks], watch)
+    if settings.refine_layout:
+        for _ in range(_LAYOUT_ROUNDS):
+            refined = layout_change([track.layout for track in tracks], watch)
+            watch = with_layout(watch, refined.corners_m)
+            tracks = _fuse(sources, watch, results, settings, workers, told)
+    document = tracking_document(tracks, watch, change, refined=settings.refine_layout)
     write_json(results / "tracking.json", document)
     _refuse_empty(tracks)
     return document
@@ -132,6 +136,39 @@ def _recordings(run: RecordedRun, cameras: Sequence[Camera]) -> list[tuple[Camer
             f"{', '.join(by_name)}: name the files as the cameras are named"
         )
     return [(by_name[name], found[name]) for name in known]
+
+
+def _by_run(
+    pairs: Sequence[tuple[str, list[tuple[Camera, Recording]]]], paths: Sequence[list[Path]]
+) -> list[tuple[str, tuple[tuple[Camera, tuple[Path, ...]], ...]]]:
+    """Each run's cameras with their pieces."""
+    sources, start = [], 0
+    for name, found in pairs:
+        mine = paths[start : start + len(found)]
+        start += len(found)
+        views = tuple((camera, tuple(p)) for (camera, _), p in zip(found, mine, strict=True))
+        sources.append((name, views))
+    return sources
+
+
+def _fuse(
+    sources: Sequence[tuple[str, tuple[tuple[Camera, tuple[Path, ...]], ...]]],
+    watch: Watch,
+    results: Path,
+    settings: Settings,
+    workers: int,
+    progress: Progress | None,
+) -> list[RunTrack]:
+    noise = read_calibration_noise(results / "calibration.json")
+    jobs = [
+        Job(
+            f"{name} fused",
+            track_run,
+            (name, views, watch, results / "tracks" / f"{name}.csv", settings, noise),
+        )
+        for name, views in sources
+    ]
+    return run_jobs(jobs, workers, progress)
 
 
 def _scaled(progress: Progress | None, low: float, high: float) -> Progress | None:

@@ -8,21 +8,43 @@ from typing import Any
 import numpy as np
 
 from vision.fuse import Fit
+from vision.layout import LayoutChange
 from vision.run_track import RunTrack
 from vision.watch import Watch
 
 
-def tracking_document(tracks: Sequence[RunTrack], watch: Watch) -> dict[str, Any]:
+def tracking_document(
+    tracks: Sequence[RunTrack], watch: Watch, change: LayoutChange, *, refined: bool
+) -> dict[str, Any]:
     """The document of `results/tracking.json`.
 
     Agreement is the root mean square reprojection in pixels, and the distance in millimetres at
-    which a camera's mean ray passes the platform that all cameras agree on.
+    which a camera's mean ray passes the platform that all cameras agree on. `position_std_mm`
+    is the scatter of single poses, as in the track; `calibration_std_mm` is how far the
+    calibration's own uncertainty may shift all of them together (null when it is not known).
     """
     return {
         "format": "freeswing-tracking/1",
         "runs": [_run(track, watch) for track in tracks],
+        "layout": _layout(watch, change, refined=refined),
         "effects": [entry for track in tracks for entry in _effects(track)],
     }
+
+
+def _layout(watch: Watch, change: LayoutChange, *, refined: bool) -> dict[str, Any]:
+    """How far each tag sits from where target.toml has it, corners' rms in millimetres."""
+    tags = [
+        {
+            "family": family,
+            "id": number,
+            "mismatch_mm": 1e3 * float(change.change_m[k]),
+            "std_mm": 1e3 * float(change.std_m[k]),
+            "corners_platform_m": change.corners_m[k].tolist(),
+        }
+        for k, (family, number) in enumerate(watch.tags)
+    ]
+    worst = max((tag["mismatch_mm"] for tag in tags), default=0.0)
+    return {"refined": refined, "worst_mismatch_mm": worst, "tags": tags}
 
 
 def _run(track: RunTrack, watch: Watch) -> dict[str, Any]:
@@ -55,19 +77,25 @@ def _run(track: RunTrack, watch: Watch) -> dict[str, Any]:
         "run": track.name,
         "samples": track.samples,
         "known": track.known,
-        "rate_hz": track.rate_hz,
-        "position_std_mm": 1e3 * track.std_m,
-        "rotation_std_mrad": 1e3 * track.std_rad,
+        "rate_hz": _known(track.rate_hz),
+        "position_std_mm": _known(1e3 * track.std_m),
+        "rotation_std_mrad": _known(1e3 * track.std_rad),
+        "calibration_std_mm": _known(1e3 * track.calibration_m),
+        "calibration_std_mrad": _known(1e3 * track.calibration_rad),
         **_agreement(track.after),
         "cameras": cameras,
         "problems": list(track.problems),
     }
 
 
-def _agreement(fit: Fit) -> dict[str, float]:
+def _known(value: float) -> float | None:
+    return value if np.isfinite(value) else None
+
+
+def _agreement(fit: Fit) -> dict[str, float | None]:
     used = fit.used > 0
     if not used.any():
-        return {"reprojection_px": float("nan"), "consistency_mm": float("nan")}
+        return {"reprojection_px": None, "consistency_mm": None}
     weights = fit.used[used] / fit.used[used].sum()
     return {
         "reprojection_px": float(np.sqrt(weights @ fit.reprojection_px[used] ** 2)),

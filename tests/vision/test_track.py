@@ -28,7 +28,7 @@ from vision import pieces, sightings
 from vision.record import record
 from vision.rig_effects import moved_by
 from vision.simulate import Look
-from vision.track import track_session
+from vision.track import Settings, track_session
 
 FRAMES = 60
 STAMPS = 0.3 + np.arange(FRAMES) / 50.0
@@ -104,7 +104,7 @@ def test_poses_scatter_as_they_claim(session) -> None:
     total = np.einsum(
         "ni,nij,nj->",
         error[inner],
-        np.linalg.inv(trajectory.covariances[inner]),
+        np.linalg.inv(np.asarray(trajectory.covariances)[inner]),
         error[inner],
     )
     low, high = chi2.ppf([1e-4, 1 - 1e-4], error[inner].size)
@@ -181,3 +181,28 @@ def test_a_recording_of_another_size_is_refused(session, tmp_path) -> None:
     wrong = tuple(replace(c, size_px=(640, 480)) for c in cameras())
     with pytest.raises(InputError, match=r"360 x 288 pixels, but cameras\.toml has 640 x 480"):
         track(run, tmp_path, view=wrong)
+
+
+def test_a_tag_that_sits_elsewhere_is_measured_and_put_right(session, tmp_path) -> None:
+    """The recordings' tag 3 sits 2 mm from where the target file has it."""
+    _, run, _ = session
+    moved = np.array([0.0014, 0.0, -0.0014])
+    tags = list(TARGET.tags)
+    pose = tags[3].T_platform_tag.copy()
+    pose[:3, 3] += moved
+    tags[3] = replace(tags[3], T_platform_tag=pose)
+    document = track_session(
+        [run],
+        cameras(),
+        Target(tuple(tags)),
+        results=tmp_path / "results",
+        base_tags=BASE,
+        workers=1,
+        settings=Settings(refine_layout=True),
+    )
+    mismatch = {tag["id"]: tag["mismatch_mm"] for tag in document["layout"]["tags"]}
+    assert max(mismatch, key=mismatch.get) == 3, mismatch
+    assert 1.2 < mismatch[3] < 2.5, f"mismatch {mismatch[3]:.2f} mm"
+    error = errors(read_trajectory(tmp_path / "results" / "tracks" / "swing.csv"))
+    scatter_mm = 1e3 * error[:, :3].std(axis=0).max()
+    assert scatter_mm < 0.06, f"scatter {scatter_mm:.3f} mm"
