@@ -108,7 +108,11 @@ def _images(recording: Recording) -> Iterator[tuple[int, str, Image]]:
     import cv2
 
     for number, path in zip(recording.numbers, recording.images, strict=True):
-        image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
+        try:
+            image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
+        except cv2.error as error:
+            reason = str(error.err or error)
+            raise InputError(f"{path}: an image that is not read ({reason})") from error
         if image is None:
             raise InputError(f"{path}: not an image that can be read")
         yield number, f"{recording.name}/{path.name}", np.asarray(image, dtype=np.uint8)

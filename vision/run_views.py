@@ -183,6 +183,8 @@ def blocks(views: Sequence[CameraViews], watch: Watch, instants_s: Array) -> Ite
 def _nearest(views: CameraViews, instants_s: Array) -> Ints:
     """Instant of each frame, -1 when it is farther than 0.6 steps or was not used."""
     times = views.middle_times()
+    if len(instants_s) == 0:
+        return np.full(len(times), -1, dtype=np.int64)
     if len(instants_s) == 1:
         place = np.zeros(len(times), dtype=np.int64)
         return np.where(views.status == USED, place, -1)
