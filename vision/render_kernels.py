@@ -82,6 +82,18 @@ def sample_plane(
                 or r > last_row - 1 + foot_r
             ):
                 continue
+            reach = 0.5 + 0.6 / subpixels
+            k, m = math.floor(c - reach * foot_c), math.floor(r - reach * foot_r)
+            if (
+                math.floor(c + reach * foot_c) == k
+                and math.floor(r + reach * foot_r) == m
+                and 0 <= k < last_column - 1
+                and 0 <= m < last_row - 1
+            ):  # the whole pixel lies within one cell
+                p, q = i * subpixels, j * subpixels
+                out[0, p : p + subpixels, q : q + subpixels] += light[m + 1, k + 1]
+                out[1, p : p + subpixels, q : q + subpixels] += cover[m + 1, k + 1]
+                continue
             foot_c /= subpixels
             foot_r /= subpixels
             for a in range(subpixels):
@@ -159,7 +171,7 @@ def sample_sphere(
                     out[1, i * subpixels + a, j * subpixels + b] += part
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, fastmath={"reassoc", "contract"})
 def composite(
     samples: NDArray[np.float32],
     weights: NDArray[np.float32],
@@ -178,31 +190,29 @@ def composite(
     margin = (taps // subpixels - 1) // 2
     rows, columns = samples.shape[1] // subpixels, samples.shape[2] // subpixels
     inner_rows, inner_columns = rows - 2 * margin, columns - 2 * margin
-    across = np.zeros((2, rows * subpixels, inner_columns), dtype=np.float32)
-    for channel in range(2):
-        for i in range(rows * subpixels):
-            for j in range(inner_columns):
-                total = np.float32(0.0)
-                for k in range(taps):
-                    total += weights[k] * samples[channel, i, j * subpixels + k]
-                across[channel, i, j] = total
-    total_light = np.empty(inner_columns, dtype=np.float32)
-    total_cover = np.empty(inner_columns, dtype=np.float32)
+    down = np.empty((2, columns * subpixels), dtype=np.float32)
     for i in range(inner_rows):
         v = top + margin + i
         if v < 0 or v >= image.shape[0]:
             continue
-        total_light[:] = 0.0
-        total_cover[:] = 0.0
-        for k in range(taps):
-            w = weights[k]
-            for j in range(inner_columns):
-                total_light[j] += w * across[0, i * subpixels + k, j]
-                total_cover[j] += w * across[1, i * subpixels + k, j]
+        down[:] = 0.0
+        for channel in range(2):
+            line = down[channel]
+            for k in range(taps):
+                w = weights[k]
+                source = samples[channel, i * subpixels + k]
+                for j in range(columns * subpixels):
+                    line[j] += w * source[j]
         for j in range(inner_columns):
             u = left + margin + j
-            if 0 <= u < image.shape[1]:
-                image[v, u] += share * (total_light[j] - total_cover[j] * image[v, u])
+            if u < 0 or u >= image.shape[1]:
+                continue
+            light = np.float32(0.0)
+            cover = np.float32(0.0)
+            for k in range(taps):
+                light += weights[k] * down[0, j * subpixels + k]
+                cover += weights[k] * down[1, j * subpixels + k]
+            image[v, u] += share * (light - cover * image[v, u])
 
 
 @numba.njit(cache=True, nogil=True)
