@@ -22,7 +22,9 @@ from calib.reprojection import Scene, board_residuals, fixed_residuals, moved
 from calib.views import relative_std
 
 MOST_ITERATIONS = 60
-_DECREMENT = 1e-7  # expected fall of the cost, in units where one residual counts 1/2
+# expected fall of the cost at which to stop, in units where one residual of 1 sigma counts 1/2
+CONVERGED = 1e-7
+ROUGHLY_CONVERGED = 1e-2
 MEDIAN_OF_RAYLEIGH = 1.1774100225154747  # median length of a 2-D error of unit standard deviation
 
 
@@ -60,7 +62,11 @@ class Adjustment:
 
 
 def adjust(
-    scene: Scene, problem: Problem, sigma_px: Array | None = None, rounds: int = 2
+    scene: Scene,
+    problem: Problem,
+    sigma_px: Array | None = None,
+    rounds: int = 2,
+    converged: float = CONVERGED,
 ) -> Adjustment:
     """Adjust `scene` to the sightings.
 
@@ -69,13 +75,14 @@ def adjust(
         problem: data and free unknowns.
         sigma_px: noise of each camera to start from; measured from the residuals when None.
         rounds: how often the noise is measured again and the adjustment repeated.
+        converged: expected fall of the cost at which to stop.
     """
     iterations, stop, cost = 0, "", np.inf
     sigma = _noise(scene, problem, None) if sigma_px is None else np.array(sigma_px, dtype=float)
     for turn in range(rounds):
         if turn:
             sigma = _noise(scene, problem, sigma)
-        scene, cost, steps, stop = _minimise(scene, problem, sigma)
+        scene, cost, steps, stop = _minimise(scene, problem, sigma, converged)
         iterations += steps
     sigma = _noise(scene, problem, sigma)
     normal = normal_equations(scene, problem, sigma)
@@ -87,7 +94,9 @@ def adjust(
     )  # fmt: skip
 
 
-def _minimise(scene: Scene, problem: Problem, sigma: Array) -> tuple[Scene, float, int, str]:
+def _minimise(
+    scene: Scene, problem: Problem, sigma: Array, converged: float
+) -> tuple[Scene, float, int, str]:
     damping, growth = 1e-4, 4.0
     cost = _cost(scene, problem, sigma)
     normal = normal_equations(scene, problem, sigma)
@@ -100,11 +109,11 @@ def _minimise(scene: Scene, problem: Problem, sigma: Array) -> tuple[Scene, floa
         trial_cost = _cost(trial, problem, sigma)
         if trial_cost <= cost:
             scene, cost = trial, trial_cost
-            if fall < _DECREMENT and damping <= 1e-3:
+            if fall < converged and damping <= 1e-3:
                 return scene, cost, iteration, "converged"
             normal = normal_equations(scene, problem, sigma)
             damping, growth = max(damping * 0.1, 1e-12), 4.0
-        elif fall < _DECREMENT:
+        elif fall < converged:
             return scene, cost, iteration, "converged to rounding"
         else:
             damping, growth = damping * growth, growth * 2.0

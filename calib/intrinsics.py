@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib.adjustment import Adjustment, Problem, adjust
+from calib.adjustment import ROUGHLY_CONVERGED, Adjustment, adjust
 from calib.board_pose import best_poses, view_errors
 from calib.camera import Camera
 from calib.camera_models import FISHEYE, PARAMETER_NAMES, Array
+from calib.normal_equations import Problem
 from calib.planar_pose import (
     board_poses,
     flatness_errors,
@@ -27,7 +28,7 @@ _FLATNESS_FLOOR = 0.01
 _FOCAL_STARTS = (0.5, 0.8, 1.2, 2.0)
 _FISHEYE_STARTS = (0.3, 0.4, 0.5, 0.7)
 _GOOD_PX = 1.0
-_START_VIEWS = 25
+_START_VIEWS = 16
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,7 +144,8 @@ def _adjust_lens(camera: Camera, board_points_m: Array, views: Views) -> Adjustm
     free = np.zeros(len(camera.params) + POSE + CLOCK + WARP, dtype=bool)
     free[: len(camera.params)] = True
     scene = Scene((camera,), poses[good], np.zeros(WARP), np.zeros((0, 3)))
-    result = adjust(scene, Problem(board_points_m, kept, None, free), rounds=1)
+    problem = Problem(board_points_m, kept, None, free)
+    result = adjust(scene, problem, rounds=1, converged=ROUGHLY_CONVERGED)
     return result if np.isfinite(result.cost) else None
 
 

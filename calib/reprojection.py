@@ -12,6 +12,7 @@ residual = pixel - velocity (lag + clock_offset + row line_time) - projection.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -56,7 +57,12 @@ def shape_modes(board_points_m: Array) -> Array:
     (mrcal's model). The third moves every tag's corners away from its middle, half of it along each
     side: ink that spread, or a marker of another size than stated. It is zero without tags.
     """
-    plane = board_points_m[:, :2]
+    return _shape_modes(np.ascontiguousarray(board_points_m, dtype=np.float64).tobytes())
+
+
+@lru_cache(maxsize=8)
+def _shape_modes(points: bytes) -> Array:
+    plane = np.frombuffer(points).reshape(-1, 3)[:, :2]
     low, high = plane.min(axis=0), plane.max(axis=0)
     half = np.maximum(0.5 * (high - low), 1e-12)
     modes = np.zeros((len(plane), 3, WARP))
@@ -67,6 +73,7 @@ def shape_modes(board_points_m: Array) -> Array:
         reach = np.linalg.norm(arms, axis=-1, keepdims=True)
         if np.allclose(arms[:, :2], -arms[:, 2:]) and np.allclose(reach, reach[0, 0, 0]):
             modes[:, :2, 2] = (arms / (np.sqrt(2.0) * reach)).reshape(-1, 2)
+    modes.flags.writeable = False
     return modes
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calib.adjustment import MEDIAN_OF_RAYLEIGH, Adjustment, adjust
+from calib.adjustment import MEDIAN_OF_RAYLEIGH, ROUGHLY_CONVERGED, Adjustment, adjust
 from calib.camera import Camera
 from calib.camera_models import Array
 from calib.intrinsics import CameraStart, DroppedView, start_camera
@@ -110,7 +110,8 @@ def _with_board_shape(rig: Rig) -> Rig:
     free = rig.problem.free.copy()
     free[end : end + WARP] = np.abs(shape_modes(rig.problem.board_points_m)).max(axis=(0, 1)) > 0
     problem = replace(rig.problem, free=free)
-    trial = adjust(rig.adjustment.scene, problem, rig.adjustment.sigma_px, rounds=1)
+    sigma = rig.adjustment.sigma_px
+    trial = adjust(rig.adjustment.scene, problem, sigma, rounds=1, converged=ROUGHLY_CONVERGED)
     shape = trial.scene.warp_m
     std = np.sqrt(np.diag(trial.covariance)[end : end + WARP])
     shown = (np.abs(shape) > SHAPE_SIGMAS * std) & (np.abs(shape) > LEAST_SHAPE_M)
@@ -173,7 +174,7 @@ def refine(
     n_trimmed: int = 0,
 ) -> Rig:
     """Adjust, drop outlying views and corners, and adjust again until none is left."""
-    result = adjust(scene, problem, rounds=1)
+    result = adjust(scene, problem, rounds=1, converged=ROUGHLY_CONVERGED)
     for _ in range(_MOST_SWEEPS):
         keep, limits, errors = _views_kept(result, problem)
         trimmed = _trimmed(result, problem)
@@ -189,7 +190,7 @@ def refine(
         views, moments = trimmed.select(enough).compacted()
         problem = replace(problem, views=views)
         scene = replace(result.scene, T_base_boards=result.scene.T_base_boards[moments])
-        result = adjust(scene, problem, result.sigma_px, rounds=1)
+        result = adjust(scene, problem, result.sigma_px, rounds=1, converged=ROUGHLY_CONVERGED)
     result = adjust(result.scene, problem, result.sigma_px, rounds=1)
     return Rig(result, problem, reference, dropped, n_trimmed)
 

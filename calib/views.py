@@ -93,6 +93,8 @@ def make_views(
 def relative_std(views: Views) -> Array:
     """Noise of each corner relative to its camera's typical (median) corner, (n, n_points)."""
     result = np.ones_like(views.std_px)
+    if np.ptp(views.std_px, axis=None) == 0.0:
+        return result
     for index in np.unique(views.camera):
         own = views.camera == index
         seen = views.seen[own]
