@@ -14,11 +14,11 @@ from vision.patterns import Sphere
 from vision.simulate import Look, Renderer, Scene, still
 
 CLEAN = Look(noise=0.0, texture=0.0, psf_px=0.7)
-FINE = 12
+FINE = 8
 
 
 def dense_image(view, patch, look, box) -> np.ndarray:
-    """Grey values of one static patch on the plain background, by 12 x 12 point samples."""
+    """Grey values of one static patch on the plain background, by 8 x 8 point samples."""
     left, top, size = box
     pad = 4
     at = (np.arange((size + 2 * pad) * FINE) + 0.5) / FINE - 0.5 - pad
@@ -157,9 +157,9 @@ def test_a_frame_with_six_tags_is_fast() -> None:
     renderer.frame(0.0)
     times = []
     for index in range(8):
-        start = time.perf_counter()
+        start = time.process_time()
         renderer.frame(0.0, index)
-        times.append(time.perf_counter() - start)
+        times.append(time.process_time() - start)
     best = min(times)
     assert best < 0.03, f"{best * 1e3:.1f} ms a frame"
 

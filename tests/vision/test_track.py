@@ -183,6 +183,7 @@ def test_a_recording_of_another_size_is_refused(session, tmp_path) -> None:
         track(run, tmp_path, view=wrong)
 
 
+@pytest.mark.slow
 def test_a_tag_that_sits_elsewhere_is_measured_and_put_right(session, tmp_path) -> None:
     """The recordings' tag 3 sits 2 mm from where the target file has it."""
     _, run, _ = session
