@@ -56,6 +56,7 @@ class CableState:
         straight: |rho|.
         arm: u . (a - d), the distance of A from the swivel axis.
         square: |rho|^2, negative where A lies inside the pulley.
+        entry: d, base frame, (3,).
         lever: a', from P to A in the base frame, (3,).
         direction: t, from the pulley to the platform, base frame, (3,).
         across: w, normal to the pulley's plane, base frame, (3,); None for an eyelet.
@@ -69,6 +70,7 @@ class CableState:
     straight: Expression
     arm: Expression
     square: Expression
+    entry: Expression
     lever: Expression
     direction: Expression
     across: Expression
@@ -136,6 +138,7 @@ def cable_state(
         straight=straight,
         arm=arm,
         square=square,
+        entry=geometry.entries[index],
         lever=lever,
         direction=axes.T @ direction,
         across=across,

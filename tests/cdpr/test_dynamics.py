@@ -145,7 +145,7 @@ def test_six_cables_and_more_have_kinematics_and_forces_but_no_free_motion(n):
 def test_held_and_pulled_motions_agree():
     model = build_model(robot_named("bologna-4"), ("pulley_friction", "tether"))
     zetas, rates, inertia = allowed_states(model, 5)
-    values = [0.0, 1.0, 0.2, -0.1, 0.3]
+    values = [0.0, 1.0, 0.2, -0.1, 0.3, 0.4, 0.1, 0.0, 0.05]
     second, tensions = evaluate(model.acceleration, 0.1, zetas, rates, inertia, values)
     pulled = evaluate(model.pulled, 0.1, zetas, rates, tensions, inertia, values)[0]
     assert np.abs(pulled - second).max() < 1e-12

@@ -47,6 +47,19 @@ def _harmonic(values):
     return np.array([[hz, math.pi / 2, *cosine, 0.0], [hz, 0.0, *sine, 0.0]])
 
 
+def _spring(world, values):
+    """A line from P to its anchor, by stiffness and unstretched length."""
+    mean = world.entry.mean(axis=0)
+    spread = np.sqrt(np.mean(np.sum((world.entry - mean) ** 2, axis=1)))
+    to_anchor = values[1:4] / (values[0] * (1.0 - values[4]))
+    return {
+        "tether_stiffness": MASS * values[0],
+        "tether_anchor": mean - [0.0, 0.0, 0.7 * spread] + to_anchor,
+        "tether_point": values[5:],
+        "tether_rest": values[4] * float(np.linalg.norm(to_anchor)),
+    }
+
+
 # Product values, and what the same physics is called in the independent simulator, whose forces
 # are not per mass.
 TRANSLATED = {
@@ -68,10 +81,7 @@ TRANSLATED = {
     "attachment_offset": (None, lambda w, v: {"attach": w.attach + _offset_rows(v)}),
     "pulley_radius": (None, lambda w, v: {"radius": w.radius + v}),
     "pulley_axis": (None, lambda w, v: {"swivel": _axes(w, v)}),
-    "tether": (
-        [1.5, 0.6, -0.4, 1.2],
-        lambda w, v: {"tether_stiffness": MASS * v[0], "tether_anchor": v[1:] / v[0]},
-    ),
+    "tether": ([1.5, 0.6, -0.4, 0.8, 0.6, 0.1, -0.05, 0.07], _spring),
     "torsion_spring": (
         [0.2, 0.05],
         lambda w, v: {"torsion": MASS * v[0], "torsion_yaw": v[1] / v[0]},

@@ -94,7 +94,7 @@ def test_stable_equilibria_are_least_energy():
     [
         ("constant_force", [0.3, -0.2, 0.1]),
         ("gravity_tilt", [0.02, -0.03]),
-        ("tether", [1.0, 0.5, -0.5, 0.3]),
+        ("tether", [1.0, 0.5, -0.5, 0.3, 0.5, 0.05, 0.1, -0.1]),
         ("torsion_spring", [0.3, 0.1]),
         ("cable_mass", [0.004]),
         ("cable_elasticity", [2e-4]),
