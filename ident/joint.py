@@ -99,7 +99,7 @@ class Problem:
         self.estimate_scales = estimate_scales
         self.tolerance_m = tolerance_m
         self.prior_centre = model.start_values
-        self.prior_std = np.array([max(p.high - p.start, p.start - p.low) for p in parameters])
+        self.prior_std = np.array([p.prior_std for p in parameters])
         self.unit = np.concatenate([INERTIA_UNIT, [p.scale for p in parameters]])
 
     def simulated(self, state: State) -> State:

@@ -183,7 +183,7 @@ def reduce_run(linear: Linearised, samples: Samples, scales: Array) -> Reduced:
 def own_prior(motion: Motion) -> Array:
     """A run's own effect values over their plausible size, (o,)."""
     parameters = motion.model.parameters
-    return np.array([motion.values[k] / parameters[k].high for k in motion.model.own_values])
+    return np.array([motion.values[k] / parameters[k].prior_std for k in motion.model.own_values])
 
 
 def _own_priors(motion: Motion, directions: int, columns: int) -> Array:
@@ -191,7 +191,7 @@ def _own_priors(motion: Motion, directions: int, columns: int) -> Array:
     places = motion.model.own_values
     rows = np.zeros((len(places), columns))
     for row, k in enumerate(places):
-        rows[row, directions + row] = 1.0 / motion.model.parameters[k].high
+        rows[row, directions + row] = 1.0 / motion.model.parameters[k].prior_std
     rows[:, -1] = own_prior(motion)
     return rows
 

@@ -19,7 +19,7 @@ class AnchorOffset(Effect):
 
     def parameters(self, robot: Robot) -> tuple[Parameter, ...]:
         """Three coordinates a cable."""
-        return each_axis(robot, "offset", "xyz", "m", 0.1, 0.003)
+        return each_axis(robot, "offset", "xyz", "m", 0.03, 0.003)
 
     def geometry(self, geometry: Geometry, values: Expression) -> Geometry:
         """The displaced points."""

@@ -24,7 +24,7 @@ class Parameter:
         name: with its unit as suffix.
         low: least plausible value.
         high: greatest plausible value.
-        scale: a typical size, the prior standard deviation about zero (or about `start`).
+        scale: a typical size, for the scaling of steps.
         start: where a fit starts.
         amplitude: True when the effect vanishes where all its amplitude parameters are zero;
             False for shape parameters (a frequency, a point of application).
@@ -38,6 +38,11 @@ class Parameter:
     start: float = 0.0
     amplitude: bool = True
     per_run: bool = False
+
+    @property
+    def prior_std(self) -> float:
+        """A third of the way from the start to the farther bound."""
+        return max(self.high - self.start, self.start - self.low) / 3.0
 
 
 @dataclass(frozen=True, slots=True)

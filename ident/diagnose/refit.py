@@ -12,7 +12,8 @@ from cdpr.robot import Array
 from ident.diagnose.rows import Evidence, Score, score
 from ident.diagnose.screen import BASE, screen
 from ident.joint import State
-from ident.likelihood import LikelihoodFit, fit
+from ident.likelihood import LikelihoodFit, correlation_factor, fit
+from ident.likelihood_run import residuals
 
 RANKING_STEPS = 8
 RANKING_ACCURACY_M = 3e-7
@@ -24,7 +25,7 @@ class Refit:
 
     Attributes:
         effects: in the model, the candidate last.
-        fit: in units of the noise.
+        fit: the fit.
         evidence: linear, at the fit, over inertia and effect values.
         score: of that evidence: its held-out costs count.
     """
@@ -50,9 +51,20 @@ class Refit:
         raise ValueError(f"{name} is not among {self.effects}")
 
 
-def rescored(current: LikelihoodFit, noise_scales: Array) -> Refit:
+def colour_of(fit: LikelihoodFit, noise_scales: Array) -> float:
+    """How much stronger than the noise the residual is in the band of the motion, >= 1."""
+    squares = np.mean(
+        [
+            np.mean(residuals(motion, run, noise_scales) ** 2)
+            for motion, run in zip(fit.motions, fit.samples, strict=True)
+        ]
+    )
+    return max(1.0, float(squares) * correlation_factor(fit.motions, fit.samples, noise_scales))
+
+
+def rescored(current: LikelihoodFit, noise_scales: Array, colour: float) -> Refit:
     """Score a fit that is there already."""
-    linear = screen(current, (), noise_scales)
+    linear = screen(current, (), noise_scales, colour=colour)
     return Refit(current.model.effects, current, linear.evidence, score(linear.evidence))
 
 
@@ -62,6 +74,7 @@ def refit(
     values: Array,
     change: Array,
     noise_scales: Array,
+    colour: float,
 ) -> Refit:
     """Add a candidate to a fit's model and fit again.
 
@@ -71,6 +84,7 @@ def refit(
         values: its start values, (k,).
         change: of the inertia and earlier effect values that goes with it, from the screening.
         noise_scales: of metres and radians, (2,).
+        colour: of the residual without it.
 
     Raises:
         ValueError: when the start cannot be simulated.
@@ -82,7 +96,7 @@ def refit(
         start.inertia + limited[:BASE],
         np.concatenate([start.values + change[BASE:], values]),
         start.starts,
-        noise_scales,
+        noise_scales * np.sqrt(colour),
         own_values=_with_new(start.own_values, len(model.own_values)),
     )
     try:
@@ -90,7 +104,7 @@ def refit(
     except ValueError:
         state = replace(state, inertia=start.inertia, values=_unchanged(start.values, model))
         found = _fitted(model, current, state)
-    return rescored(found, noise_scales)
+    return rescored(found, noise_scales, colour)
 
 
 def _fitted(model: Model, current: LikelihoodFit, state: State) -> LikelihoodFit:
@@ -102,7 +116,7 @@ def _fitted(model: Model, current: LikelihoodFit, state: State) -> LikelihoodFit
         estimate_scales=False,
         grow=False,
         steps=RANKING_STEPS,
-        tolerance=max(1.0, 1e-4 * current.cost),
+        tolerance=max(0.1, 1e-4 * current.cost),
         accuracy_m=RANKING_ACCURACY_M,
     )
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,7 +15,6 @@ from ident.diagnose.rows import Evidence
 from ident.likelihood import LikelihoodFit
 from ident.likelihood_run import Samples, reduce_run
 
-Progress = Callable[[str, float], None]
 BASE = 9
 
 
@@ -48,7 +47,7 @@ def screen(
     candidates: Sequence[str],
     noise_scales: Array,
     shapes: dict[str, dict[str, float]] | None = None,
-    progress: Progress | None = None,
+    colour: float = 1.0,
 ) -> Screen:
     """Linearise a fit by its own unknowns and by the amplitudes of candidates.
 
@@ -57,16 +56,15 @@ def screen(
         candidates: names of effects that are not in it.
         noise_scales: of metres and radians: those of the noise, not of the residual, (2,).
         shapes: values for shape parameters (a frequency) by effect and parameter name.
-        progress: told a label and a fraction.
+        colour: power of the residual in the band of the motion over the noise's, >= 1: samples
+            that a model does not reach count that much less beside the priors.
     """
     accepted = fit.model.effects
     model = build_model(fit.model.robot, (*accepted, *candidates))
     values, columns = _start(model, fit, candidates, shapes or {})
     base = np.arange(BASE + len(fit.values))
     triangles, counts = [], []
-    for index, (motion, samples) in enumerate(zip(fit.motions, fit.samples, strict=True)):
-        if progress:
-            progress(f"screening {len(candidates)} candidates", index / len(fit.motions))
+    for motion, samples in zip(fit.motions, fit.samples, strict=True):
         mine = values.copy()
         mine[: len(fit.values)] = motion.values
         reduced = reduce_run(
@@ -78,7 +76,7 @@ def screen(
         tuple(s.name for s in fit.samples),
         np.array(triangles),
         np.array(counts, dtype=np.float64),
-        _priors(model, values),
+        np.sqrt(colour) * _priors(model, values),
     )
     return Screen(model, values, evidence, base, columns)
 
@@ -115,7 +113,6 @@ def _priors(model: Model, values: Array) -> Array:
     for k, parameter in enumerate(model.parameters):
         if parameter.per_run:
             continue
-        std = max(parameter.high - parameter.start, parameter.start - parameter.low)
-        rows[k, BASE + k] = 1.0 / std
-        rows[k, -1] = (values[k] - parameter.start) / std
+        rows[k, BASE + k] = 1.0 / parameter.prior_std
+        rows[k, -1] = (values[k] - parameter.start) / parameter.prior_std
     return rows

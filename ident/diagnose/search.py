@@ -18,11 +18,11 @@ from scipy.stats import chi2
 
 from cdpr.effects import effect_named
 from cdpr.robot import Array, Robot
-from ident.diagnose.refit import Refit, plausible, refit, rescored
+from ident.diagnose.refit import Refit, colour_of, plausible, refit, rescored
 from ident.diagnose.rows import score
 from ident.diagnose.screen import BASE, Screen, screen
 from ident.diagnose.spectrum import common_frequency
-from ident.likelihood import LikelihoodFit, correlation_factor, fit
+from ident.likelihood import LikelihoodFit, fit
 
 Progress = Callable[[str, float], None]
 
@@ -30,7 +30,9 @@ REFITTED = 5
 NEARLY_AS_GOOD = 0.5
 MOST_ROUNDS = 4
 SIGNIFICANCE = 1e-3
-LEAST_SHARE_IMPROVED = 0.6
+# A cause helps wherever it shows; what trades small swings for large ones is a stand-in.
+MOST_WORSE = 0.25
+NO_WORSE = 0.01
 # A second effect must be worth its place: integrators, shapes of friction and points of
 # application differ a little from reality, and 0.1 mm samples see it.
 LEAST_GAIN_LATER = 0.25
@@ -90,7 +92,7 @@ class Search:
     def run(self, base: LikelihoodFit) -> Refit:
         """Add effects to a base fit until none passes; the last fit."""
         self._tell("base dynamics", 0.0)
-        current = rescored(base, self.noise_scales)
+        current = rescored(base, self.noise_scales, colour_of(base, self.noise_scales))
         for index in range(MOST_ROUNDS):
             if index and _excess(current) < LEAST_EXCESS_LATER:
                 break
@@ -111,22 +113,29 @@ class Search:
         left = [n for n in self.candidates if n not in current.effects]
         if not left:
             return Round(current, (), None, ())
-        screens = self._screens(current.fit, left)
+        colour = colour_of(current.fit, self.noise_scales)
+        screens = self._screens(current.fit, left, colour)
         linear = {name: _linear_held_out(screens[name], name) for name in left}
         ranked = sorted(linear, key=lambda name: linear[name])
         promising = _promising(ranked, linear, current)
-        tried = self._refits(current, screens, promising, index)
-        return self._polished(_decided(current, screens, linear, ranked, tried, index))
+        tried = self._refits(current, screens, promising, index, colour)
+        return self._polished(
+            _decided(current, linear, ranked, tried, index, colour, self.noise_scales)
+        )
 
     def _polished(self, done: Round) -> Round:
         """The round with its winner fitted to convergence: ranking stops early."""
         if done.winner is None:
             return done
         found = done.winner.fit
-        exact = fit(found.model, found.samples, found.state, estimate_scales=False, grow=False)
-        return replace(done, winner=rescored(exact, self.noise_scales))
+        colour = colour_of(found, self.noise_scales)
+        state = replace(found.state, scales=self.noise_scales * np.sqrt(colour))
+        exact = fit(found.model, found.samples, state, estimate_scales=False, grow=False)
+        return replace(done, winner=rescored(exact, self.noise_scales, colour))
 
-    def _screens(self, found: LikelihoodFit, names: Sequence[str]) -> dict[str, Screen]:
+    def _screens(
+        self, found: LikelihoodFit, names: Sequence[str], colour: float
+    ) -> dict[str, Screen]:
         """Linear evidence by candidate.
 
         Those that need tensions stand apart because they cost more, those with values for each
@@ -141,26 +150,34 @@ class Search:
         for kind in ((False, False), (True, False), (False, True)):
             group = [n for n in names if _kind(n, robot) == kind]
             if group:
-                together = screen(found, group, self.noise_scales, shapes)
+                together = screen(found, group, self.noise_scales, shapes, colour)
                 screens |= dict.fromkeys(group, together)
         return screens
 
     def _refits(
-        self, current: Refit, screens: dict[str, Screen], names: Sequence[str], index: int
+        self,
+        current: Refit,
+        screens: dict[str, Screen],
+        names: Sequence[str],
+        index: int,
+        colour: float,
     ) -> dict[str, Refit]:
-        jobs = [(current, name, *_start_of(screens[name], name)) for name in names]
+        jobs = [
+            (current, name, *_start_of(screens[name], name), self.noise_scales, colour)
+            for name in names
+        ]
         share = 1.0 / MOST_ROUNDS
         found: dict[str, Refit] = {}
         if not jobs:
             return found
         if self.workers < 2:
-            results = (_job(*job, self.noise_scales) for job in jobs)
+            results = (_job(*job) for job in jobs)
             for k, (name, result) in enumerate(zip(names, results, strict=True)):
                 self._tell(f"round {index + 1}: {name}", (index + (k + 1) / len(jobs)) * share)
                 found |= {} if result is None else {name: result}
             return found
         with ProcessPoolExecutor(self.workers, mp_context=get_context("fork")) as pool:
-            futures = [pool.submit(_job, *job, self.noise_scales) for job in jobs]
+            futures = [pool.submit(_job, *job) for job in jobs]
             for k, (name, future) in enumerate(zip(names, futures, strict=True)):
                 self._tell(f"round {index + 1}: {name}", (index + k / len(jobs)) * share)
                 result = future.result()
@@ -174,10 +191,15 @@ def _kind(name: str, robot: Robot) -> tuple[bool, bool]:
 
 
 def _job(
-    current: Refit, name: str, values: Array, change: Array, noise_scales: Array
+    current: Refit,
+    name: str,
+    values: Array,
+    change: Array,
+    noise_scales: Array,
+    colour: float,
 ) -> Refit | None:
     try:
-        return refit(current.fit, name, values, change, noise_scales)
+        return refit(current.fit, name, values, change, noise_scales, colour)
     except ValueError:
         return None
 
@@ -208,24 +230,17 @@ def _promising(ranked: Sequence[str], linear: dict[str, float], current: Refit) 
     return within[:REFITTED]
 
 
-def colour_of(fit: LikelihoodFit, noise_scales: Array) -> float:
-    """How much stronger than white noise the residual is in the band of the motion, >= 1."""
-    total = correlation_factor(fit.motions, fit.samples, noise_scales)
-    squares = fit.cost / max(fit.n_samples, 1)
-    return max(1.0, total * squares)
-
-
 def _decided(
     current: Refit,
-    screens: dict[str, Screen],
     linear: dict[str, float],
     ranked: Sequence[str],
     tried: dict[str, Refit],
     index: int,
+    colour: float,
+    noise_scales: Array,
 ) -> Round:
     count = float(current.evidence.counts.sum())
     excess = max(current.held_out - count, LEAST_EXCESS * count)
-    colour = colour_of(current.fit, np.ones(2) * current.fit.scales)
     complaints: dict[str, str] = {}
     passed: dict[str, Refit] = {}
     for name, one in tried.items():
@@ -234,7 +249,7 @@ def _decided(
             complaints[name] = complaint
         else:
             passed[name] = one
-    winner, group = _winner(passed, current)
+    winner, group = _winner(passed, current, noise_scales)
     candidates = []
     for name in ranked:
         known = tried.get(name)
@@ -268,9 +283,9 @@ def _complaint(
     if chance > SIGNIFICANCE or _delta_bic(current, one, n_new, colour, count) > -10.0:
         return f"not significant: p = {chance:.2g} with {n_tried} candidates tried"
     gains = current.score.held_out - one.score.held_out
-    better = float((gains > 0.0).mean())
-    if gains.sum() <= 0.0 or better < LEAST_SHARE_IMPROVED:
-        return f"only {100 * better:.0f} % of the left-out runs are predicted better"
+    worse = int((gains < -NO_WORSE * current.score.held_out).sum())
+    if gains.sum() <= 0.0 or worse > MOST_WORSE * len(gains):
+        return f"{worse} of {len(gains)} left-out runs are predicted worse with it"
     excess = _excess(current)
     gain = float(gains.sum()) / max(current.held_out - count, LEAST_EXCESS * count)
     if index and (excess < LEAST_EXCESS_LATER or gain < LEAST_GAIN_LATER):
@@ -293,12 +308,14 @@ def _excess(current: Refit) -> float:
     return current.held_out / float(current.evidence.counts.sum()) - 1.0
 
 
-def _winner(passed: dict[str, Refit], current: Refit) -> tuple[Refit | None, tuple[str, ...]]:
+def _winner(
+    passed: dict[str, Refit], current: Refit, noise_scales: Array
+) -> tuple[Refit | None, tuple[str, ...]]:
     """The best of those that passed, and all that held-out runs cannot tell from it."""
     if not passed:
         return None, ()
     best = min(passed.values(), key=lambda one: one.held_out)
-    colour = colour_of(best.fit, best.fit.scales)
+    colour = colour_of(best.fit, noise_scales)
     group = [
         name
         for name, one in passed.items()
