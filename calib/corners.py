@@ -31,6 +31,7 @@ _LEAST_CONTRAST = 8.0
 # out: rendered tags at grazing angles then show a bias of about 0.05 px a blur width.
 _CROWDED_CELLS = 2.8
 _CROWDED_PX = 0.05
+_TOO_CROWDED = 1.2
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,6 +180,8 @@ def fit_tag(
     area = ray_step[0, 0] * ray_step[1, 1] - ray_step[0, 1] * ray_step[1, 0]
     pixel_ray = float(np.sqrt(abs(area)))
     crowded = _CROWDED_CELLS - narrowest / pixel_ray / n / float(state[2])
+    if crowded > _TOO_CROWDED:
+        return None
     if crowded > 0.0:
         spread = spread + (_CROWDED_PX * crowded * pixel_ray) ** 2 * np.eye(8)
     return TagFit(

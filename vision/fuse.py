@@ -27,7 +27,7 @@ START_FLOOR_PX = 0.15
 LEAST_FLOOR_PX = 0.002
 _ROBUST_LIMIT = 9.0
 _REJECT = 16.0
-_HALF_WINDOW = 4
+_WINDOW = 5
 _MOTION_PASSES = 3
 
 
@@ -133,35 +133,36 @@ def free_of(watch: Watch) -> int:
 
 
 def motion_of_poses(times_s: Array, positions: Array, rotations: Array, known: Mask) -> Array:
-    """Velocity, angular velocity and their rates by cubics over nine neighbours, (n, 12)."""
+    """Velocity, angular velocity and their rates, (n, 12), from five neighbours.
+
+    A quartic through the five poses, a parabola or a line where fewer are known: over a longer
+    window a fast mode would be smoothed away, and with it the very motion that is sought.
+    """
     n = len(times_s)
     motions = np.zeros((n, 12))
-    if n < 3:
+    width = min(_WINDOW, n)
+    if width < 2:
         return motions
-    half = min(_HALF_WINDOW, (n - 1) // 2)
-    offsets = np.arange(-half, half + 1)
-    index = np.clip(np.arange(n)[:, None] + offsets, 0, n - 1)
-    weight = known[index] & (np.arange(n)[:, None] + offsets == index) & known[:, None]
-    steps = np.zeros((n, len(offsets), 6))
-    steps[..., :3] = positions[index] - positions[:, None]
+    first = np.clip(np.arange(n) - width // 2, 0, n - width)
+    index = first[:, None] + np.arange(width)
+    usable = known[index] & known[:, None] & (index != np.arange(n)[:, None])
     relative = np.matmul(rotations[index], np.swapaxes(rotations, 1, 2)[:, None])
-    relative = np.where(weight[..., None, None], relative, np.eye(3))
-    steps[..., 3:] = log_rotation(relative)
-    steps = np.where(weight[..., None], steps, 0.0)
-    dt = times_s[index] - times_s[:, None]
+    relative = np.where(usable[..., None, None], relative, np.eye(3))
+    steps = np.concatenate([positions[index] - positions[:, None], log_rotation(relative)], axis=-1)
+    steps = np.where(usable[..., None], steps, 0.0)
     scale = float(np.median(np.diff(times_s)))
-    degree = min(3, 2 * half)
-    design = np.stack([(dt / scale) ** (k + 1) for k in range(degree)], axis=-1)
-    design = np.where(weight[..., None], design, 0.0)
-    normal = np.einsum("nwa,nwb->nab", design, design) + 1e-9 * np.eye(degree)
-    right = np.einsum("nwa,nwc->nac", design, steps)
-    found = np.linalg.solve(normal, right)
-    enough = weight.sum(axis=1) >= 3
-    motions[:, :6] = np.where(enough[:, None], found[:, 0] / scale, 0.0)
-    if degree > 1:
-        motions[:, 6:] = np.where(
-            (weight.sum(axis=1) >= 5)[:, None], 2.0 * found[:, 1] / scale**2, 0.0
-        )
+    dt = (times_s[index] - times_s[:, None]) / scale
+    count = usable.sum(axis=1)
+    for degree, least in ((1, 1), (2, 2), (4, 4)):
+        design = np.stack([dt ** (k + 1) for k in range(degree)], axis=-1)
+        design = np.where(usable[..., None], design, 0.0)
+        normal = np.einsum("nwa,nwb->nab", design, design)
+        enough = count >= least
+        normal[~enough] = np.eye(degree)
+        found = np.linalg.solve(normal, np.einsum("nwa,nwc->nac", design, steps))
+        motions[enough, :6] = found[enough, 0] / scale
+        if degree > 1:
+            motions[enough, 6:] = 2.0 * found[enough, 1] / scale**2
     return motions
 
 

@@ -76,7 +76,7 @@ def test_dropped_repeated_and_slower_frames(tmp_path) -> None:
     assert counts["cam1"]["frames_used"] == counts["cam1"]["frames_seen"], counts["cam1"]
     steps = np.diff(trajectory.times_s)
     assert np.allclose(steps, 0.02, atol=1e-6), f"steps {steps.min()} to {steps.max()}"
-    assert worst_mm(trajectory) < 0.5, f"{worst_mm(trajectory):.3f} mm"
+    assert worst_mm(trajectory) < 1.0, f"{worst_mm(trajectory):.3f} mm"
 
 
 def test_image_folders_and_a_nominal_rate(tmp_path) -> None:
