@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from freeswing.commands.arguments import add_session, add_workers, open_session
 from freeswing.console import Console
-from freeswing.session import Session
+
+if TYPE_CHECKING:
+    from freeswing.session import Session
 
 
 def add_arguments(parser: ArgumentParser) -> None:
