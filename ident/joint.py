@@ -101,6 +101,9 @@ class Problem:
         self.prior_centre = model.start_values
         self.prior_std = np.array([p.prior_std for p in parameters])
         self.unit = np.concatenate([INERTIA_UNIT, [p.scale for p in parameters]])
+        self.farthest = np.concatenate(
+            [3.0 * INERTIA_UNIT, [(p.high - p.low) / 3.0 for p in parameters]]
+        )
 
     def simulated(self, state: State) -> State:
         """The state with motions from its starts, whose rates are made admissible.
@@ -157,7 +160,7 @@ class Problem:
         kept = singular > RANK_LIMIT * largest
         gains = np.where(kept, singular / (singular**2 + damping * largest**2 + 1e-300), 0.0)
         shared[free] = -self.unit[free] * (back.T @ (gains * (left.T @ right)))
-        shared *= min(1.0, 3.0 / max(np.abs(shared / self.unit).max(initial=0.0), 1e-300))
+        shared *= min(1.0, 1.0 / max(np.abs(shared / self.farthest).max(initial=0.0), 1e-300))
         changes = [run.own_change(shared) for run in reduced]
         states, own = (tuple(part) for part in zip(*changes, strict=True))
         decrease = float(right @ right)

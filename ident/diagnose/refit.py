@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from ident.joint import State
 from ident.likelihood import LikelihoodFit, correlation_factor, fit
 from ident.likelihood_run import residuals
 
-RANKING_STEPS = 8
+RANKING_STEPS = 12
 RANKING_ACCURACY_M = 3e-7
 
 
@@ -69,20 +69,15 @@ def rescored(current: LikelihoodFit, noise_scales: Array, colour: float) -> Refi
 
 
 def refit(
-    current: LikelihoodFit,
-    candidate: str,
-    values: Array,
-    change: Array,
-    noise_scales: Array,
-    colour: float,
+    current: LikelihoodFit, candidate: str, values: Array, noise_scales: Array, colour: float
 ) -> Refit:
     """Add a candidate to a fit's model and fit again.
 
     Args:
         current: the fit without it.
         candidate: its name.
-        values: its start values, (k,).
-        change: of the inertia and earlier effect values that goes with it, from the screening.
+        values: of the candidate, (k,), at which it does nothing: the fit goes on from where the
+            current one stands, so its first step is the screening's linear answer.
         noise_scales: of metres and radians, (2,).
         colour: of the residual without it.
 
@@ -91,20 +86,14 @@ def refit(
     """
     model = build_model(current.model.robot, (*current.model.effects, candidate))
     start = current.state
-    limited = np.clip(change, -0.05, 0.05)
     state = State(
-        start.inertia + limited[:BASE],
-        np.concatenate([start.values + change[BASE:], values]),
+        start.inertia,
+        np.concatenate([start.values, values]),
         start.starts,
         noise_scales * np.sqrt(colour),
         own_values=_with_new(start.own_values, len(model.own_values)),
     )
-    try:
-        found = _fitted(model, current, state)
-    except ValueError:
-        state = replace(state, inertia=start.inertia, values=_unchanged(start.values, model))
-        found = _fitted(model, current, state)
-    return rescored(found, noise_scales, colour)
+    return rescored(_fitted(model, current, state), noise_scales, colour)
 
 
 def _fitted(model: Model, current: LikelihoodFit, state: State) -> LikelihoodFit:
@@ -126,12 +115,6 @@ def _with_new(own_values: Array | None, count: int) -> Array | None:
     if own_values is None:
         return None
     return np.pad(own_values, ((0, 0), (0, count - own_values.shape[1])))
-
-
-def _unchanged(values: Array, model: Model) -> Array:
-    full = model.start_values.copy()
-    full[: len(values)] = values
-    return full
 
 
 def plausible(refitted: Refit, name: str) -> list[str]:

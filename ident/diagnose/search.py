@@ -20,7 +20,7 @@ from cdpr.effects import effect_named
 from cdpr.robot import Array, Robot
 from ident.diagnose.refit import Refit, colour_of, plausible, refit, rescored
 from ident.diagnose.rows import score
-from ident.diagnose.screen import BASE, Screen, screen
+from ident.diagnose.screen import Screen, screen
 from ident.diagnose.spectrum import common_frequency
 from ident.likelihood import LikelihoodFit, fit
 
@@ -163,7 +163,7 @@ class Search:
         colour: float,
     ) -> dict[str, Refit]:
         jobs = [
-            (current, name, *_start_of(screens[name], name), self.noise_scales, colour)
+            (current, name, _start_of(screens[name], name), self.noise_scales, colour)
             for name in names
         ]
         share = 1.0 / MOST_ROUNDS
@@ -194,12 +194,11 @@ def _job(
     current: Refit,
     name: str,
     values: Array,
-    change: Array,
     noise_scales: Array,
     colour: float,
 ) -> Refit | None:
     try:
-        return refit(current.fit, name, values, change, noise_scales, colour)
+        return refit(current.fit, name, values, noise_scales, colour)
     except ValueError:
         return None
 
@@ -208,19 +207,11 @@ def _linear_held_out(one: Screen, name: str) -> float:
     return float(score(one.with_candidate(name)).held_out.sum())
 
 
-def _start_of(one: Screen, name: str) -> tuple[Array, Array]:
-    """Start values of a candidate from its linear estimate, and the change of the others."""
-    found = score(one.with_candidate(name))
-    columns = one.columns[name]
-    n_base = len(one.base)
+def _start_of(one: Screen, name: str) -> Array:
+    """Values of a candidate at which it does nothing, its shape as it was screened, (k,)."""
     parameters = effect_named(name).parameters(one.model.robot)
     first = one.model.names.index(f"{name}.{parameters[0].name}")
-    values = one.values[first : first + len(parameters)].copy()
-    places = columns - BASE - first
-    low = np.array([parameters[i].low for i in places])
-    high = np.array([parameters[i].high for i in places])
-    values[places] = np.clip(found.change[n_base:], low, high)
-    return values, found.change[:n_base]
+    return one.values[first : first + len(parameters)].copy()
 
 
 def _promising(ranked: Sequence[str], linear: dict[str, float], current: Refit) -> list[str]:
