@@ -50,7 +50,7 @@ def test_corners_have_no_bias(kind):
     camera = small_rig(1)[0]
     detector = BoardDetector(board)
     errors = []
-    for index, pose in enumerate(rigs.poses((camera,), 3, tilt=0.4)):
+    for index, pose in enumerate(rigs.poses((camera,), 6, tilt=0.4)):
         near = pose.copy()
         near[:3, 3] = 0.3 * pose[:3, 3] + 0.3 * camera.position_base_m
         shown = patch.moved(near @ FLIP, "base")
