@@ -20,52 +20,14 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from calib.gaussian_tables import gaussian_edge
+from calib.tag_map import blur_at_centre
+
 Array = NDArray[np.float64]
 
 UNKNOWNS = 11
 BLACK, CONTRAST, BLUR = 8, 9, 10
-_REACH = 4.0
 _FLAT = 4.4  # blur widths from an edge at which nothing of it is left, with a margin
-_STEPS_PER_UNIT = 256
-
-
-def _gaussian_tables() -> tuple[Array, Array]:
-    at = np.arange(-_REACH - 1, _REACH + 1 + 1.5 / _STEPS_PER_UNIT, 1.0 / _STEPS_PER_UNIT)
-    step = np.array([0.5 * (1.0 + math.erf(v / math.sqrt(2.0))) for v in at])
-    return step, np.exp(-0.5 * at**2) / math.sqrt(2.0 * math.pi)
-
-
-_STEP, _BELL = _gaussian_tables()
-
-
-@numba.njit(cache=True, nogil=True, inline="always")
-def _edge(z: float, step: Array, bell: Array) -> tuple[float, float]:
-    """Gaussian integral and density at z, from tables."""
-    if z >= _REACH:
-        return 1.0, 0.0
-    if z <= -_REACH:
-        return 0.0, 0.0
-    place = (z + _REACH + 1.0) * _STEPS_PER_UNIT
-    k = int(place)
-    f = place - k
-    return step[k] + f * (step[k + 1] - step[k]), bell[k] + f * (bell[k + 1] - bell[k])
-
-
-@numba.njit(cache=True, nogil=True, inline="always")
-def _blur_at_centre(h: Array, ray_step: Array, half: float, blur: float) -> tuple[float, float]:
-    """How many cells across and down `blur` pixels are in the middle of the tag, and a margin."""
-    back = np.linalg.inv(h)
-    w = 1.0 / (back[2, 0] * half + back[2, 1] * half + back[2, 2])
-    x = (back[0, 0] * half + back[0, 1] * half + back[0, 2]) * w
-    y = (back[1, 0] * half + back[1, 1] * half + back[1, 2]) * w
-    w = 1.0 / (h[2, 0] * x + h[2, 1] * y + h[2, 2])
-    across = np.empty(2)
-    for row in range(2):
-        gx, gy = (h[row, 0] - half * h[2, 0]) * w, (h[row, 1] - half * h[2, 1]) * w
-        u = gx * ray_step[0, 0] + gy * ray_step[1, 0]
-        v = gx * ray_step[0, 1] + gy * ray_step[1, 1]
-        across[row] = blur * math.sqrt(u * u + v * v)
-    return across[0], across[1]
 
 
 @numba.njit(cache=True, nogil=True)
@@ -117,7 +79,7 @@ def accumulate(
     design = np.empty(UNKNOWNS)
     h = pattern_from_ray
     limit = 4.0 * scale
-    flat_c, flat_r = _blur_at_centre(h, ray_step, half, _FLAT * blur)
+    flat_c, flat_r = blur_at_centre(h, ray_step, half, _FLAT * blur)
     skew = max(1, int(stride * 0.618 + 0.5))
     for v in range(box[1], box[3]):
         for u in range(box[0] + (v * skew) % stride, box[2], stride):
@@ -176,10 +138,10 @@ def accumulate(
                 continue
             z0, z1 = (c - (k - 1)) / blur_c, (c - k) / blur_c
             y0, y1 = (r - (m - 1)) / blur_r, (r - m) / blur_r
-            s0, g0 = _edge(z0, step, bell)
-            s1, g1 = _edge(z1, step, bell)
-            t0, b0 = _edge(y0, step, bell)
-            t1, b1 = _edge(y1, step, bell)
+            s0, g0 = gaussian_edge(z0, step, bell)
+            s1, g1 = gaussian_edge(z1, step, bell)
+            t0, b0 = gaussian_edge(y0, step, bell)
+            t1, b1 = gaussian_edge(y1, step, bell)
             k0, k2 = max(k - 1, 0), min(k + 1, n + 1)
             m0, m2 = max(m - 1, 0), min(m + 1, n + 1)
             wc0, wc1, wc2 = 1.0 - s0, s0 - s1, s1
@@ -444,39 +406,3 @@ def _levels(
         state[1] += (a * right[9] - b * right[8]) / determinant
     if state[1] < 10.0:
         state[1] = 10.0
-
-
-@numba.njit(cache=True, nogil=True)
-def corners_of_map(
-    pattern_from_ray: Array, covariance: Array, n: int
-) -> tuple[Array, Array, float]:
-    """Corner rays TL TR BR BL (4, 2), their covariance (8, 8) and the shortest side in rays."""
-    back = np.linalg.inv(pattern_from_ray)
-    rays = np.empty((4, 2))
-    jacobian = np.zeros((8, 8))
-    for k in range(4):
-        x = 1.0 if k == 1 or k == 2 else -1.0
-        y = 1.0 if k >= 2 else -1.0
-        c, r = (x + 1.0) * n / 2.0, (y + 1.0) * n / 2.0
-        w = back[2, 0] * c + back[2, 1] * r + back[2, 2]
-        rays[k, 0] = (back[0, 0] * c + back[0, 1] * r + back[0, 2]) / w
-        rays[k, 1] = (back[1, 0] * c + back[1, 1] * r + back[1, 2]) / w
-        for i in range(2):
-            by_c = (back[i, 0] - rays[k, i] * back[2, 0]) / w
-            by_r = (back[i, 1] - rays[k, i] * back[2, 1]) / w
-            line = jacobian[2 * k + i]
-            line[0], line[1], line[2] = by_c * x, by_c * y, by_c
-            line[3], line[4], line[5] = by_r * x, by_r * y, by_r
-            line[6] = -(by_c * x + by_r * y) * x
-            line[7] = -(by_c * x + by_r * y) * y
-    shortest = 1e300
-    for k in range(4):
-        dx = rays[k, 0] - rays[(k + 1) % 4, 0]
-        dy = rays[k, 1] - rays[(k + 1) % 4, 1]
-        shortest = min(shortest, math.sqrt(dx * dx + dy * dy))
-    spread = np.zeros((8, 8))
-    spread[:] = jacobian @ covariance @ jacobian.T
-    return rays, spread, shortest
-
-
-TABLES = np.stack([_STEP, _BELL])

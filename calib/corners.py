@@ -15,7 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.camera import Camera
-from calib.corner_kernels import TABLES, corners_of_map, fit_pattern
+from calib.corner_kernels import fit_pattern
+from calib.gaussian_tables import TABLES
+from calib.tag_map import corners_of_map
 from calib.tag_patterns import tag_cells
 
 Array = NDArray[np.float64]

@@ -38,6 +38,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         arguments: the words after `freeswing`; those of the process when None.
     """
     options = build_parser().parse_args(arguments)
+    for threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+        # Processes share the cores; small matrices only lose by threads of their own.
+        os.environ.setdefault(threads, "1")
     with Console(as_json=options.json, quiet=options.quiet) as console:
         try:
             options.run(options, console)

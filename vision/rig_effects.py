@@ -19,12 +19,12 @@ from vision.fuse import Fit, Poses, camera_matrices, whitened
 from vision.pose_kernels import linearise_block
 from vision.rig_kernels import CLOCK, LINE, PER_CAMERA, POSE, add_rig_equations
 from vision.run_views import CameraViews, blocks
+from vision.settings import SURVEY_STD_M
 from vision.watch import Watch
 
 Array = NDArray[np.float64]
 
 MOVED_PX = 0.4
-SURVEY_STD_M = 0.0003
 LEAST_CLOCK_S = 5e-5
 LEAST_LINE_S = 3e-7
 _SIGMAS = 6.0

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,10 +19,8 @@ from vision.layout import LayoutSums, layout_sums
 from vision.rig_correct import correct_rig
 from vision.rig_effects import Finding
 from vision.run_views import CameraViews
+from vision.settings import Settings
 from vision.watch import Watch
-
-if TYPE_CHECKING:
-    from vision.track import Settings
 
 Array = NDArray[np.float64]
 

@@ -15,7 +15,6 @@ sightings under `results/tracks/.sightings`, from where a run that was killed go
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -27,13 +26,13 @@ from vision.calibration_share import read_calibration_noise
 from vision.jobs import Job, run_jobs
 from vision.layout import layout_change, with_layout
 from vision.run_track import RunTrack, track_run
+from vision.settings import Settings
 from vision.sightings import collect_sightings
 from vision.tracking_report import tracking_document
 from vision.watch import StandingTag, Watch
 
 Progress = Callable[[str, float], None]
 
-SURVEY_STD_M = 0.0003
 _LAYOUT_ROUNDS = 3
 _FOLLOWING = 0.85  # share of the time that goes into the images
 
@@ -45,21 +44,6 @@ class RecordedRun(Protocol):
     def name(self) -> str: ...  # noqa: D102
     @property
     def video(self) -> Path | None: ...  # noqa: D102
-
-
-@dataclass(frozen=True, slots=True)
-class Settings:
-    """How to track.
-
-    Attributes:
-        correct_rig: look for late clocks, rolling shutters and moved cameras, and remove them.
-        refine_layout: fit the tags' places on the platform to the recordings.
-        survey_std_m: standard deviation of the base tags' corners.
-    """
-
-    correct_rig: bool = True
-    refine_layout: bool = False
-    survey_std_m: float = SURVEY_STD_M
 
 
 def track_session(

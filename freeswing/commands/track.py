@@ -44,7 +44,8 @@ def make(
     from calib.cameras_file import read_cameras
     from cdpr.documents import DataError, InputError
     from freeswing.swings import load_target
-    from vision.track import Settings, track_session
+    from vision.settings import Settings
+    from vision.track import track_session
 
     if not session.cameras.is_file():
         raise DataError(f"{session.cameras}: no such file; run freeswing calibrate first")

@@ -27,8 +27,9 @@ from tests.vision.scenes import (
 from vision import pieces, sightings
 from vision.record import record
 from vision.rig_effects import moved_by
+from vision.settings import Settings
 from vision.simulate import Look
-from vision.track import Settings, track_session
+from vision.track import track_session
 
 FRAMES = 60
 STAMPS = 0.3 + np.arange(FRAMES) / 50.0

@@ -1,0 +1,61 @@
+"""Between a tag's cells and the camera's rays: its blur in cells, its corners in rays."""
+
+from __future__ import annotations
+
+import math
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@numba.njit(cache=True, nogil=True, inline="always")
+def blur_at_centre(h: Array, ray_step: Array, half: float, blur: float) -> tuple[float, float]:
+    """How many cells across and down `blur` pixels are in the middle of the tag, and a margin."""
+    back = np.linalg.inv(h)
+    w = 1.0 / (back[2, 0] * half + back[2, 1] * half + back[2, 2])
+    x = (back[0, 0] * half + back[0, 1] * half + back[0, 2]) * w
+    y = (back[1, 0] * half + back[1, 1] * half + back[1, 2]) * w
+    w = 1.0 / (h[2, 0] * x + h[2, 1] * y + h[2, 2])
+    across = np.empty(2)
+    for row in range(2):
+        gx, gy = (h[row, 0] - half * h[2, 0]) * w, (h[row, 1] - half * h[2, 1]) * w
+        u = gx * ray_step[0, 0] + gy * ray_step[1, 0]
+        v = gx * ray_step[0, 1] + gy * ray_step[1, 1]
+        across[row] = blur * math.sqrt(u * u + v * v)
+    return across[0], across[1]
+
+
+@numba.njit(cache=True, nogil=True)
+def corners_of_map(
+    pattern_from_ray: Array, covariance: Array, n: int
+) -> tuple[Array, Array, float]:
+    """Corner rays TL TR BR BL (4, 2), their covariance (8, 8) and the shortest side in rays."""
+    back = np.linalg.inv(pattern_from_ray)
+    rays = np.empty((4, 2))
+    jacobian = np.zeros((8, 8))
+    for k in range(4):
+        x = 1.0 if k == 1 or k == 2 else -1.0
+        y = 1.0 if k >= 2 else -1.0
+        c, r = (x + 1.0) * n / 2.0, (y + 1.0) * n / 2.0
+        w = back[2, 0] * c + back[2, 1] * r + back[2, 2]
+        rays[k, 0] = (back[0, 0] * c + back[0, 1] * r + back[0, 2]) / w
+        rays[k, 1] = (back[1, 0] * c + back[1, 1] * r + back[1, 2]) / w
+        for i in range(2):
+            by_c = (back[i, 0] - rays[k, i] * back[2, 0]) / w
+            by_r = (back[i, 1] - rays[k, i] * back[2, 1]) / w
+            line = jacobian[2 * k + i]
+            line[0], line[1], line[2] = by_c * x, by_c * y, by_c
+            line[3], line[4], line[5] = by_r * x, by_r * y, by_r
+            line[6] = -(by_c * x + by_r * y) * x
+            line[7] = -(by_c * x + by_r * y) * y
+    shortest = 1e300
+    for k in range(4):
+        dx = rays[k, 0] - rays[(k + 1) % 4, 0]
+        dy = rays[k, 1] - rays[(k + 1) % 4, 1]
+        shortest = min(shortest, math.sqrt(dx * dx + dy * dy))
+    spread = np.zeros((8, 8))
+    spread[:] = jacobian @ covariance @ jacobian.T
+    return rays, spread, shortest
