@@ -97,6 +97,16 @@ def _moved(row: int, shift: tuple[float, float, float]) -> Array:
     return moved
 
 
+def _linear_tether(robot: str, stiffness: float, anchor: tuple[float, float, float]):
+    """A line without unstretched length, tied to P: told by its pull at the product's place."""
+    entries = declared_robot(robot).entries_m
+    mean = entries.mean(axis=0)
+    depth = 0.7 * np.sqrt(np.mean(np.sum((entries - mean) ** 2, axis=1)))
+    pull = stiffness * (np.array(anchor) - mean + [0.0, 0.0, depth])
+    named = {f"tether.pull_{axis}_m_s2": pull[k] for k, axis in enumerate("xyz")}
+    return {"tether.stiffness_1_s2": stiffness, "tether.rest_share": 0.0, **named}
+
+
 # World fields (of a platform of `MASS_KG`, the product's forces being over the mass), the product's
 # values, and by how much of the effects' own size the two may differ: smooth effects agree to
 # integration error, |v| is rounded at 0.1 mm/s in the product, dry friction is smoothed over
@@ -127,10 +137,7 @@ EFFECTS = {
             "harmonic_force.frequency_hz": 1.7,
             "torsion_spring.stiffness_m2_s2": 0.1,
             "torsion_spring.moment_m2_s2": 0.1 * 0.2,
-            "tether.stiffness_1_s2": 0.5,
-            "tether.pull_x_m_s2": 0.5 * 2.0,
-            "tether.pull_y_m_s2": 0.5 * 1.0,
-            "tether.pull_z_m_s2": 0.5 * 0.4,
+            **_linear_tether("bologna-4", 0.5, (2.0, 1.0, 0.4)),
         },
         SMOOTH,
     ),
