@@ -16,7 +16,7 @@ class WinchCreep(Effect):
 
     def parameters(self, robot: Robot) -> tuple[Parameter, ...]:
         """One rate a cable."""
-        return each(robot, "rate", "m_s", -0.01, 0.01, 2e-4)
+        return each(robot, "rate", "m_s", -0.01, 0.01, 5e-5)
 
     def length_change(self, robot: Robot, instant: Instant, values: Expression) -> Expression:
         """Rate times time."""

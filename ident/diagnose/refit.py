@@ -16,6 +16,8 @@ from ident.likelihood import LikelihoodFit, correlation_factor, fit
 from ident.likelihood_run import residuals
 
 RANKING_STEPS = 12
+# Surveys and calibrations are good to a few tenths of a millimetre: 0.3 mm for a displaced point.
+NEGLIGIBLE = 0.1
 RANKING_ACCURACY_M = 3e-7
 
 
@@ -130,4 +132,11 @@ def plausible(refitted: Refit, name: str) -> list[str]:
                 f"{parameter.name} = {value:.4g} lies outside its plausible range "
                 f"{parameter.low:g} to {parameter.high:g}"
             )
+    sizes = np.array([p.scale for p in parameters])
+    shares = np.abs(refitted.fit.values[where] - [p.start for p in parameters]) / sizes
+    if effect_named(name).stage == "kinematics" and shares.max(initial=0.0) < NEGLIGIBLE:
+        complaints.append(
+            f"all its values are below {NEGLIGIBLE:g} of a typical size ({sizes.max():g}): "
+            "neither a declared geometry nor a calibration is known better"
+        )
     return complaints

@@ -21,7 +21,7 @@ from cdpr.robot import Array, Robot
 from ident.diagnose.refit import Refit, colour_of, plausible, refit, rescored
 from ident.diagnose.rows import score
 from ident.diagnose.screen import Screen, screen
-from ident.diagnose.spectrum import common_frequency
+from ident.diagnose.spectrum import common_frequency, too_small
 from ident.likelihood import LikelihoodFit, fit
 
 Progress = Callable[[str, float], None]
@@ -94,7 +94,7 @@ class Search:
         self._tell("base dynamics", 0.0)
         current = rescored(base, self.noise_scales, colour_of(base, self.noise_scales))
         for index in range(MOST_ROUNDS):
-            if index and _excess(current) < LEAST_EXCESS_LATER:
+            if index and (_excess(current) < LEAST_EXCESS_LATER or too_small(current.fit)):
                 break
             done = self._round(current, index)
             self.rounds.append(done)

@@ -9,6 +9,9 @@ from ident.likelihood import LikelihoodFit
 from ident.likelihood_run import residuals
 
 LOWEST_HZ = 0.15
+# No calibration or survey can be trusted below this: nothing is sought in such a residual.
+SMALLEST_RESIDUAL_M = 2e-5
+SMALLEST_RESIDUAL_RAD = 1e-4
 
 
 def mean_log_spectrum(fit: LikelihoodFit, noise_scales: Array) -> tuple[Array, Array]:
@@ -40,3 +43,9 @@ def common_frequency(fit: LikelihoodFit, noise_scales: Array) -> float:
     around = np.median(np.lib.stride_tricks.sliding_window_view(padded, width), axis=-1)
     prominence = np.log(power) - around
     return float(frequencies[int(np.argmax(prominence))])
+
+
+def too_small(fit: LikelihoodFit) -> bool:
+    """Whether the residuals are below what any calibration can be trusted to."""
+    limits = np.array([SMALLEST_RESIDUAL_M, SMALLEST_RESIDUAL_RAD])
+    return bool((np.nan_to_num(fit.noise) < limits).all())

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cdpr.robot import Array
-from ident.diagnose.spectrum import common_frequency, mean_log_spectrum
+from ident.diagnose.spectrum import common_frequency, mean_log_spectrum, too_small
 from ident.likelihood import LikelihoodFit
 from ident.likelihood_run import predicted, residuals
 from ident.prepare import PreparedRun
@@ -52,7 +52,7 @@ def unexplained(
     frequencies, spectrum = mean_log_spectrum(fit, noise_scales)
     low = float(np.mean(spectrum[frequencies < 5.0]))
     evidence: dict[str, object] = {"residual_over_noise": float(np.sqrt(power)), "colour": low}
-    if power < 1.0 + LEAST_EXCESS or low < LEAST_COLOUR:
+    if power < 1.0 + LEAST_EXCESS or low < LEAST_COLOUR or too_small(fit):
         return Unexplained(False, "", evidence)
     names = fit.samples[0].coordinates
     by_coordinate = np.sqrt(np.mean([np.mean(one**2, axis=0) for one in white], axis=0))
