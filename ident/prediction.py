@@ -15,7 +15,7 @@ from ident.maximum_likelihood import started
 from ident.prepare import PreparedRun
 
 PREDICTED_HZ = 50.0
-_ASTRAY = 0.3  # residual over motion beyond which a fit deserves a second, careful start
+_ASTRAY = 0.05  # residual over motion beyond which a fit deserves a second, careful start
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +84,8 @@ def predict(
     # A start too far off leaves the simulated swing out of phase: grow into the run instead.
     spread = np.sqrt(np.mean((samples.values - samples.values.mean(axis=0)) ** 2))
     if np.sqrt(np.mean((seen - samples.values) ** 2)) > _ASTRAY * spread:
-        found = _fitted(model, samples, state, grow=True)
+        careful = _fitted(model, samples, state, grow=True)
+        found = min(found, careful, key=lambda one: one.deviance)
         seen = _seen(found)
     return Prediction(
         run.name,
