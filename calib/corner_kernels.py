@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.gaussian_tables import gaussian_edge
-from calib.tag_map import blur_at_centre
+from calib.tag_map import blur_at_centre, compose
 
 Array = NDArray[np.float64]
 
@@ -225,20 +225,6 @@ def _noise_from(histogram: NDArray[np.int64], count: float) -> float:
 
 
 @numba.njit(cache=True, nogil=True)
-def _compose(pattern_from_ray: Array, e: Array, half: float) -> Array:
-    """The pattern's map after the small homography `e`, which acts on (q - half) / half."""
-    change = np.eye(3)
-    change[0, :] += e[0:3] / half
-    change[1, :] += e[3:6] / half
-    change[2, :2] += e[6:8] / half
-    scaled = np.array([[1.0 / half, 0.0, -1.0], [0.0, 1.0 / half, -1.0], [0.0, 0.0, 1.0]])
-    cells = np.array([[half, 0.0, half], [0.0, half, half], [0.0, 0.0, 1.0]])
-    moved = np.empty((3, 3))
-    moved[:] = cells @ np.linalg.solve(change, scaled @ pattern_from_ray)
-    return moved
-
-
-@numba.njit(cache=True, nogil=True)
 def fit_pattern(
     image: NDArray[np.uint8],
     rays: Array,
@@ -349,7 +335,7 @@ def fit_pattern(
             largest = max(largest, abs(change[i]))
         if largest > 2.0:
             change[:8] *= 2.0 / largest
-        h = _compose(h, change, half)
+        h = compose(h, change, half)
         last = max(largest, 0.5 * abs(blur_change) / state[2] if free else 0.0)
         scale = max(_noise_from(histogram, count), 0.5 * noise)
         after = max(squares - change @ right, 0.0)  # what the step leaves, to first order

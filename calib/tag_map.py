@@ -29,6 +29,20 @@ def blur_at_centre(h: Array, ray_step: Array, half: float, blur: float) -> tuple
 
 
 @numba.njit(cache=True, nogil=True)
+def compose(pattern_from_ray: Array, e: Array, half: float) -> Array:
+    """The pattern's map after the small homography `e`, which acts on (q - half) / half."""
+    change = np.eye(3)
+    change[0, :] += e[0:3] / half
+    change[1, :] += e[3:6] / half
+    change[2, :2] += e[6:8] / half
+    scaled = np.array([[1.0 / half, 0.0, -1.0], [0.0, 1.0 / half, -1.0], [0.0, 0.0, 1.0]])
+    cells = np.array([[half, 0.0, half], [0.0, half, half], [0.0, 0.0, 1.0]])
+    moved = np.empty((3, 3))
+    moved[:] = cells @ np.linalg.solve(change, scaled @ pattern_from_ray)
+    return moved
+
+
+@numba.njit(cache=True, nogil=True)
 def corners_of_map(
     pattern_from_ray: Array, covariance: Array, n: int
 ) -> tuple[Array, Array, float]:

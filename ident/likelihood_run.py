@@ -84,20 +84,12 @@ class Reduced:
             then the effect values that are the run's own.
         basis: state change by [state directions; shared; 1], (12, 12 - n + p + 1).
         own_columns: where the run's own effect values stand among the shared unknowns, (o,).
-        squares: sum of squared whitened residuals of metres and of radians, (2,).
-        counts: how many there are of each, (2,).
-        lengths_square: whitened squared length residuals.
-        residuals: whitened sample residuals, (n, c).
     """
 
     rows: Array
     own: Array
     basis: Array
     own_columns: np.ndarray
-    squares: Array
-    counts: Array
-    lengths_square: float
-    residuals: Array
 
     def own_change(self, shared: Array) -> tuple[Array, Array]:
         """Change of the initial [zeta; rates], and of the run's own effect values.
@@ -166,18 +158,7 @@ def reduce_run(linear: Linearised, samples: Samples, scales: Array) -> Reduced:
     size = together.shape[1]
     full = np.zeros((size, size))
     full[: len(triangle)] = triangle
-    squares = np.array([np.sum(white[:, samples.groups == g] ** 2) for g in (0, 1)])
-    counts = np.array([white[:, samples.groups == g].size for g in (0, 1)])
-    return Reduced(
-        full[n_own:, n_own:],
-        full[:n_own],
-        basis,
-        mine,
-        squares,
-        counts,
-        float(lengths @ lengths),
-        white,
-    )
+    return Reduced(full[n_own:, n_own:], full[:n_own], basis, mine)
 
 
 def own_prior(motion: Motion) -> Array:

@@ -121,7 +121,7 @@ def diagnose(
     _refuse_few(fitted, checked)
     noise_scales = _noise_scales([*fitted, *checked], free)
     names = tuple(catalogue()) if candidates is None else candidates
-    barred = _barred(fitted, robot, full)
+    barred = _barred(fitted, robot)
     considered = tuple(name for name in names if name not in barred)
     base, fitted, dropped = _base_fit(
         robot, fitted, free, estimate.values, noise_scales, _part(progress, 0.05, 0.2)
@@ -197,7 +197,7 @@ def _noise_scales(runs: list[PreparedRun], free: tuple[str, ...] | None) -> Arra
     return np.array([np.sqrt(np.mean(np.square(group))) if group else 1.0 for group in ratios])
 
 
-def _barred(runs: list[PreparedRun], robot: Robot, full: bool) -> dict[str, str]:
+def _barred(runs: list[PreparedRun], robot: Robot) -> dict[str, str]:
     """Effects that these data cannot show, and why."""
     barred = {}
     if all(run.run.lengths_m is None for run in runs):
