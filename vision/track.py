@@ -18,6 +18,7 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
+from calib.base_tags import SurveyedTag
 from calib.camera import Camera
 from calib.recordings import Recording, find_recordings
 from cdpr.documents import DataError, InputError, write_json
@@ -29,7 +30,7 @@ from vision.run_track import RunTrack, track_run
 from vision.settings import Settings
 from vision.sightings import collect_sightings
 from vision.tracking_report import tracking_document
-from vision.watch import StandingTag, Watch
+from vision.watch import Watch
 
 Progress = Callable[[str, float], None]
 
@@ -52,7 +53,7 @@ def track_session(
     target: Target,
     *,
     results: Path,
-    base_tags: Iterable[StandingTag] = (),
+    base_tags: Iterable[SurveyedTag] = (),
     frame_rate_hz: float | None = None,
     settings: Settings | None = None,
     workers: int = 0,

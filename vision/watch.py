@@ -4,27 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from calib.base_tags import SurveyedTag
 from cdpr.documents import InputError
 from cdpr.target import Target
 from vision.detect import TagKey
 
 Array = NDArray[np.float64]
-
-
-class StandingTag(Protocol):
-    """A tag fixed to the base: family, id, corners TL TR BR BL in the base frame, (4, 3)."""
-
-    @property
-    def family(self) -> str: ...  # noqa: D102
-    @property
-    def id(self) -> int: ...  # noqa: D102
-    @property
-    def corners_base_m(self) -> Array: ...  # noqa: D102
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +39,7 @@ class Watch:
     marker_diameters_m: Array
 
     @staticmethod
-    def of(target: Target, base_tags: Iterable[StandingTag] = ()) -> Watch:
+    def of(target: Target, base_tags: Iterable[SurveyedTag] = ()) -> Watch:
         """From target.toml and the surveyed tags.
 
         Raises:
