@@ -5,7 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,33 +23,51 @@ class Job:
     arguments: tuple[Any, ...]
 
 
-def run_jobs(jobs: Sequence[Job], workers: int, progress: Progress | None) -> list[Any]:
+def run_jobs(
+    jobs: Sequence[Job],
+    workers: int,
+    progress: Progress | None,
+    executor: Executor | None = None,
+) -> list[Any]:
     """Results of all jobs in their order; the first failure ends the rest and is raised.
 
-    With one worker (or one job) everything happens in this process.
+    Args:
+        jobs: in the order of the results.
+        workers: processes; 0 = one a core. With one (or one job) everything happens in this one.
+        progress: told a job's label and the fraction done.
+        executor: makes the calls instead of processes of this machine; left open.
     """
+    if executor is not None:
+        return _all_of(executor, jobs, progress)
     count = min(workers or os.cpu_count() or 1, len(jobs))
     if count <= 1:
         return _one_by_one(jobs, progress)
     context = multiprocessing.get_context("spawn")
-    results: dict[Future[Any], int] = {}
     with ProcessPoolExecutor(count, mp_context=context) as pool:
-        for index, job in enumerate(jobs):
-            results[pool.submit(job.function, *job.arguments)] = index
-        open_jobs = set(results)
         try:
-            while open_jobs:
-                done, open_jobs = wait(open_jobs, _POLL_S, return_when=FIRST_COMPLETED)
-                for future in done:
-                    future.result()
-                    if progress is not None:
-                        share = 1.0 - len(open_jobs) / len(jobs)
-                        progress(jobs[results[future]].label, share)
+            return _all_of(pool, jobs, progress)
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
-    ordered = sorted(results, key=lambda future: results[future])
-    return [future.result() for future in ordered]
+
+
+def _all_of(pool: Executor, jobs: Sequence[Job], progress: Progress | None) -> list[Any]:
+    futures: dict[Future[Any], Job] = {}
+    for job in jobs:
+        futures[pool.submit(job.function, *job.arguments)] = job
+    open_jobs = set(futures)
+    try:
+        while open_jobs:
+            done, open_jobs = wait(open_jobs, _POLL_S, return_when=FIRST_COMPLETED)
+            for future in done:
+                future.result()
+                if progress is not None:
+                    progress(futures[future].label, 1.0 - len(open_jobs) / len(jobs))
+    except BaseException:
+        for future in open_jobs:
+            future.cancel()
+        raise
+    return [future.result() for future in futures]
 
 
 def _one_by_one(jobs: Sequence[Job], progress: Progress | None) -> list[Any]:

@@ -15,6 +15,7 @@ sightings under `results/tracks/.sightings`, from where a run that was killed go
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -57,6 +58,7 @@ def track_session(
     frame_rate_hz: float | None = None,
     settings: Settings | None = None,
     workers: int = 0,
+    executor: Executor | None = None,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
     """Tracks all runs and writes their trajectories and `tracking.json`.
@@ -70,6 +72,8 @@ def track_session(
         frame_rate_hz: serves recordings without time stamps.
         settings: see `Settings`.
         workers: processes; 0 = one a core.
+        executor: follows the recordings instead of them, such as a cluster's; it has to see the
+            same files under the same names.
         progress: told a label and the fraction done.
 
     Returns:
@@ -95,7 +99,7 @@ def track_session(
         for name, found in pairs
         for camera, recording in found
     ]
-    paths = run_jobs(jobs, workers, _scaled(progress, 0.0, _FOLLOWING))
+    paths = run_jobs(jobs, workers, _scaled(progress, 0.0, _FOLLOWING), executor)
     sources = _by_run(pairs, paths)
     told = _scaled(progress, _FOLLOWING, 1.0)
     tracks = _fuse(sources, watch, results, settings, workers, told)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -94,6 +95,7 @@ def diagnose(
     progress: Progress | None = None,
     workers: int = 2,
     candidates: tuple[str, ...] | None = None,
+    executor: Executor | None = None,
 ) -> Diagnosis:
     """Find the effects that the model of a session lacks.
 
@@ -103,6 +105,7 @@ def diagnose(
         progress: told a label and a fraction.
         workers: processes that fit candidates side by side.
         candidates: effects to consider; None for the whole catalogue.
+        executor: fits candidates instead of processes of this machine, such as a cluster's.
 
     Raises:
         DataError: when fewer than three runs can be fitted, or no validation run is usable.
@@ -126,7 +129,7 @@ def diagnose(
     base, fitted, dropped = _base_fit(
         robot, fitted, free, estimate.values, noise_scales, _part(progress, 0.05, 0.2)
     )
-    search = Search(noise_scales, considered, workers, _part(progress, 0.2, 0.85))
+    search = Search(noise_scales, considered, workers, executor, _part(progress, 0.2, 0.85))
     last = search.run(base)
     notes = [*known.notes, *dropped]
     share = _share_explained(search, last)

@@ -9,7 +9,8 @@ range, and large enough to matter. Candidates that held-out runs cannot tell fro
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import Executor, ProcessPoolExecutor
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
 from multiprocessing import get_context
 
@@ -80,12 +81,14 @@ class Search:
         noise_scales: of metres and radians, (2,).
         candidates: names still to be considered.
         workers: processes that fit candidates side by side.
+        executor: fits them instead, such as a cluster's; left open.
         progress: told a label and a fraction.
     """
 
     noise_scales: Array
     candidates: tuple[str, ...]
     workers: int = 2
+    executor: Executor | None = None
     progress: Progress | None = None
     rounds: list[Round] = field(default_factory=list)
 
@@ -170,19 +173,24 @@ class Search:
         found: dict[str, Refit] = {}
         if not jobs:
             return found
-        if self.workers < 2:
+        if self.workers < 2 and self.executor is None:
             results = (_job(*job) for job in jobs)
             for k, (name, result) in enumerate(zip(names, results, strict=True)):
                 self._tell(f"round {index + 1}: {name}", (index + (k + 1) / len(jobs)) * share)
                 found |= {} if result is None else {name: result}
             return found
-        with ProcessPoolExecutor(self.workers, mp_context=get_context("fork")) as pool:
+        with self._pool() as pool:
             futures = [pool.submit(_job, *job) for job in jobs]
             for k, (name, future) in enumerate(zip(names, futures, strict=True)):
                 self._tell(f"round {index + 1}: {name}", (index + k / len(jobs)) * share)
                 result = future.result()
                 found |= {} if result is None else {name: result}
         return found
+
+    def _pool(self) -> AbstractContextManager[Executor]:
+        if self.executor is not None:
+            return nullcontext(self.executor)
+        return ProcessPoolExecutor(self.workers, mp_context=get_context("fork"))
 
 
 def _kind(name: str, robot: Robot) -> tuple[bool, bool]:
