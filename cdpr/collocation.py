@@ -36,16 +36,16 @@ class Table:
     spectrum: Array
 
 
+@cache
+def _integral_coefficients(orders: int, times: int) -> Array:
+    """Legendre coefficients of `_integrated`'s columns, (orders + times, orders)."""
+    return legendre.legint(np.eye(orders), m=times, lbnd=-1, scl=0.5)
+
+
 def _integrated(orders: int, fractions: Array, times: int) -> Array:
     """Shifted Legendre polynomials 0..orders-1 integrated `times` from 0, (n, orders)."""
-    columns = []
-    for order in range(orders):
-        coefficients = np.zeros(order + 1)
-        coefficients[order] = 1.0
-        for _ in range(times):
-            coefficients = legendre.legint(coefficients, lbnd=-1, scl=0.5)
-        columns.append(legendre.legval(2 * fractions - 1, coefficients))
-    return np.stack(columns, axis=-1)
+    coefficients = _integral_coefficients(orders, times)
+    return legendre.legvander(2 * fractions - 1, orders + times - 1) @ coefficients
 
 
 @cache
@@ -73,5 +73,8 @@ def interpolation(m: int, fractions: Array) -> tuple[Array, Array, Array]:
         Three (n, m) arrays: values, first and second integrals, of the unit segment.
     """
     spectrum = table(m).spectrum
-    values, once, twice = (_integrated(m, fractions, k) @ spectrum for k in range(3))
+    basis = legendre.legvander(2 * fractions - 1, m + 1)
+    values, once, twice = (
+        basis[:, : m + k] @ (_integral_coefficients(m, k) @ spectrum) for k in range(3)
+    )
     return values, once, twice
