@@ -20,7 +20,7 @@ from freeswing.demo.rig import (
     film_swing,
     true_cameras,
 )
-from freeswing.demo.truth import Swing, demo_robot, demo_swings
+from freeswing.demo.truth import EFFECT_VALUES, Swing, demo_robot, demo_swings
 
 DURATION_S = 5.4
 CUT_S = 0.2  # nothing is filmed this close to the ends of the simulated motion
@@ -32,20 +32,22 @@ def write_filmed_session(
     seed: int = 1,
     progress: Callable[[str, float], None] | None = None,
     filmed: tuple[str, ...] = FILMED,
+    effect_values: tuple[float, float] = EFFECT_VALUES,
 ) -> Path:
     """Film the calibration and the swings; gives the path of session.toml.
 
     The same seed gives the same files. `truth.json` holds what no file declares.
     """
     generator = np.random.default_rng(seed)
-    swings = [s for s in demo_swings(generator, DURATION_S) if s.name in filmed]
+    swings = demo_swings(generator, DURATION_S, effect_values)
+    swings = tuple(swing for swing in swings if swing.name in filmed)
     film_board(folder / "calibration", seed, progress)
     for swing in swings:
         film_swing(folder / "runs" / swing.name, swing, CUT_S, seed, progress)
     write_robot(folder / "robot.toml", demo_robot())
     write_target(folder / "target.toml", demo_target())
     cameras = {camera.name: {"clock_offset_s": camera.clock_offset_s} for camera in true_cameras()}
-    write_json(folder / "truth.json", {**truth_document(), "cameras": cameras})
+    write_json(folder / "truth.json", {**truth_document(effect_values), "cameras": cameras})
     session = {
         "format": "freeswing-session/1",
         "name": "freeswing demo",

@@ -69,11 +69,13 @@ def write_mocap_session(
     return folder / "session.toml"
 
 
-def truth_document() -> dict[str, object]:
+def truth_document(
+    effect_values: tuple[float, float] = EFFECT_VALUES,
+) -> dict[str, object]:
     """What no file of the session declares."""
     return {
         "format": "freeswing-truth/1",
-        "effects": [{"effect": EFFECT, "rate_1_s": EFFECT_VALUES[0]}],
+        "effects": [{"effect": EFFECT, "rate_1_s": effect_values[0]}],
         "parameters": dict(zip(INERTIA_NAMES, TRUE_INERTIA.tolist(), strict=True)),
     }
 

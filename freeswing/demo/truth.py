@@ -66,10 +66,14 @@ def demo_robot() -> Robot:
     return Robot("demo-4", cables, free_coordinates=("x", "y"), platform=platform)
 
 
-def demo_swings(generator: np.random.Generator, duration_s: float) -> tuple[Swing, ...]:
+def demo_swings(
+    generator: np.random.Generator,
+    duration_s: float,
+    effect_values: tuple[float, float] = EFFECT_VALUES,
+) -> tuple[Swing, ...]:
     """The swings, each released at rest beside an equilibrium of its own."""
     model = build_model(demo_robot(), (EFFECT,))
-    values = np.array(EFFECT_VALUES)
+    values = np.array(effect_values)
     swings = []
     for name, role, lengths in SWINGS:
         rest = rest_at_lengths(model, np.array(lengths), TRUE_INERTIA, values, generator)
