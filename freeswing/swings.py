@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
 from cdpr.documents import DataError, InputError
+from cdpr.pose_errors import PoseErrors, read_pose_errors
 from cdpr.robot import Robot
 from cdpr.robot_file import read_robot
 from cdpr.target import Target, read_target
@@ -38,7 +40,31 @@ def load_swings(session: Session, robot: Robot, target: Target | None) -> tuple[
             the robot's.
         DataError: where a video has not been tracked yet.
     """
-    return tuple(load_swing(session, run, robot, target) for run in session.runs)
+    errors = calibration_errors(session)
+    swings = (load_swing(session, run, robot, target) for run in session.runs)
+    return tuple(replace(swing, pose_errors=errors.get(swing.name)) for swing in swings)
+
+
+def calibration_errors(session: Session) -> dict[str, PoseErrors]:
+    """What the cameras' calibration may do to the poses of each tracked run, from tracking.json.
+
+    Raises:
+        InputError: when that file is not what tracking writes.
+    """
+    path = session.results / "tracking.json"
+    filmed = {run.name for run in session.video_runs}
+    if not filmed or not path.is_file():
+        return {}
+    try:
+        runs = json.loads(path.read_text(encoding="utf-8"))["runs"]
+        told = {run["run"]: run.get("calibration_errors") for run in runs}
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise InputError(f"{path}: not a tracking result ({error}); track again") from error
+    return {
+        name: read_pose_errors(entry)
+        for name, entry in told.items()
+        if name in filmed and entry is not None
+    }
 
 
 def load_swing(session: Session, run: Run, robot: Robot, target: Target | None) -> SwingRun:

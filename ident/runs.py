@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 
+from cdpr.pose_errors import PoseErrors
 from cdpr.robot import Array, frozen_array
 from cdpr.trajectory import Trajectory
 
@@ -44,6 +45,7 @@ class SwingRun:
         lengths_std_m: their standard deviation, one for all cables, or None: unknown.
         window_s: start and end of the free motion, or None: found from the samples.
         payload: a known mass added for this run, or None.
+        pose_errors: what the calibration may do to all its poses, or None: unknown.
     """
 
     name: str
@@ -53,6 +55,7 @@ class SwingRun:
     lengths_std_m: float | None = None
     window_s: tuple[float, float] | None = None
     payload: Payload | None = None
+    pose_errors: PoseErrors | None = None
 
     def __post_init__(self) -> None:
         if self.role not in ("identify", "validate"):

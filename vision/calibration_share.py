@@ -2,7 +2,9 @@
 
 Pixel noise scatters the poses; a calibration that is a little wrong shifts them all alike, and no
 residual shows it. The covariance that `calibrate` leaves in calibration.json is carried through
-the solve: dpose = N^-1 J' W (d rays / d lens - d rays / d pose of the camera) d calibration.
+the solve: dpose = N^-1 J' W (d rays / d calibration) d calibration, at some instants of each run.
+What the runs have in common is kept as modes, each of one standard deviation; `identify` takes
+them as what they are, errors that all poses of the session share.
 """
 
 from __future__ import annotations
@@ -16,15 +18,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vision.fuse import Fit, Poses, camera_matrices, whitened
+from calib.camera_models import PARAMETER_NAMES
+from cdpr.pose_errors import PoseErrors, error_terms, fitted_terms
+from vision.fuse import Fit, Poses, camera_matrices, free_of, whitened
 from vision.pose_kernels import linearise_block
 from vision.run_views import Block, CameraViews, blocks
 from vision.watch import Watch
 
 Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 _POSE_NAMES = ("tx_m", "ty_m", "tz_m", "rx_rad", "ry_rad", "rz_rad")
-_BLOCK_SAMPLES = 12
+_INSTANTS_A_RUN = 150
+_LEFT_OUT = 1e-4  # of the variance, over all runs
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +39,27 @@ class CalibrationNoise:
 
     names: tuple[str, ...]
     matrix: Array
+
+    def roots(self) -> Array:
+        """L with L L' the covariance, one column an independent cause, (n, m)."""
+        values, vectors = np.linalg.eigh(self.matrix)
+        real = values > 1e-14 * max(float(values[-1]), 1e-300)
+        return vectors[:, real] * np.sqrt(values[real])
+
+
+@dataclass(frozen=True, slots=True)
+class RunShare:
+    """The calibration's share of one run's poses.
+
+    Attributes:
+        std: median standard deviations of position and small rotation, (6,).
+        errors: one mode for each independent cause in the calibration.
+        spread: root mean square of each of the errors' terms along the run, (13,).
+    """
+
+    std: Array
+    errors: PoseErrors
+    spread: Array
 
 
 def read_calibration_noise(path: Path) -> CalibrationNoise | None:
@@ -49,35 +76,70 @@ def read_calibration_noise(path: Path) -> CalibrationNoise | None:
     return CalibrationNoise(names, matrix)
 
 
-def calibration_deviations(
-    poses: Poses,
-    fit: Fit,
-    views: Sequence[CameraViews],
-    watch: Watch,
-    noise: CalibrationNoise,
-) -> Array:
-    """Standard deviations of position and small rotation at some instants of a run, (n, 6)."""
+def run_share(
+    poses: Poses, fit: Fit, views: Sequence[CameraViews], watch: Watch, noise: CalibrationNoise
+) -> RunShare | None:
+    """The share of a run's poses, from instants spread over it; None where no pose is known."""
+    known = np.flatnonzero(poses.known)
+    if not len(known):
+        return None
+    chosen = known[:: max(1, len(known) // _INSTANTS_A_RUN)]
     focal = np.array([v.camera.focal_px.mean() for v in views])
-    found = [np.zeros((0, 6))]
+    roots = noise.roots()
+    found = []
     for block in blocks(views, watch, poses.times_s):
-        span = slice(block.first, block.first + len(block.starts) - 1)
-        chosen = np.flatnonzero(poses.known[span])
-        if len(chosen):
-            chosen = chosen[:: max(1, len(chosen) // _BLOCK_SAMPLES)]
-            shares = _shares(block, poses, views, fit.floor_px / focal, noise, chosen)
-            found.append(np.sqrt(np.diagonal(shares, axis1=1, axis2=2)))
-    return np.concatenate(found)
+        mine = chosen[(chosen >= block.first) & (chosen < block.first + len(block.starts) - 1)]
+        if len(mine):
+            slopes = _pose_slopes(
+                block, poses, views, fit.floor_px / focal, noise.names, mine, free_of(watch)
+            )
+            found.append(slopes @ roots)
+    slopes = np.concatenate(found)
+    about = int(known[len(known) // 2])
+    origin, turn = poses.positions_m[about], poses.rotations[about]
+    terms = error_terms(
+        poses.positions_m[chosen], poses.rotations[chosen], poses.motions[chosen, :6], origin, turn
+    )
+    modes = np.moveaxis(fitted_terms(terms, slopes), 2, 0)
+    return RunShare(
+        np.median(np.sqrt(np.sum(slopes**2, axis=2)), axis=0),
+        PoseErrors(origin, turn, modes),
+        np.sqrt(np.mean(terms**2, axis=0)),
+    )
 
 
-def _shares(
+def common_errors(shares: Sequence[RunShare | None]) -> list[PoseErrors | None]:
+    """The runs' errors with the fewest modes that hold all but a trace of their variance.
+
+    A radian counts as much as a metre: cables of a metre or two make them do the same.
+    """
+    seen = [share for share in shares if share is not None]
+    if not seen:
+        return [None] * len(shares)
+    weighted = [
+        np.moveaxis(s.errors.modes * s.spread, 0, 2).reshape(-1, len(s.errors.modes)) for s in seen
+    ]
+    _, sizes, mixes = np.linalg.svd(np.concatenate(weighted), full_matrices=False)
+    left = 1.0 - np.cumsum(sizes**2) / max(float(np.sum(sizes**2)), 1e-300)
+    count = int(np.searchsorted(-left, -_LEFT_OUT)) + 1
+    return [None if share is None else _mixed(share.errors, mixes[:count]) for share in shares]
+
+
+def _mixed(errors: PoseErrors, mixes: Array) -> PoseErrors:
+    modes = np.einsum("jr,rab->jab", mixes, errors.modes)
+    return PoseErrors(errors.about_m, errors.about_rotation, modes)
+
+
+def _pose_slopes(
     block: Block,
     poses: Poses,
     views: Sequence[CameraViews],
     floors: Array,
-    noise: CalibrationNoise,
-    chosen: NDArray[np.int64],
+    names: tuple[str, ...],
+    chosen: Ints,
+    free: int,
 ) -> Array:
-    """Covariance of the pose by the calibration at the chosen instants, (n, 6, 6)."""
+    """Change of the pose by the calibration at the chosen instants, (n, 6, n_names)."""
     count = len(block.starts) - 1
     span = slice(block.first, block.first + count)
     n_o = len(block.things)
@@ -92,47 +154,44 @@ def _shares(
         block.points, block.rays, lags, block.counts, residuals, jacobians, rates, places,
     )  # fmt: skip
     white = whitened(block, floors)
-    shares = np.zeros((len(chosen), 6, 6))
-    for row, k in enumerate(chosen):
-        normal, cross = np.zeros((6, 6)), np.zeros((6, len(noise.names)))
+    slopes = np.zeros((len(chosen), 6, len(names)))
+    for row, k in enumerate(chosen - block.first):
+        normal, cross = np.zeros((free, free)), np.zeros((free, len(names)))
         for o in range(block.starts[k], block.starts[k + 1]):
-            m = 2 * int(block.counts[o])
-            weight = white[o, :m, :m].T @ white[o, :m, :m]
+            points = int(block.counts[o])
+            m = 2 * points
             if not np.isfinite(places[o]).all() or (residuals[o, :m] == 0.0).all():
                 continue
-            jacobian = jacobians[o, :m]
-            normal += jacobian.T @ weight @ jacobian
+            jacobian = white[o, :m, :m] @ jacobians[o, :m, :free]
+            normal += jacobian.T @ jacobian
             view = views[block.camera_of[o]]
-            slope = _ray_slopes(view, places[o, : m // 2], noise.names)
-            cross += jacobian.T @ weight @ slope
-        solved = np.linalg.pinv(normal, hermitian=True) @ cross
-        shares[row] = solved @ noise.matrix @ solved.T
-    return shares
+            by_time = rates[o, :m].reshape(points, 2)
+            slope = _ray_slopes(view, places[o, :points], by_time, block.rows_px[o], names)
+            cross += jacobian.T @ white[o, :m, :m] @ slope
+        slopes[row, :free] = np.linalg.pinv(normal, hermitian=True) @ cross
+    return slopes
 
 
-def _ray_slopes(view: CameraViews, places: Array, names: tuple[str, ...]) -> Array:
+def _ray_slopes(
+    view: CameraViews, places: Array, by_time: Array, rows_px: Array, names: tuple[str, ...]
+) -> Array:
     """How residual rays of points (n, 3) change with the calibration, (2 n, n_names)."""
     camera = view.camera
     rays = np.column_stack([places[:, :2] / places[:, 2:], np.ones(len(places))])
     _, by_point, by_lens = camera.project_jacobian(rays)
     lens = -np.linalg.solve(by_point[:, :, :2], by_lens)
-    offset = camera.T_camera_base[:3, 3]
+    g = np.zeros((len(places), 2, 3))
+    g[:, 0, 0] = g[:, 1, 1] = 1.0
+    g[:, :, 2] = -rays[:, :2]
+    g /= places[:, 2][:, None, None]
+    arms = places - camera.T_camera_base[:3, 3]
+    by_pose = -np.concatenate([g, np.cross(arms[:, None, :], g)], axis=2)
+    clocks = -np.stack([by_time, by_time * rows_px[: len(places), None]], axis=2)
+    parts = np.concatenate([lens, by_pose, clocks], axis=2)
+    entries = (*PARAMETER_NAMES[camera.model], *_POSE_NAMES, "clock_offset_s", "line_time_s")
     columns = {name: k for k, name in enumerate(names)}
     slopes = np.zeros((2 * len(places), len(names)))
-    for k, name in enumerate(_lens_names(view)):
-        if (column := columns.get(f"{camera.name}.{name}")) is not None:
-            slopes[:, column] = lens[:, :, k].ravel()
-    for i, place in enumerate(places):
-        x, y = place[:2] / place[2]
-        g = np.array([[1.0, 0.0, -x], [0.0, 1.0, -y]]) / place[2]
-        extrinsic = -np.hstack([g, np.cross(place - offset, g)])
-        for k, name in enumerate(_POSE_NAMES):
-            if (column := columns.get(f"{camera.name}.{name}")) is not None:
-                slopes[2 * i : 2 * i + 2, column] = extrinsic[:, k]
+    for k, entry in enumerate(entries):
+        if (column := columns.get(f"{camera.name}.{entry}")) is not None:
+            slopes[:, column] = parts[:, :, k].ravel()
     return slopes
-
-
-def _lens_names(view: CameraViews) -> tuple[str, ...]:
-    from calib.camera_models import PARAMETER_NAMES
-
-    return PARAMETER_NAMES[view.camera.model]

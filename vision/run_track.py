@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from calib.camera import Camera
 from cdpr.trajectory import Trajectory
 from cdpr.trajectory_files import write_csv
-from vision.calibration_share import CalibrationNoise, calibration_deviations
+from vision.calibration_share import CalibrationNoise, RunShare, run_share
 from vision.follow import STATUS_NAMES, USED
 from vision.fuse import Fit, Poses, free_of
 from vision.layout import LayoutSums, layout_sums
@@ -48,8 +48,7 @@ class RunTrack:
     rate_hz: float
     std_m: float
     std_rad: float
-    calibration_m: float
-    calibration_rad: float
+    calibration: RunShare | None
     cameras: tuple[CameraCount, ...]
     before: Fit
     after: Fit
@@ -76,9 +75,9 @@ def track_run(
     corrected = correct_rig(views, watch, settings.survey_std_m, look=settings.correct_rig)
     poses = corrected.poses
     known = int(poses.known.sum())
-    shares = np.zeros((0, 6))
-    if noise is not None and known:
-        shares = calibration_deviations(poses, corrected.after, corrected.views, watch, noise)
+    share = None
+    if noise is not None:
+        share = run_share(poses, corrected.after, corrected.views, watch, noise)
     if known:
         write_csv(csv, trajectory_of(poses, watch))
     deviations = np.sqrt(np.diagonal(poses.covariances, axis1=1, axis2=2))
@@ -90,8 +89,7 @@ def track_run(
         float(1.0 / np.median(steps)) if len(steps) else float("nan"),
         _median(deviations[poses.known, :3]),
         _median(deviations[poses.known, 3:]),
-        _median(shares[:, :3]),
-        _median(shares[:, 3:]),
+        share,
         counts,
         corrected.before,
         corrected.after,

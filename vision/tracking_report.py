@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from cdpr.pose_errors import PoseErrors
+from vision.calibration_share import common_errors
 from vision.fuse import Fit
 from vision.layout import LayoutChange
 from vision.run_track import RunTrack
@@ -21,11 +23,14 @@ def tracking_document(
     Agreement is the root mean square reprojection in pixels, and the distance in millimetres at
     which a camera's mean ray passes the platform that all cameras agree on. `position_std_mm`
     is the scatter of single poses, as in the track; `calibration_std_mm` is how far the
-    calibration's own uncertainty may shift all of them together (null when it is not known).
+    calibration's own uncertainty may shift all of them together (null when it is not known),
+    and `calibration_errors` how: see `cdpr.pose_errors.PoseErrors`.
     """
+    errors = common_errors([track.calibration for track in tracks])
+    runs = [_run(track, watch, own) for track, own in zip(tracks, errors, strict=True)]
     return {
         "format": "freeswing-tracking/1",
-        "runs": [_run(track, watch) for track in tracks],
+        "runs": runs,
         "layout": _layout(watch, change, refined=refined),
         "effects": [entry for track in tracks for entry in _effects(track)],
     }
@@ -47,7 +52,8 @@ def _layout(watch: Watch, change: LayoutChange, *, refined: bool) -> dict[str, A
     return {"refined": refined, "worst_mismatch_mm": worst, "tags": tags}
 
 
-def _run(track: RunTrack, watch: Watch) -> dict[str, Any]:
+def _run(track: RunTrack, watch: Watch, errors: PoseErrors | None) -> dict[str, Any]:
+    std = np.full(6, np.nan) if track.calibration is None else track.calibration.std
     cameras = []
     for index, count in enumerate(track.cameras):
         cameras.append(
@@ -80,11 +86,12 @@ def _run(track: RunTrack, watch: Watch) -> dict[str, Any]:
         "rate_hz": _known(track.rate_hz),
         "position_std_mm": _known(1e3 * track.std_m),
         "rotation_std_mrad": _known(1e3 * track.std_rad),
-        "calibration_std_mm": _known(1e3 * track.calibration_m),
-        "calibration_std_mrad": _known(1e3 * track.calibration_rad),
+        "calibration_std_mm": _known(1e3 * float(np.median(std[:3]))),
+        "calibration_std_mrad": _known(1e3 * float(np.median(std[3:]))),
         **_agreement(track.after),
         "cameras": cameras,
         "problems": list(track.problems),
+        "calibration_errors": None if errors is None else errors.document(),
     }
 
 
