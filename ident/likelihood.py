@@ -39,11 +39,12 @@ class LikelihoodFit:
     Attributes:
         model: the equations fitted.
         inertia: `INERTIA_NAMES` values, (9,).
+        loads: what payload runs add to the unknowns (see `ident.loaded`), (u,).
         values: effect values, (k,); root mean squares over the runs of those that each run has
             for itself (its motion holds them).
-        free: which of the 9 + k shared unknowns were estimated.
-        covariance: of all shared unknowns, (9 + k, 9 + k), zero where not estimated, infinite on
-            the diagonal where the rank does not suffice; enlarged by `correlation`.
+        free: which of the shared unknowns were estimated: inertia, values, loads, (9 + k + u,).
+        covariance: of all shared unknowns, (9 + k + u, 9 + k + u), zero where not estimated,
+            infinite on the diagonal where the rank does not suffice; enlarged by `correlation`.
         correlation: power of the residuals in the band of the motion over that of white noise of
             the same variance: above 1 the model misses something, or the noise is not white.
         scales: factors on the stated (or unit) noise of metres and radians, (2,).
@@ -61,6 +62,7 @@ class LikelihoodFit:
     model: Model
     inertia: Array
     values: Array
+    loads: Array
     free: np.ndarray
     covariance: Array
     correlation: float
@@ -77,7 +79,7 @@ class LikelihoodFit:
 
     @property
     def std(self) -> Array:
-        """Standard deviations of the shared unknowns, (9 + k,)."""
+        """Standard deviations of the shared unknowns, (9 + k + u,)."""
         return np.sqrt(np.diag(self.covariance))
 
     @property
@@ -90,7 +92,7 @@ class LikelihoodFit:
         """All unknowns, to start another fit from."""
         starts = np.array([np.concatenate([m.zetas[0], m.rates[0]]) for m in self.motions])
         own = np.array([m.values[self.model.own_values] for m in self.motions])
-        return State(self.inertia, self.values, starts, self.scales, self.motions, own)
+        return State(self.inertia, self.values, starts, self.scales, self.motions, own, self.loads)
 
 
 def fit(
@@ -104,6 +106,7 @@ def fit(
     steps: int = STEPS,
     tolerance: float = CONVERGED_DECREASE,
     accuracy_m: float = TOLERANCE_M,
+    consistent: bool = False,
 ) -> LikelihoodFit:
     """Fit inertia, effect values, initial states and lengths to the samples of the runs.
 
@@ -118,6 +121,7 @@ def fit(
         steps: at most so many Gauss-Newton steps on the whole runs.
         tolerance: converged when an undamped step lowers the cost by less.
         accuracy_m: local error of the simulated motions.
+        consistent: hold the inertia, of which all is then free, to what a body can have.
 
     Raises:
         ValueError: when no run is given, or a start cannot be simulated, with the reason.
@@ -134,16 +138,17 @@ def fit(
         if index == 0:
             states_alone = Problem(model, parts, none, estimate_scales)
             state = _minimised(states_alone, state, STEPS, ROUGH_DECREASE)[0]
-        problem = Problem(model, parts, free, estimate_scales)
+        problem = Problem(model, parts, free, estimate_scales, consistent=consistent)
         state = _minimised(problem, state, STEPS, ROUGH_DECREASE)[0]
     if progress:
         progress("maximum likelihood: whole runs", (total - 1) / total)
     if grow:
         for std in (LOOSE_LENGTH_STD_M, TIGHTER_LENGTH_STD_M):
             if any(run.lengths_m is not None and run.lengths_std_m < std for run in samples):
-                problem = Problem(model, [s.loosened(std) for s in samples], free, estimate_scales)
+                loose = [run.loosened(std) for run in samples]
+                problem = Problem(model, loose, free, estimate_scales, consistent=consistent)
                 state = _minimised(problem, state, STEPS, ROUGH_DECREASE)[0]
-    problem = Problem(model, samples, free, estimate_scales, accuracy_m)
+    problem = Problem(model, samples, free, estimate_scales, accuracy_m, consistent)
     state, step, taken, reason = _minimised(problem, state, steps, tolerance)
     if progress:
         progress("maximum likelihood", 1.0)
@@ -204,6 +209,7 @@ def _packed(problem: Problem, state: State, step: Step, taken: int, reason: str)
         model=problem.model,
         inertia=state.inertia,
         values=_values(problem, state),
+        loads=problem.loads_of(state),
         free=problem.free,
         covariance=_covariance(problem, step) * max(1.0, correlation if correlation > 1.2 else 1.0),
         correlation=correlation,

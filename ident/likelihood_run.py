@@ -18,6 +18,7 @@ from cdpr.robot import POSE_COORDINATES, Array
 from cdpr.rotation import angle_rate_matrix
 from cdpr.sensitivity import Linearised
 from cdpr.simulation import Motion
+from ident.runs import Payload
 
 STATE = 12
 
@@ -36,6 +37,7 @@ class Samples:
         lengths_m: stated cable lengths, (n_cables,), or None.
         lengths_std_m: their standard deviation.
         span_s: start and end of the window.
+        payload: a known mass on the platform, or None.
     """
 
     name: str
@@ -47,6 +49,7 @@ class Samples:
     lengths_m: Array | None
     lengths_std_m: float
     span_s: tuple[float, float]
+    payload: Payload | None = None
 
     def until(self, end_s: float) -> Samples:
         """The samples up to a time."""
@@ -130,13 +133,17 @@ def lengths_residual(motion: Motion, samples: Samples) -> Array:
     return (told - samples.lengths_m) / samples.lengths_std_m
 
 
-def reduce_run(linear: Linearised, samples: Samples, scales: Array) -> Reduced:
+def reduce_run(
+    linear: Linearised, samples: Samples, scales: Array, shifts: Array | None = None
+) -> Reduced:
     """Linearise one run's residuals at a motion and eliminate its own unknowns.
 
     Args:
         linear: the motion's first-order answer.
         samples: what was measured.
         scales: noise scale of metres and of radians, (2,).
+        shifts: what further shared unknowns, which come after the others, add to the measured
+            pose, (n, 6, r).
     """
     motion = linear.motion
     matrix = _sample_rows(linear, samples, scales)
@@ -152,7 +159,10 @@ def reduce_run(linear: Linearised, samples: Samples, scales: Array) -> Reduced:
     own = np.hstack([body[:, :directions], shared[:, mine]])
     shared[:, mine] = 0.0
     n_own = own.shape[1]
-    together = np.column_stack([own, shared, right + body[:, -1]])
+    further = np.zeros((len(rows), 0 if shifts is None else shifts.shape[2]))
+    if shifts is not None:
+        further[: white.size] = _whitened_change(shifts, samples, scales).reshape(white.size, -1)
+    together = np.column_stack([own, shared, further, right + body[:, -1]])
     together = np.vstack([together, _own_priors(motion, directions, together.shape[1])])
     triangle = np.linalg.qr(together, mode="r")
     size = together.shape[1]
@@ -205,6 +215,11 @@ def _sample_rows(linear: Linearised, samples: Samples, scales: Array) -> Array:
         direct = slopes[:, :, STATE:]
         change = slopes[:, :, :6] @ change + slopes[:, :, 6:STATE] @ change_rates
         change[:, :, STATE:] += direct
+    return _whitened_change(change, samples, scales)
+
+
+def _whitened_change(change: Array, samples: Samples, scales: Array) -> Array:
+    """A change of the predicted pose (n, 6, m), as it shows in the whitened residuals."""
     if samples.is_pose:
         turn = angle_rate_matrix(samples.values[:, 3:])
         change = np.concatenate([change[:, :3], turn @ change[:, 3:]], axis=1)

@@ -38,12 +38,13 @@ class MassEstimate:
     Attributes:
         mass_kg: mass.
         std_kg: its standard deviation.
-        chi_square: weighted residual over its degrees of freedom; about 1 when all agree.
+        chi_square: weighted residual over its degrees of freedom, about 1 when all agree; None
+            where the mass was not found by itself.
     """
 
     mass_kg: float
     std_kg: float
-    chi_square: float
+    chi_square: float | None
 
 
 def mass_from_payloads(com_m: Array, covariance: Array, loaded: list[LoadedCentre]) -> MassEstimate:

@@ -9,23 +9,12 @@ import numpy as np
 from cdpr.free_motion import choose_free_coordinates
 from cdpr.model import Model
 from cdpr.robot import Array
+from ident.consistency import is_possible
 from ident.fidim import fidim
 from ident.motion import regressor
 from ident.prepare import PreparedRuns, guessed_inertia, usable
 
 _POSES_A_RUN = 10
-
-
-def is_possible(inertia: Array) -> bool:
-    """Whether a body can have this specific inertia: its pseudo-inertia is positive definite.
-
-    Args:
-        inertia: `INERTIA_NAMES` values, (9,).
-    """
-    com, (xx, yy, zz, xy, xz, yz) = inertia[:3], inertia[3:]
-    tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    second = 0.5 * np.trace(tensor) * np.eye(3) - tensor
-    return bool(np.linalg.eigvalsh(second - np.outer(com, com))[0] > 0.0)
 
 
 def likelihood_starts(

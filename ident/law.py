@@ -1,0 +1,56 @@
+"""Whether runs follow the law of a freely swinging platform at all: how much of them it explains.
+
+A fit always gives numbers. Where the fitted free motion explains less than a quarter of a run's
+motion, they are numbers about nothing: the platform was held or driven, a cable was slack, the
+samples are not of this robot. Missing losses alone do not come near that limit: a swing whose
+amplitude falls by e within a quarter of the run is explained to a half.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cdpr.batch import evaluate, only
+from cdpr.free_motion import coordinate_indices
+from cdpr.model import Model
+from cdpr.robot import Array
+from ident.likelihood import LikelihoodFit
+from ident.likelihood_run import predicted
+from ident.motion import SwingMotion
+
+LEAST_EXPLAINED = 0.25  # of the variance of a run's motion
+WORST_ACCELERATION = 0.3  # unexplained, root mean square, that FIDIM's equations may leave
+
+
+def unexplained_motion(found: LikelihoodFit) -> Array:
+    """Share of each run's motion about its mean that its fit leaves, root mean square, (runs,)."""
+    shares = []
+    for motion, samples in zip(found.motions, found.samples, strict=True):
+        off = samples.values - predicted(motion, samples.times_s)[:, samples.columns]
+        spread = samples.values - samples.values.mean(axis=0)
+        shares.append(float(np.sqrt(np.sum(off**2) / np.sum(spread**2))))
+    return np.array(shares)
+
+
+def is_lawless(shares: Array) -> Array:
+    """Which runs the fit explains too little of, by their unexplained shares."""
+    return shares**2 > 1.0 - LEAST_EXPLAINED
+
+
+def lawless_sentence(share: float) -> str:
+    """Why a run cannot serve, by its unexplained share."""
+    return (
+        f"the best free swing explains {100.0 * max(0.0, 1.0 - share**2):.0f} % of the variance of "
+        f"its motion ({100.0 * LEAST_EXPLAINED:.0f} % are needed): the platform was held or "
+        "driven, a cable was slack, or geometry, cable_lengths_m or window_s are wrong"
+    )
+
+
+def unexplained_acceleration(model: Model, motion: SwingMotion, inertia: Array) -> float:
+    """Share of the free coordinates' acceleration that an inertia's equations leave, rms."""
+    columns = coordinate_indices(motion.free)
+    function = only(model.acceleration, 0)
+    arguments = (0.0 * motion.times_s, motion.zetas, motion.rates, inertia, model.start_values)
+    measured = motion.accelerations[:, columns]
+    off = evaluate(function, *arguments)[0][:, columns] - measured
+    return float(np.sqrt(np.mean(off**2) / np.mean(measured**2)))
