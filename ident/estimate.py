@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdpr.robot import INERTIA_NAMES, Array
+from ident.consistency import Consistency, consistency
 from ident.fidim import FidimEstimate
+from ident.fidim_calibration import CalibrationShare
 from ident.frozen import freeze
 from ident.payload import MassEstimate
 from ident.runs import DroppedRun
@@ -30,6 +32,7 @@ class Estimate:
         dropped: runs left out.
         notes: sentences that a reader must see beside the numbers.
         mass: from payload runs.
+        held_cost: see `Consistency.cost`; None where the inertia was free.
         reduced: essential parameters solved again alone: names, values, standard deviations.
         extra: more numbers for the result file, JSON-ready.
     """
@@ -43,6 +46,7 @@ class Estimate:
     dropped: tuple[DroppedRun, ...] = ()
     notes: tuple[str, ...] = ()
     mass: MassEstimate | None = None
+    held_cost: float | None = None
     reduced: dict[str, Any] | None = None
     extra: dict[str, Any] = field(default_factory=dict)
 
@@ -53,6 +57,11 @@ class Estimate:
     def std(self) -> Array:
         """Standard deviations, (9,)."""
         return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def consistency(self) -> Consistency:
+        """Whether a body can have this inertia."""
+        return consistency(self.values, self.covariance, self.held_cost)
 
     def document(self) -> dict[str, Any]:
         """The entry of `estimates` in results/identification.json."""
@@ -71,6 +80,7 @@ class Estimate:
             "samples": self.samples,
             "dropped_runs": [{"run": run.run, "why": run.why} for run in self.dropped],
             "notes": list(self.notes),
+            "consistency": self.consistency.document(),
             **({"reduced": self.reduced} if self.reduced is not None else {}),
             **self.extra,
         }
@@ -81,6 +91,7 @@ def fidim_entry(
     dropped: tuple[DroppedRun, ...],
     notes: tuple[str, ...],
     weighted: WeightedSolution | None = None,
+    share: CalibrationShare | None = None,
 ) -> Estimate:
     """An estimate from FIDIM's result.
 
@@ -89,6 +100,7 @@ def fidim_entry(
         dropped: runs left out.
         notes: beside those of `found`.
         weighted: the covariance-weighted form, to be taken in its place.
+        share: what the cameras' calibration adds to the covariance.
     """
     solution = found.solution
     values, covariance = solution.values, solution.covariance
@@ -99,6 +111,11 @@ def fidim_entry(
         extra["noise_ratio"] = weighted.noise_ratio
     names = [name for name, kept in zip(INERTIA_NAMES, found.essential, strict=True) if kept]
     reduced = found.reduced
+    reduced_std = reduced.std
+    if share is not None:
+        covariance = covariance + share.covariance
+        reduced_std = np.sqrt(reduced_std**2 + np.diag(share.reduced))
+        extra["calibration_std"] = np.sqrt(np.diag(share.covariance)).tolist()
     return Estimate(
         values=values,
         covariance=covariance,
@@ -111,7 +128,7 @@ def fidim_entry(
         reduced={
             "parameters": [
                 _row(name, value, std, True)
-                for name, value, std in zip(names, reduced.values, reduced.std, strict=True)
+                for name, value, std in zip(names, reduced.values, reduced_std, strict=True)
             ],
             "sigma_W": reduced.sigma_W,
             "cost_C": reduced.cost_C,

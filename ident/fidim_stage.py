@@ -11,6 +11,7 @@ from cdpr.model import Model
 from cdpr.robot import Array
 from ident.estimate import Estimate, fidim_entry
 from ident.fidim import FidimEstimate, fidim
+from ident.fidim_calibration import calibration_share
 from ident.motion import lowest_tension, regressor
 from ident.payload import LoadedCentre, MassEstimate, mass_from_payloads
 from ident.prepare import (
@@ -95,7 +96,8 @@ def _completed(
             'weighting = "covariance" gives the weighted form'
         )
     mass = _mass(model, prepared, raw, full, notes)
-    entry = fidim_entry(raw, left_out(prepared, full), tuple(notes), weighted)
+    share = calibration_share(model, unloaded, full, raw.essential)
+    entry = fidim_entry(raw, left_out(prepared, full), tuple(notes), weighted, share)
     return replace(entry, mass=mass)
 
 

@@ -2,24 +2,42 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from cdpr.model import Model
 from cdpr.robot import Array
+from ident.calibration import with_calibration
+from ident.consistency import consistency, is_possible, nearest_possible
 from ident.estimate import Estimate
 from ident.fidim import WELL_IDENTIFIED_PERCENT, near_zero
+from ident.geometry import geometry_document
 from ident.guess import first_state
 from ident.joint import State
+from ident.law import LawlessError, is_lawless, lawless_sentence, unexplained_motion
 from ident.likelihood import LikelihoodFit, fit
-from ident.likelihood_run import Samples, predicted
+from ident.likelihood_run import Samples
+from ident.loaded import Loads, mass_of
 from ident.prepare import PreparedRun, Progress
 from ident.runs import DroppedRun
 from ident.samples import prepare
-from ident.starts import is_possible
 
 _ASTRAY = 0.5  # a lost swing is out of phase with its samples
+_ROUNDS = 3  # of leaving out runs that follow no law
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """What a maximum-likelihood estimate is asked for beside the fit itself.
+
+    Attributes:
+        consistent: hold the inertia to what a body can have.
+        mass_kg: a guess of the mass, to start from where runs carry payloads.
+    """
+
+    consistent: bool = False
+    mass_kg: float | None = None
 
 
 def ml_estimate(
@@ -29,26 +47,36 @@ def ml_estimate(
     inertia: Array,
     dropped: tuple[DroppedRun, ...] = (),
     progress: Progress | None = None,
+    asked: Asked | None = None,
 ) -> tuple[Estimate, LikelihoodFit]:
     """Fit the free motions themselves to the samples of some runs.
 
     Args:
-        model: the robot.
-        runs: those to fit.
+        model: the robot; values of its effects, if any, are estimated with their priors.
+        runs: those to fit, with and without payloads.
         free: the coordinates to use of them, or None for full poses.
         inertia: where to start, (9,): FIDIM's result.
         dropped: runs left out, for the record.
         progress: told a label and a fraction.
+        asked: what else is asked for.
 
     Raises:
-        ValueError: when a run's samples cannot give a motion, or the fit breaks down.
+        ValueError: when no run's samples can give a motion, or the fit breaks down.
     """
-    starts = [started(model, run, free, inertia) for run in runs]
-    samples = [one for one, _ in starts]
-    states = np.array([state for _, state in starts])
-    state = State(np.array(inertia), model.start_values, states, np.ones(2))
-    found = fit(model, samples, state, progress=progress)
-    return _entry(found, dropped), found
+    asked = asked or Asked()
+    kept, samples, states, more = _begun(model, runs, free, inertia, asked.mass_kg)
+    loads = Loads.of([run.payload for run in samples]).start(asked.mass_kg)
+    state = State(np.array(inertia), model.start_values, states, np.ones(2), loads=loads)
+    found, cost = fit(model, samples, state, progress=progress), None
+    if asked.consistent and not is_possible(found.inertia):
+        held = _held(found, progress)
+        found, cost = held, held.deviance - found.deviance
+    errors = [run.run.pose_errors for run in kept]
+    told = with_calibration(found, errors, consistent=cost is not None)
+    entry = _entry(told.fit, dropped + more, cost)
+    return replace(
+        entry, notes=entry.notes + told.notes(), extra={**entry.extra, **told.document()}
+    ), told.fit
 
 
 def best_ml_estimate(
@@ -58,38 +86,108 @@ def best_ml_estimate(
     starts: list[Array],
     dropped: tuple[DroppedRun, ...] = (),
     progress: Progress | None = None,
-) -> Estimate:
+    asked: Asked | None = None,
+) -> tuple[Estimate, LikelihoodFit]:
+    """The likeliest fit, without the runs that follow no free swing: they are dropped by name.
+
+    Raises:
+        LawlessError: when no run follows one.
+        ValueError: when no start leads to a fit: what went wrong from the first.
+    """
+    for _ in range(_ROUNDS):
+        entry, found = _from_starts(model, runs, free, starts, dropped, progress, asked)
+        shares = unexplained_motion(found)
+        lawless = is_lawless(shares)
+        if not lawless.any():
+            return entry, found
+        if lawless.all():
+            break
+        # One bad run may take others with it: those that are off nearly as far as the worst leave.
+        worst = lawless & (shares > 0.9 * shares.max())
+        names = {
+            run.name: lawless_sentence(share)
+            for run, share in zip(found.samples, shares[worst], strict=False)
+        }
+        dropped += tuple(DroppedRun(name, why) for name, why in names.items())
+        runs = [run for run in runs if run.name not in names]
+        starts = [entry.values, *starts]
+    least = int(np.argmin(shares))
+    raise LawlessError(
+        f"none of {len(shares)} runs swings freely by this robot's equations; of the best, "
+        f"{found.samples[least].name}, {lawless_sentence(float(shares[least]))}"
+    )
+
+
+def _from_starts(
+    model: Model,
+    runs: list[PreparedRun],
+    free: tuple[str, ...] | None,
+    starts: list[Array],
+    dropped: tuple[DroppedRun, ...],
+    progress: Progress | None,
+    asked: Asked | None,
+) -> tuple[Estimate, LikelihoodFit]:
     """The first fit from several starts that follows the runs, or else the likeliest of all.
 
     A fit follows when its residuals are small beside the swings and a body can have its inertia.
-
-    Raises:
-        ValueError: when no start leads to a fit: what went wrong from the first.
     """
-    found: list[tuple[float, Estimate]] = []
+    found: list[tuple[Estimate, LikelihoodFit]] = []
     failure: Exception | None = None
     for start in starts:
         try:
-            entry, result = ml_estimate(model, runs, free, start, dropped, progress)
+            entry, result = ml_estimate(model, runs, free, start, dropped, progress, asked)
         except (ValueError, np.linalg.LinAlgError) as error:
             failure = failure or error
             continue
-        if is_possible(entry.values) and _astray(result) < _ASTRAY:
-            return entry
-        found.append((result.deviance, entry))
+        if is_possible(entry.values) and astray(result) < _ASTRAY:
+            return entry, result
+        found.append((entry, result))
     if not found:
         raise ValueError(str(failure)) from failure
-    return min(found, key=lambda pair: pair[0])[1]
+    return min(found, key=lambda pair: pair[1].deviance)
 
 
-def _astray(found: LikelihoodFit) -> float:
+def astray(found: LikelihoodFit) -> float:
     """Largest share of a run's motion that its fit leaves unexplained, root mean square."""
-    shares = []
-    for motion, samples in zip(found.motions, found.samples, strict=True):
-        off = samples.values - predicted(motion, samples.times_s)[:, samples.columns]
-        spread = samples.values - samples.values.mean(axis=0)
-        shares.append(float(np.sqrt(np.sum(off**2) / np.sum(spread**2))))
-    return max(shares)
+    return float(unexplained_motion(found).max())
+
+
+def _begun(
+    model: Model,
+    runs: list[PreparedRun],
+    free: tuple[str, ...] | None,
+    inertia: Array,
+    mass_kg: float | None,
+) -> tuple[list[PreparedRun], list[Samples], Array, tuple[DroppedRun, ...]]:
+    """Runs that can be started, their samples and first states, and the others with reasons."""
+    kept, samples, states, dropped = [], [], [], []
+    for run in runs:
+        load = Loads.of([run.run.payload])
+        guess = load.inertia(0, inertia, load.start(mass_kg))
+        try:
+            one, state = started(model, run, free, guess)
+        except (ValueError, np.linalg.LinAlgError) as error:
+            dropped.append(DroppedRun(run.name, str(error)))
+            continue
+        kept.append(run)
+        samples.append(one)
+        states.append(state)
+    if not any(run.run.payload is None for run in kept):
+        raise ValueError(
+            f"no run without payload can be started; {dropped[0].run}: {dropped[0].why}"
+            if dropped
+            else "no run without payload"
+        )
+    return kept, samples, np.array(states), tuple(dropped)
+
+
+def _held(found: LikelihoodFit, progress: Progress | None) -> LikelihoodFit:
+    """The fit again, its inertia held to what a body can have."""
+    if found.rank < int(found.free.sum()):
+        return found
+    inertia = nearest_possible(found.inertia, found.covariance[:9, :9])
+    start = replace(found.state, inertia=inertia, motions=())
+    return fit(found.model, found.samples, start, progress=progress, consistent=True)
 
 
 def started(
@@ -110,7 +208,9 @@ def started(
     return samples, first_state(model, samples, inertia)
 
 
-def _entry(found: LikelihoodFit, dropped: tuple[DroppedRun, ...]) -> Estimate:
+def _entry(
+    found: LikelihoodFit, dropped: tuple[DroppedRun, ...], held_cost: float | None
+) -> Estimate:
     covariance = found.covariance[:9, :9]
     if not np.isfinite(covariance).all():
         raise ValueError(
@@ -125,6 +225,16 @@ def _entry(found: LikelihoodFit, dropped: tuple[DroppedRun, ...]) -> Estimate:
             f"the residuals are not white (power below 5 Hz is {found.correlation:.3g} times that "
             "of white noise): the model misses something; standard deviations are enlarged for it"
         )
+    mass = None
+    if len(found.loads):
+        place = 9 + len(found.values)
+        try:
+            mass = mass_of(found.loads[0], float(found.std[place]))
+        except ValueError as error:
+            notes.append(str(error))
+    held = consistency(found.inertia, covariance, held_cost)
+    if not (held.is_possible and held_cost is None):
+        notes.append(held.sentence())
     noise = {"noise_m": found.noise[0], "noise_rad": found.noise[1]}
     return Estimate(
         values=found.inertia,
@@ -133,8 +243,11 @@ def _entry(found: LikelihoodFit, dropped: tuple[DroppedRun, ...]) -> Estimate:
         samples=sum(len(run.times_s) for run in found.samples),
         dropped=dropped,
         notes=tuple(notes),
+        mass=mass,
+        held_cost=held_cost,
         extra={
             **{key: float(value) for key, value in noise.items() if np.isfinite(value)},
             "stop_reason": found.reason,
+            **geometry_document(found),
         },
     )

@@ -1,0 +1,128 @@
+"""The cameras' calibration among the unknowns of identification."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cdpr.pose_errors import TERMS, PoseErrors
+from cdpr.robot import POSE_COORDINATES, Array
+from cdpr.rotation import matrix_from_angles
+from ident.calibration import mode_shifts, with_calibration
+from ident.fidim import fidim
+from ident.fidim_calibration import calibration_share
+from ident.maximum_likelihood import ml_estimate
+from ident.motion import regressor
+from ident.prepare import PreparedRun, prepare_runs
+from ident.runs import SwingRun
+from ident.signals import SignalSettings
+from tests.ident.swings import TRUE_INERTIA, paper_model, recorded, swing
+
+SHIFT_M, TURN_RAD, SCALE = 1e-4, 1e-4, 1e-4
+NOISE_M = 1e-5
+EQUILIBRIA = (3, 6, 9)
+CENTRE_M = np.array([1.2, -0.2, 0.0])
+
+
+def modes() -> Array:
+    """A base frame shifted and turned about the workspace's centre, and a wrong scale: seven."""
+    found = np.zeros((7, 6, TERMS))
+    for k in range(3):
+        found[k, k, 0] = SHIFT_M
+        turn = TURN_RAD * np.eye(3)[k]
+        found[3 + k, 3 + k, 0] = TURN_RAD
+        found[3 + k, :3, 1:4] = np.cross(turn, np.eye(3)).T
+    found[6, :3, 1:4] = SCALE * np.eye(3)
+    return found
+
+
+def errors_of(run: SwingRun) -> PoseErrors:
+    """The same base-frame errors, written about the run's first pose."""
+    about = run.trajectory.positions()[0]
+    here = modes()
+    here[:, :, 0] += np.einsum("rab,b->ra", here[:, :, 1:4], about - CENTRE_M)
+    turned = matrix_from_angles(run.trajectory.values[0, 3:])
+    return PoseErrors(about, turned, here)
+
+
+def runs(amplitudes: Array, seed: int, duration_s: float = 3.0) -> list[SwingRun]:
+    """Swings as cameras saw them whose calibration is off by these amplitudes."""
+    generator = np.random.default_rng(seed)
+    found = []
+    for k in EQUILIBRIA:
+        motion = swing(k, duration_s=duration_s)
+        run = recorded(motion, f"swing-{k}", generator, NOISE_M, POSE_COORDINATES)
+        errors = errors_of(run)
+        zetas, rates, _ = motion.at(run.trajectory.times_s)
+        off = mode_shifts(zetas, rates, errors) @ amplitudes
+        trajectory = replace(run.trajectory, values=run.trajectory.values + off)
+        found.append(replace(run, trajectory=trajectory, pose_errors=errors))
+    return found
+
+
+def prepared(found: list[SwingRun]) -> list[PreparedRun]:
+    return list(prepare_runs(found, paper_model(), SignalSettings()).runs)
+
+
+@pytest.fixture(scope="module")
+def estimates():
+    """With the calibration's errors among the unknowns, and without."""
+    generator = np.random.default_rng(5)
+    ready = prepared(runs(generator.standard_normal(7), seed=6))
+    blind = [replace(one, run=replace(one.run, pose_errors=None)) for one in ready]
+    told = ml_estimate(paper_model(), ready, None, TRUE_INERTIA)
+    return told, ml_estimate(paper_model(), blind, None, TRUE_INERTIA)
+
+
+def test_the_inertia_is_within_three_claimed_deviations(estimates) -> None:
+    told, _ = estimates[0]
+    z = (told.values - TRUE_INERTIA) / told.std
+    assert np.abs(z).max() < 3.5, f"z = {np.round(z, 2)}"
+
+
+def test_left_out_the_calibration_is_claimed_to_be_inertia(estimates) -> None:
+    """The negative control: without the modes, errors are many times what is claimed."""
+    (told, _), (blind, _) = estimates
+    z = (blind.values - TRUE_INERTIA) / blind.std
+    assert np.abs(z).max() > 6.0, f"z = {np.round(z, 2)}"
+    gain = np.abs(blind.values - TRUE_INERTIA)[2] / np.abs(told.values - TRUE_INERTIA)[2]
+    assert gain > 3.0, f"com_z's error falls {gain:.1f} times"
+
+
+def test_the_result_file_tells_the_modes(estimates) -> None:
+    told, blind = estimates[0][0], estimates[1][0]
+    assert len(told.document()["calibration_modes"]["amplitudes"]) == 7, told.extra
+    assert "calibration_modes" not in blind.document(), blind.extra
+
+
+def test_a_calibration_that_must_be_far_off_is_said(estimates) -> None:
+    """Base tags surveyed 2 mm off: twenty standard deviations."""
+    found = runs(np.array([20.0, 0, 0, 0, 0, 0, 0]), seed=8, duration_s=2.0)
+    told, _ = ml_estimate(paper_model(), prepared(found), None, TRUE_INERTIA)
+    assert any("standard deviations of their calibration" in note for note in told.notes), told
+
+
+def test_without_known_errors_nothing_changes(estimates) -> None:
+    _, fitted = estimates[1]
+    same = with_calibration(fitted, [None] * len(EQUILIBRIA))
+    assert same.fit is fitted, "another fit"
+    assert len(same.amplitudes) == 0, same.amplitudes
+
+
+@pytest.mark.parametrize("full", [True, False])
+def test_fidim_claims_what_the_calibration_does_to_it(full: bool) -> None:
+    """Noise-free swings of a calibration 1 std off: the change is within the share's ellipsoid."""
+    generator = np.random.default_rng(11)
+    amplitudes = generator.standard_normal(7)
+    plain, off = (prepared(runs(a, seed=1)) for a in (np.zeros(7), amplitudes))
+    solutions = []
+    for one in (plain, off):
+        motions = [run.full if full else run.free for run in one]
+        solutions.append(fidim([regressor(paper_model(), m) for m in motions if m is not None]))
+    change = solutions[1].values - solutions[0].values
+    share = calibration_share(paper_model(), plain, full, solutions[0].essential)
+    assert share is not None
+    z = change / np.sqrt(np.diag(share.covariance))
+    assert 0.1 < np.abs(z).max() < 4.0, f"z = {np.round(z, 2)}"
