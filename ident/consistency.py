@@ -20,6 +20,7 @@ from cdpr.robot import INERTIA_NAMES, Array
 LEAST_EXTENT_M = 1e-3
 _BARRIERS = 10.0 ** np.arange(1, -9, -1)
 _NEWTON_STEPS = 60
+_SIGNIFICANT = 3.0  # standard deviations
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,9 +44,19 @@ class Consistency:
         """Whether the pseudo-inertia is positive definite."""
         return self.least_moment_m2 > 0.0
 
+    @property
+    def is_refuted(self) -> bool:
+        """Whether no body has the inertia that the samples ask for, beyond its uncertainty."""
+        if self.cost is not None:
+            return self.cost > _SIGNIFICANT**2
+        return self.least_moment_m2 < -_SIGNIFICANT * self.std_m2
+
+    def size(self) -> str:
+        """How far inside or outside the possible it is."""
+        return f"least second moment of mass {self.least_moment_m2:.2g} +- {self.std_m2:.2g} m2"
+
     def sentence(self) -> str:
         """For people."""
-        size = f"{self.least_moment_m2:.2g} +- {self.std_m2:.2g} m2"
         if self.cost is not None:
             return (
                 "held to the inertia of a possible body, which raises the weighted squared error "
@@ -53,10 +64,10 @@ class Consistency:
                 "the nearest possible inertia is never farther from the truth than"
             )
         if self.is_possible:
-            return f"a body can have this inertia (least second moment of mass {size})"
+            return f"a body can have this inertia ({self.size()})"
         return (
-            f"no body can have this inertia: its least second moment of mass is {size}; hold it to "
-            "possible bodies (--consistent), or look for what the model misses (diagnose)"
+            f"no body can have this inertia ({self.size()}): hold it to possible bodies "
+            "(--consistent), or look for what the model misses (diagnose)"
         )
 
     def document(self) -> dict[str, Any]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from cdpr.model import Model
 from cdpr.robot import Array
+from ident.consistency import nearest_possible
 from ident.estimate import Estimate, fidim_entry
 from ident.fidim import FidimEstimate, fidim
 from ident.fidim_calibration import calibration_share
@@ -32,9 +33,15 @@ _THINNED = 10  # samples skipped where only an impression of the regressor's noi
 
 
 def fidim_estimates(
-    model: Model, prepared: PreparedRuns, weighting: Weighting, progress: Progress | None
+    model: Model,
+    prepared: PreparedRuns,
+    weighting: Weighting,
+    progress: Progress | None,
+    consistent: bool = False,
 ) -> tuple[PreparedRuns, dict[str, Estimate], dict[str, str]]:
     """FIDIM by full poses and by free coordinates; slack runs found with its result leave.
+
+    With `consistent` an inertia that no body can have is replaced by the nearest possible one.
 
     Returns:
         The runs without the slack ones, `fidim_full` and `fidim_free` as far as they exist, and
@@ -57,7 +64,8 @@ def fidim_estimates(
                 prepared = without(prepared, slack)
                 unloaded = usable(prepared, full, None)
                 raw = fidim([regressor(model, motion_of(run, full)) for run in unloaded])
-            found[name] = _completed(model, prepared, unloaded, raw, full, weighting)
+            entry = _completed(model, prepared, unloaded, raw, full, weighting)
+            found[name] = _consistent(entry, consistent)
         except (ValueError, np.linalg.LinAlgError) as error:
             failures[name] = str(error)
     # A full-pose problem is quiet where poses were not measured: that is no failure.
@@ -99,6 +107,18 @@ def _completed(
     share = calibration_share(model, unloaded, full, raw.essential)
     entry = fidim_entry(raw, left_out(prepared, full), tuple(notes), weighted, share)
     return replace(entry, mass=mass)
+
+
+def _consistent(entry: Estimate, enforced: bool) -> Estimate:
+    """The entry with a word on whether a body can have its inertia, or held to one that can."""
+    if enforced and not entry.consistency.is_possible:
+        values = nearest_possible(entry.values, entry.covariance)
+        off = values - entry.values
+        cost = float(off @ np.linalg.solve(entry.covariance, off))
+        entry = replace(entry, values=values, held_cost=cost)
+    if entry.consistency.is_possible and entry.held_cost is None:
+        return entry
+    return replace(entry, notes=(*entry.notes, entry.consistency.sentence()))
 
 
 def _mass(

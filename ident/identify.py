@@ -13,7 +13,9 @@ from cdpr.robot import Robot
 from ident.comparison import ParameterComparison, compare
 from ident.estimate import Estimate
 from ident.fidim_stage import Weighting, fidim_estimates
-from ident.maximum_likelihood import best_ml_estimate
+from ident.geometry import GeometryPriors, corrected
+from ident.law import WORST_ACCELERATION, LawlessError, unexplained_acceleration
+from ident.maximum_likelihood import Asked, best_ml_estimate
 from ident.prepare import (
     LARGEST_AMPLIFICATION,
     PreparedRuns,
@@ -21,7 +23,9 @@ from ident.prepare import (
     fittable,
     left_out,
     length_differences,
+    motion_of,
     prepare_runs,
+    usable,
 )
 from ident.runs import SwingRun
 from ident.signals import SignalSettings
@@ -29,7 +33,6 @@ from ident.starts import likelihood_starts
 from ident.validate import ValidatedRun, validate_run
 
 FORMAT = "freeswing-identification/1"
-_THINNED = 10  # samples skipped where only an impression of the regressor's noise is wanted
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,12 +44,16 @@ class IdentifySettings:
         weighting: of FIDIM: `published`, or `covariance` (the weighted form in its place).
         maximum_likelihood: whether the free motions themselves are fitted too.
         predict: whether validation runs are simulated.
+        consistent: whether inertias are held to what a body can have.
+        geometry: how well the cables' ends are known, for maximum likelihood.
     """
 
     signals: SignalSettings = field(default_factory=SignalSettings)
     weighting: Weighting = "published"
     maximum_likelihood: bool = True
     predict: bool = True
+    consistent: bool = False
+    geometry: GeometryPriors = field(default_factory=GeometryPriors)
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,12 +132,18 @@ def identify(
         prepared = prepare_runs(runs, model, settings.signals, progress)
     except ValueError as error:
         raise DataError(str(error)) from error
-    prepared, by_fidim, failures = fidim_estimates(model, prepared, settings.weighting, progress)
-    estimates = dict(by_fidim)
+    prepared, by_fidim, failures = fidim_estimates(
+        model, prepared, settings.weighting, progress, settings.consistent
+    )
+    fitted: dict[str, Fitted] = {}
+    lawless = False
     if settings.maximum_likelihood:
-        added, more = _likelihood_estimates(model, prepared, by_fidim, progress)
-        estimates.update(added)
+        fitted, more, lawless = _likelihood_estimates(prepared, by_fidim, settings, robot, progress)
         failures.update(more)
+    meaningless = _meaningless(model, prepared, by_fidim, lawless and not fitted)
+    failures.update(meaningless)
+    estimates = {name: one for name, one in by_fidim.items() if name not in meaningless}
+    estimates.update({name: one.estimate for name, one in fitted.items()})
     if not estimates:
         raise DataError(_nothing_sentence(prepared, failures))
     best = next(n for n in ("ml_full", "ml_free", "fidim_full", "fidim_free") if n in estimates)
@@ -138,7 +151,8 @@ def identify(
     for method in ("fidim", "ml"):
         if {f"{method}_free", f"{method}_full"} <= estimates.keys():
             comparison[method] = _compared(estimates[f"{method}_free"], estimates[f"{method}_full"])
-    validation = _validated(model, prepared, estimates[best], best, settings, progress)
+    truer = fitted[best].robot if best in fitted else robot
+    validation = _validated(truer, prepared, estimates[best], best, settings, progress)
     return Identification(
         estimates=estimates,
         comparison=comparison,
@@ -151,32 +165,81 @@ def identify(
     )
 
 
+@dataclass(frozen=True, slots=True)
+class Fitted:
+    """A maximum-likelihood estimate.
+
+    Attributes:
+        estimate: as it is reported.
+        robot: with its cable ends where the fit found them.
+    """
+
+    estimate: Estimate
+    robot: Robot
+
+
 def _likelihood_estimates(
-    model: Model,
     prepared: PreparedRuns,
     by_fidim: dict[str, Estimate],
+    settings: IdentifySettings,
+    robot: Robot,
     progress: Progress | None,
-) -> tuple[dict[str, Estimate], dict[str, str]]:
-    """Maximum likelihood, started from FIDIM's result or, where that leads nowhere, elsewhere."""
-    found: dict[str, Estimate] = {}
+) -> tuple[dict[str, Fitted], dict[str, str], bool]:
+    """Maximum likelihood, started from FIDIM's result or, where that leads nowhere, elsewhere.
+
+    Returns:
+        The estimates, why others are absent, and whether it is because no run follows any law.
+    """
+    found: dict[str, Fitted] = {}
     failures: dict[str, str] = {}
     results = tuple(by_fidim[n].values for n in ("fidim_full", "fidim_free") if n in by_fidim)
-    starts = likelihood_starts(model, prepared, results)
+    starts = likelihood_starts(build_model(robot), prepared, results)
+    masses = [one.mass.mass_kg for one in by_fidim.values() if one.mass is not None]
+    asked = Asked(settings.consistent, next(iter(masses), robot.platform.mass_kg))
+    model, lawless = settings.geometry.model(robot), False
     for full in (True, False):
         name = "ml_full" if full else "ml_free"
         runs = fittable(prepared, full)
-        if not runs:
+        if not runs or lawless:
             continue
         free = None if full else prepared.free
         try:
-            entry = best_ml_estimate(model, runs, free, starts, prepared.dropped, progress)
+            entry, fit = best_ml_estimate(
+                model, runs, free, starts, prepared.dropped, progress, asked
+            )
         except (ValueError, np.linalg.LinAlgError) as error:
             failures[name] = str(error)
+            lawless = isinstance(error, LawlessError)
             continue
         starts = [entry.values, *starts]
-        same_way = by_fidim.get("fidim_full" if full else "fidim_free")
-        found[name] = replace(entry, mass=None if same_way is None else same_way.mass)
-    return found, failures
+        found[name] = Fitted(entry, corrected(robot, fit.model, fit.values))
+    return found, failures, lawless
+
+
+def _meaningless(
+    model: Model, prepared: PreparedRuns, by_fidim: dict[str, Estimate], lawless: bool
+) -> dict[str, str]:
+    """FIDIM's results that say nothing of a platform, with the reason.
+
+    No body can have them, and either their equations do not give the accelerations of any run or
+    no run follows a free swing at all.
+    """
+    found = {}
+    for name, one in by_fidim.items():
+        if not one.consistency.is_refuted:
+            continue
+        full = name == "fidim_full"
+        left = min(
+            unexplained_acceleration(model, motion_of(run, full), one.values)
+            for run in usable(prepared, full, None)
+        )
+        if lawless or left > WORST_ACCELERATION:
+            found[name] = (
+                f"no body can have its inertia ({one.consistency.size()}), and its equations miss "
+                f"the accelerations of every run by {left:.2g} times their size or more: these are "
+                "no free swings of this robot, or too few of them follow its equations"
+            )
+    return found
 
 
 def _compared(free: Estimate, full: Estimate) -> tuple[ParameterComparison, ...]:
@@ -185,21 +248,21 @@ def _compared(free: Estimate, full: Estimate) -> tuple[ParameterComparison, ...]
 
 
 def _validated(
-    model: Model,
+    robot: Robot,
     prepared: PreparedRuns,
     estimate: Estimate,
     name: str,
     settings: IdentifySettings,
     progress: Progress | None,
 ) -> tuple[ValidatedRun, ...]:
-    full = name.endswith("full")
-    runs = [
-        run
-        for run in prepared.runs
-        if run.run.role == "validate"
-        and run.run.payload is None
-        and (run.full if full else run.free) is not None
-    ]
+    """The held-out runs confronted with an estimate and the robot that goes with it."""
+    full, model = name.endswith("full"), build_model(robot)
+    held_out = [one for one in prepared.runs if one.run.role == "validate" and not one.run.payload]
+    if settings.geometry.stds and name.startswith("ml") and held_out:
+        told = replace(robot, free_coordinates=prepared.free)
+        again = prepare_runs([one.run for one in held_out], build_model(told), settings.signals)
+        held_out = list(again.runs)
+    runs = [run for run in held_out if (run.full if full else run.free) is not None]
     found = []
     for i, run in enumerate(runs):
         if progress:

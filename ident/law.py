@@ -19,7 +19,12 @@ from ident.likelihood_run import predicted
 from ident.motion import SwingMotion
 
 LEAST_EXPLAINED = 0.25  # of the variance of a run's motion
+LEAST_EXPLAINED_BY_NO_BODY = 0.75  # the same where the fit needs an inertia that no body has
 WORST_ACCELERATION = 0.3  # unexplained, root mean square, that FIDIM's equations may leave
+
+
+class LawlessError(ValueError):
+    """No run follows the law of a freely swinging platform."""
 
 
 def unexplained_motion(found: LikelihoodFit) -> Array:
@@ -32,17 +37,25 @@ def unexplained_motion(found: LikelihoodFit) -> Array:
     return np.array(shares)
 
 
-def is_lawless(shares: Array) -> Array:
-    """Which runs the fit explains too little of, by their unexplained shares."""
-    return shares**2 > 1.0 - LEAST_EXPLAINED
+def is_lawless(shares: Array, refuted: bool = False) -> Array:
+    """Which runs the fit explains too little of, by their unexplained shares.
+
+    Args:
+        shares: see `unexplained_motion`, (runs,).
+        refuted: whether no body can have the inertia that the fit needs: more is then asked of it.
+    """
+    least = LEAST_EXPLAINED_BY_NO_BODY if refuted else LEAST_EXPLAINED
+    return shares**2 > 1.0 - least
 
 
 def lawless_sentence(share: float) -> str:
     """Why a run cannot serve, by its unexplained share."""
     return (
         f"the best free swing explains {100.0 * max(0.0, 1.0 - share**2):.0f} % of the variance of "
-        f"its motion ({100.0 * LEAST_EXPLAINED:.0f} % are needed): the platform was held or "
-        "driven, a cable was slack, or geometry, cable_lengths_m or window_s are wrong"
+        f"its motion (at least {100.0 * LEAST_EXPLAINED:.0f} % are needed, "
+        f"{100.0 * LEAST_EXPLAINED_BY_NO_BODY:.0f} % where no body has the inertia that it takes): "
+        "the platform was held or driven, a cable was slack, or geometry, cable_lengths_m or "
+        "window_s are wrong"
     )
 
 

@@ -24,7 +24,7 @@ from ident.runs import DroppedRun
 from ident.samples import prepare
 
 _ASTRAY = 0.5  # a lost swing is out of phase with its samples
-_ROUNDS = 3  # of leaving out runs that follow no law
+_AS_BAD = 0.9  # times the worst run
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,28 +94,26 @@ def best_ml_estimate(
         LawlessError: when no run follows one.
         ValueError: when no start leads to a fit: what went wrong from the first.
     """
-    for _ in range(_ROUNDS):
-        entry, found = _from_starts(model, runs, free, starts, dropped, progress, asked)
-        shares = unexplained_motion(found)
-        lawless = is_lawless(shares)
-        if not lawless.any():
-            return entry, found
-        if lawless.all():
-            break
-        # One bad run may take others with it: those that are off nearly as far as the worst leave.
-        worst = lawless & (shares > 0.9 * shares.max())
-        names = {
-            run.name: lawless_sentence(share)
-            for run, share in zip(found.samples, shares[worst], strict=False)
-        }
-        dropped += tuple(DroppedRun(name, why) for name, why in names.items())
-        runs = [run for run in runs if run.name not in names]
-        starts = [entry.values, *starts]
-    least = int(np.argmin(shares))
-    raise LawlessError(
-        f"none of {len(shares)} runs swings freely by this robot's equations; of the best, "
-        f"{found.samples[least].name}, {lawless_sentence(float(shares[least]))}"
-    )
+    entry, found = _from_starts(model, runs, free, starts, dropped, progress, asked)
+    shares = unexplained_motion(found)
+    lawless = is_lawless(shares, refuted=entry.consistency.is_refuted)
+    if not lawless.any():
+        return entry, found
+    if lawless.all():
+        least = int(np.argmin(shares))
+        raise LawlessError(
+            "no run swings freely by this robot's equations; of "
+            f"{found.samples[least].name}, which comes closest, "
+            f"{lawless_sentence(float(shares[least]))}"
+        )
+    # One bad run may take others with it: those that are off nearly as far as the worst leave.
+    worst = {
+        found.samples[run].name: lawless_sentence(float(shares[run]))
+        for run in np.flatnonzero(lawless & (shares > _AS_BAD * shares.max()))
+    }
+    dropped += tuple(DroppedRun(name, why) for name, why in worst.items())
+    kept = [run for run in runs if run.name not in worst]
+    return best_ml_estimate(model, kept, free, [entry.values, *starts], dropped, progress, asked)
 
 
 def _from_starts(

@@ -263,12 +263,14 @@ def usable(prepared: PreparedRuns, full: bool, payload: Payload | None) -> list[
 
 
 def fittable(prepared: PreparedRuns, full: bool) -> list[PreparedRun]:
-    """Runs whose samples can be fitted: a singularity of the free coordinates is no obstacle."""
+    """Runs whose samples can be fitted, with payloads or not.
+
+    A singularity of the free coordinates is no obstacle.
+    """
     return [
         run
         for run in prepared.runs
         if run.run.role == "identify"
-        and run.run.payload is None
         and (run.full is not None if full else set(prepared.free) <= set(run.signals.coordinates))
     ]
 
