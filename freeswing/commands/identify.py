@@ -5,11 +5,15 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING, Any
 
+from cdpr.documents import InputError
 from freeswing.commands.arguments import add_session, open_session
 from freeswing.console import Console
 
 if TYPE_CHECKING:
+    from freeswing.crew import Crew
     from freeswing.session import Session
+
+FURTHER = ("consistent", "entry_std_m", "attachment_std_m")  # settings that are absent by default
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -24,6 +28,19 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--fidim-only", action="store_true", help="leave out the maximum-likelihood fit"
     )
+    parser.add_argument(
+        "--consistent",
+        action="store_true",
+        help="hold the inertia to what a body can have (positive definite pseudo-inertia)",
+    )
+    for flag, what in (("entry", "pulley entry"), ("attachment", "platform attachment")):
+        parser.add_argument(
+            f"--{flag}-std-m",
+            type=float,
+            metavar="STD",
+            help=f"how well every coordinate of the {what} points is known: they are then "
+            "estimated too, by maximum likelihood; default exactly",
+        )
 
 
 def run(options: Namespace, console: Console) -> None:
@@ -32,30 +49,43 @@ def run(options: Namespace, console: Console) -> None:
 
     session = open_session(options)
     settings = {"weighting": options.weighting, "likelihood": not options.fidim_only}
+    further = {name: getattr(options, name) for name in FURTHER}
+    settings |= {name: value for name, value in further.items() if value}
     result = IDENTIFY.take(session, console, settings)
     console.say(str(result))
     console.show_file(result)
 
 
 def make(
-    session: Session, console: Console, settings: dict[str, Any], workers: int
+    session: Session, console: Console, settings: dict[str, Any], crew: Crew
 ) -> list[tuple[str, dict[str, Any]]]:
     """identification.json and motion.json as documents."""
     from freeswing.motions import predicted_motions
     from freeswing.places import swing_places
     from freeswing.swings import load_robot, load_swings, load_target
+    from ident.geometry import GeometryPriors
     from ident.identify import IdentifySettings, identify
 
     robot = load_robot(session)
     swings = load_swings(session, robot, load_target(session))
+    try:
+        geometry = GeometryPriors(settings.get("entry_std_m"), settings.get("attachment_std_m"))
+    except ValueError as error:
+        raise InputError(f"--{str(error).replace('_', '-', 2)}") from error
     chosen = IdentifySettings(
-        weighting=settings["weighting"], maximum_likelihood=settings["likelihood"]
+        weighting=settings["weighting"],
+        maximum_likelihood=settings["likelihood"],
+        consistent=settings.get("consistent", False),
+        geometry=geometry,
     )
     found = identify(list(swings), robot, chosen, console.progress)
     document = found.document()
     document["swings"] = swing_places(robot, found)
     document["entries_m"] = robot.entries_m.tolist()
     _summarise(document, found.best, console)
+    best = found.estimates[found.best]
+    for sentence in dict.fromkeys((*best.notes, best.consistency.sentence())):
+        console.say(f"  {sentence}")
     return [("identification.json", document), ("motion.json", predicted_motions(found))]
 
 
