@@ -14,28 +14,31 @@ from pathlib import Path
 from typing import Any
 
 from freeswing import __version__
+from freeswing.session import Session
 
 PACKAGES = ("numpy", "scipy", "casadi", "opencv-contrib-python-headless", "av", "ezc3d")
 _CHUNK_BYTES = 2**20
 
 
-def provenance(folder: Path, inputs: Iterable[Path], settings: Mapping[str, Any]) -> dict[str, Any]:
+def provenance(
+    session: Session, inputs: Iterable[Path], settings: Mapping[str, Any]
+) -> dict[str, Any]:
     """Versions, settings and the SHA-256 of every input, for a result's `provenance` key.
 
     Args:
-        folder: inputs below it are named relative to it.
+        session: its inputs are named as its folder holds them, wherever that folder is.
         inputs: files and folders; a folder counts with all its files, what is absent is left out.
         settings: the flags that change the result.
     """
     return {
         "versions": {"freeswing": __version__, "python": platform.python_version(), **_versions()},
         "settings": dict(settings),
-        "inputs": hashes(folder, inputs),
+        "inputs": hashes(session, inputs),
     }
 
 
 def is_current(
-    result: Path, folder: Path, inputs: Iterable[Path], settings: Mapping[str, Any]
+    result: Path, session: Session, inputs: Iterable[Path], settings: Mapping[str, Any]
 ) -> bool:
     """Whether `result` was made by this version from these very inputs and settings."""
     try:
@@ -43,15 +46,15 @@ def is_current(
         same_version = made["versions"]["freeswing"] == __version__
         if not same_version or made["settings"] != json.loads(json.dumps(dict(settings))):
             return False
-        return made["inputs"] == hashes(folder, inputs)
+        return made["inputs"] == hashes(session, inputs)
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return False
 
 
-def hashes(folder: Path, inputs: Iterable[Path]) -> dict[str, str]:
-    """SHA-256 of each input file that is there, by its name seen from `folder`."""
+def hashes(session: Session, inputs: Iterable[Path]) -> dict[str, str]:
+    """SHA-256 of each input file that is there, by its name in the session."""
     files = {file for place in inputs for file in _files(place)}
-    return {_name(file, folder): _sha256(file) for file in sorted(files)}
+    return {_name(file, session): _sha256(file) for file in sorted(files)}
 
 
 def _files(place: Path) -> list[Path]:
@@ -60,7 +63,11 @@ def _files(place: Path) -> list[Path]:
     return [place] if place.is_file() else []
 
 
-def _name(file: Path, folder: Path) -> str:
+def _name(file: Path, session: Session) -> str:
+    """Results have the same name wherever they are kept: the same inputs, the same file."""
+    if file.is_relative_to(session.results):
+        return f"results/{file.relative_to(session.results).as_posix()}"
+    folder = session.folder
     return (file.relative_to(folder) if file.is_relative_to(folder) else file).as_posix()
 
 

@@ -11,12 +11,13 @@ from typing import Any
 
 from cdpr.documents import write_json
 from freeswing.console import Console
+from freeswing.crew import Crew
 from freeswing.provenance import is_current, provenance
 from freeswing.session import Session
 from freeswing.swings import trajectory_path
 
 Documents = list[tuple[str, dict[str, Any]]]
-Make = Callable[[Session, Console, dict[str, Any], int], Documents]
+Make = Callable[[Session, Console, dict[str, Any], Crew], Documents]
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +25,7 @@ class Stage:
     """One step that a command of the same name takes.
 
     Attributes:
-        name: of the command, whose module holds `make(session, console, settings, workers)`:
+        name: of the command, whose module holds `make(session, console, settings, crew)`:
             it gives the result documents, by their file's name, the main one first.
         result: main result file below the results folder.
         inputs: what it reads.
@@ -41,24 +42,24 @@ class Stage:
     def is_current(self, session: Session) -> bool:
         """Whether the result is there and made from what is there now."""
         result = session.results / self.result
-        return is_current(result, session.folder, self.inputs(session), self.settings)
+        return is_current(result, session, self.inputs(session), self.settings)
 
     def take(
         self,
         session: Session,
         console: Console,
         settings: dict[str, Any] | None = None,
-        workers: int = 0,
+        crew: Crew | None = None,
     ) -> Path:
         """Make the result from scratch and write it with its provenance.
 
-        `workers` processes serve, 0 for one a core; they do not change the result.
+        The crew (one process a core where None) does not change it.
         """
         chosen = self.settings | (settings or {})
         # Inputs are hashed first: what changes meanwhile makes the result out of date.
-        made_of = provenance(session.folder, self.inputs(session), chosen)
+        made_of = provenance(session, self.inputs(session), chosen)
         make: Make = importlib.import_module(f"freeswing.commands.{self.name}").make
-        documents = make(session, console, chosen, workers)
+        documents = make(session, console, chosen, crew or Crew())
         for name, document in reversed(documents):
             write_json(session.results / name, {**document, "provenance": made_of})
         return session.results / self.result
@@ -86,7 +87,10 @@ def _tracking_files(session: Session) -> list[Path]:
 
 
 def _motion_files(session: Session) -> list[Path]:
-    return [*_robot_files(session), *(trajectory_path(session, run) for run in session.runs)]
+    # Beside the tracks stands what the calibration may do to all of them.
+    tracking = [session.results / "tracking.json"] if session.video_runs else []
+    tracks = (trajectory_path(session, run) for run in session.runs)
+    return [*_robot_files(session), *tracks, *tracking]
 
 
 def _needs_calibration(session: Session) -> bool:

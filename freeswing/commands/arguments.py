@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from contextlib import AbstractContextManager
+
+    from freeswing.crew import Crew
     from freeswing.session import Session
 
 
@@ -22,9 +26,14 @@ def add_results(parser: ArgumentParser, usual: str) -> None:
 
 
 def add_workers(parser: ArgumentParser) -> None:
-    """How many processes work side by side."""
+    """Who works side by side."""
     parser.add_argument(
         "--workers", type=int, default=0, metavar="N", help="processes; default one a core"
+    )
+    parser.add_argument(
+        "--cluster",
+        metavar="ADDRESS",
+        help="hand recordings and refits to the Dask cluster whose scheduler is there",
     )
 
 
@@ -32,4 +41,14 @@ def open_session(options: Namespace) -> Session:
     """The session that the flags of `add_session` name."""
     from freeswing.session import read_session
 
-    return read_session(options.session, options.results)
+    session, results = options.session, options.results
+    if getattr(options, "cluster", None):  # whose workers start in other folders
+        session, results = Path(session).resolve(), results and Path(results).resolve()
+    return read_session(session, results)
+
+
+def crew_of(options: Namespace, session: Session) -> AbstractContextManager[Crew]:
+    """Those whom the flags of `add_workers` name."""
+    from freeswing.crew import crew_for
+
+    return crew_for(session, options.workers, options.cluster)

@@ -9,6 +9,7 @@ from freeswing.commands.arguments import add_session, open_session
 from freeswing.console import Console
 
 if TYPE_CHECKING:
+    from freeswing.crew import Crew
     from freeswing.session import Session
 
 
@@ -30,7 +31,7 @@ def run(options: Namespace, console: Console) -> None:
 
 
 def make(
-    session: Session, console: Console, settings: dict[str, Any], workers: int
+    session: Session, console: Console, settings: dict[str, Any], crew: Crew
 ) -> list[tuple[str, dict[str, Any]]]:
     """cameras.toml on disk, and calibration.json as a document."""
     from calib.calibrate import calibrate_session

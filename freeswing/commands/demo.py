@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from freeswing.commands.arguments import add_workers
+from freeswing.commands.arguments import add_workers, crew_of
 from freeswing.console import Console
 
 
@@ -28,11 +28,13 @@ def run(options: Namespace, console: Console) -> None:
     from freeswing.session import read_session
 
     folder = Path(options.folder)
+    folder = folder.resolve() if options.cluster else folder
     if folder.exists() and not (folder / "truth.json").is_file() and any(folder.iterdir()):
         raise InputError(f"{folder}: holds other files; name a new folder")
     console.say(f"recording a session into {folder} (its truth.json is not read by what follows)")
     session = read_session(_record(folder, options, console))
-    run_session(session, console, options.workers)
+    with crew_of(options, session) as crew:
+        run_session(session, console, crew)
     console.show_file(session.results / "identification.json")
 
 

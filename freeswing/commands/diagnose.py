@@ -5,10 +5,11 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING, Any
 
-from freeswing.commands.arguments import add_session, add_workers, open_session
+from freeswing.commands.arguments import add_session, add_workers, crew_of, open_session
 from freeswing.console import Console
 
 if TYPE_CHECKING:
+    from freeswing.crew import Crew
     from freeswing.session import Session
 
 
@@ -29,13 +30,14 @@ def run(options: Namespace, console: Console) -> None:
     from freeswing.stages import DIAGNOSE
 
     session = open_session(options)
-    result = DIAGNOSE.take(session, console, {"only": options.only}, options.workers)
+    with crew_of(options, session) as crew:
+        result = DIAGNOSE.take(session, console, {"only": options.only}, crew)
     console.say(str(result))
     console.show_file(result)
 
 
 def make(
-    session: Session, console: Console, settings: dict[str, Any], workers: int
+    session: Session, console: Console, settings: dict[str, Any], crew: Crew
 ) -> list[tuple[str, dict[str, Any]]]:
     """diagnosis.json and diagnosis_motion.json as documents."""
     import os
@@ -53,8 +55,8 @@ def make(
     robot = load_robot(session)
     swings = list(load_swings(session, robot, load_target(session)))
     candidates = None if only is None else tuple(only)
-    count = workers or os.cpu_count() or 1
-    found = diagnose(swings, robot, console.progress, count, candidates)
+    count = crew.processes or os.cpu_count() or 1
+    found = diagnose(swings, robot, console.progress, count, candidates, crew.executor)
     document = found.document()
     _summarise(document, console)
     return [("diagnosis.json", document), ("diagnosis_motion.json", ladder_motions(found.ladder))]

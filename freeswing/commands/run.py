@@ -5,10 +5,11 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING
 
-from freeswing.commands.arguments import add_session, add_workers, open_session
+from freeswing.commands.arguments import add_session, add_workers, crew_of, open_session
 from freeswing.console import Console
 
 if TYPE_CHECKING:
+    from freeswing.crew import Crew
     from freeswing.session import Session
 
 
@@ -21,11 +22,12 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(options: Namespace, console: Console) -> None:
     """Take each step that is due; the page is always written anew."""
     session = open_session(options)
-    run_session(session, console, options.workers)
+    with crew_of(options, session) as crew:
+        run_session(session, console, crew)
     console.show_file(session.results / "identification.json")
 
 
-def run_session(session: Session, console: Console, workers: int = 0) -> None:
+def run_session(session: Session, console: Console, crew: Crew) -> None:
     """All steps of a session, then the report, whose path is said last."""
     from freeswing.commands.report import write_report
     from freeswing.stages import STAGES
@@ -37,5 +39,5 @@ def run_session(session: Session, console: Console, workers: int = 0) -> None:
             console.say(f"{stage.name}: up to date")
         else:
             console.say(f"{stage.name}:")
-            stage.take(session, console, workers=workers)
+            stage.take(session, console, crew=crew)
     console.say(str(write_report(session)))

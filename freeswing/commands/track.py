@@ -5,10 +5,11 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING, Any
 
-from freeswing.commands.arguments import add_session, add_workers, open_session
+from freeswing.commands.arguments import add_session, add_workers, crew_of, open_session
 from freeswing.console import Console
 
 if TYPE_CHECKING:
+    from freeswing.crew import Crew
     from freeswing.session import Session
 
 
@@ -32,13 +33,14 @@ def run(options: Namespace, console: Console) -> None:
 
     session = open_session(options)
     settings = {"correct_rig": not options.trust_cameras, "refine_layout": options.refine_layout}
-    result = TRACK.take(session, console, settings, options.workers)
+    with crew_of(options, session) as crew:
+        result = TRACK.take(session, console, settings, crew)
     console.say(str(result))
     console.show_file(result)
 
 
 def make(
-    session: Session, console: Console, settings: dict[str, Any], workers: int
+    session: Session, console: Console, settings: dict[str, Any], crew: Crew
 ) -> list[tuple[str, dict[str, Any]]]:
     """The tracks on disk, and tracking.json as a document."""
     from calib.cameras_file import read_cameras
@@ -60,7 +62,8 @@ def make(
         base_tags=session.calibration.base_tags if session.calibration else (),
         frame_rate_hz=session.frame_rate_hz,
         settings=Settings(**settings),
-        workers=workers,
+        workers=crew.processes,
+        executor=crew.executor,
         progress=console.progress,
     )
     _summarise(document, console)

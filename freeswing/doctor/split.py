@@ -27,15 +27,15 @@ def split_findings(session: Session, swings: Sequence[SwingRun]) -> Iterator[Fin
     if "validate" not in roles:
         text = "none has the role validate: nothing can be checked on held-out data"
         yield Finding("warning", "runs", text, "keep a third of the runs for it")
-    yield from _same_recording(session.runs)
+    yield from _same_recording(session)
     yield from _same_samples(swings)
 
 
-def _same_recording(runs: Sequence[Run]) -> Iterator[Finding]:
+def _same_recording(session: Session) -> Iterator[Finding]:
     """Runs that read the same file, or files with the same bytes."""
     by_content: dict[tuple[str, ...], list[Run]] = defaultdict(list)
-    for run in runs:
-        content = tuple(hashes(Path("/"), [run.trajectory or run.video or Path()]).values())
+    for run in session.runs:
+        content = tuple(hashes(session, [run.trajectory or run.video or Path()]).values())
         if content:
             by_content[content].append(run)
     for same in by_content.values():
