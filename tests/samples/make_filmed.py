@@ -43,8 +43,8 @@ LENSES = {
 }
 CLOCK_OFFSETS_S = {"left": 0.0, "right": 0.0031}
 CENTRE_M = np.array([1.2, -0.15, -0.22])
-RATE_HZ = 25.0
-FILMED_S = (0.2, 4.2)
+RATE_HZ = 20.0
+FILMED_S = (0.2, 5.6)
 BOARD_S = 4.0
 BOARD_RATE_HZ = 8.0
 SPLINE_HZ = 400.0
@@ -112,7 +112,7 @@ def film(folder: Path, scene: Scene, stamps_s: np.ndarray) -> None:
 
 def _squeeze(path: Path, size_px: tuple[int, int], frames: Iterator[np.ndarray]) -> None:
     with av.open(str(path), "w") as container:
-        stream = container.add_stream("libx264", rate=Fraction(25), options=CODEC)
+        stream = container.add_stream("libx264", rate=Fraction(round(RATE_HZ)), options=CODEC)
         stream.width, stream.height = size_px
         stream.pix_fmt = "gray"
         stream.codec_context.thread_count = 1
