@@ -69,9 +69,13 @@ def likelihood(runs: list[SwingRun], start: Array, at: list[Motion] | None = Non
 
 
 def bound_of(motions: list[Motion], error_m: float) -> Array:
-    """Cramer-Rao standard deviations of the nine parameters at the truth, (9,)."""
-    quiet = runs_of(motions, np.random.default_rng(0), 0.0, 0.0)
-    told = [replace(run, lengths_std_m=error_m or KNOWN_LENGTHS_STD_M) for run in quiet]
+    """Cramer-Rao standard deviations of the nine parameters, (9,).
+
+    Taken at a fit from the truth to noisy samples: without noise the residuals are the
+    integrator's, whose colour the fit would take for a model error and enlarge its covariance.
+    """
+    runs = runs_of(motions, np.random.default_rng(0), NOISE_M, 0.0)
+    told = [replace(run, lengths_std_m=error_m or KNOWN_LENGTHS_STD_M) for run in runs]
     return likelihood(told, TRUE_INERTIA, motions).std
 
 

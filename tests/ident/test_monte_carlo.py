@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from benchmarks.identify_monte_carlo import (
-    KNOWN_LENGTHS_STD_M,
     NOISE_M,
+    bound_of,
     likelihood,
     runs_of,
 )
@@ -28,10 +26,7 @@ def test_maximum_likelihood_reaches_the_bound_and_fidim_stays_far_off(length_err
     """Thirty-six errors over their bounds: their root mean square is 1 within its own spread."""
     model = paper_model()
     motions = [tilted_swing(k) for k in REGULAR[:6]]
-    quiet = runs_of(motions, np.random.default_rng(0), 0.0, 0.0)
-    std = length_error_m or KNOWN_LENGTHS_STD_M
-    quiet = [replace(run, lengths_std_m=std) for run in quiet]
-    bound = likelihood(quiet, TRUE_INERTIA, motions).std
+    bound = bound_of(motions, length_error_m)
     by_ml, by_fidim, covered = [], [], []
     for draw in range(DRAWS):
         runs = runs_of(motions, np.random.default_rng([7, draw]), NOISE_M, length_error_m)
