@@ -6,20 +6,22 @@ do, and base points carry their survey as prior. The algebra is in `calib.normal
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
 from calib.camera_models import Array
 from calib.normal_equations import (
-    HUBER_SIGMAS,
+    WITHIN_KNEE,
+    Normal,
     Problem,
     covariances,
     damped_step,
+    length_with_share,
     normal_equations,
 )
 from calib.reprojection import Scene, board_residuals, fixed_residuals, moved
-from calib.views import relative_std
 
 MOST_ITERATIONS = 60
 # expected fall of the cost at which to stop, in units where one residual of 1 sigma counts 1/2
@@ -35,7 +37,7 @@ class Adjustment:
     Attributes:
         scene: the estimate.
         covariance: of the shared unknowns (zero where held), (p, p).
-        board_covariances: of the board poses (dt, dr), (n_moments, 6, 6).
+        board_covariances: of the board motions, from (dt, dr) on, (n_pieces, b, b).
         sigma_px: noise of each camera's typical corner, each axis, (n_cameras,).
         residuals_px: board residuals, NaN where unseen, (n_views, n_points, 2).
         fixed_residuals_px: residuals of the fixed points, (m, 2).
@@ -78,16 +80,19 @@ def adjust(
         converged: expected fall of the cost at which to stop.
     """
     iterations, stop, cost = 0, "", np.inf
-    sigma = _noise(scene, problem, None) if sigma_px is None else np.array(sigma_px, dtype=float)
+    residuals = board_residuals(scene, problem.board_points_m, problem.views)
+    first = _noise(scene, problem, residuals, None) if sigma_px is None else sigma_px
+    sigma = np.array(first, dtype=np.float64)
     for turn in range(rounds):
         if turn:
-            sigma = _noise(scene, problem, sigma)
+            sigma = _noise(scene, problem, residuals, sigma)
         scene, cost, steps, stop = _minimise(scene, problem, sigma, converged)
+        residuals = board_residuals(scene, problem.board_points_m, problem.views)
         iterations += steps
-    sigma = _noise(scene, problem, sigma)
+    sigma = _noise(scene, problem, residuals, sigma)
     normal = normal_equations(scene, problem, sigma)
     covariance, boards, rank, weakest, condition = covariances(normal, problem.free)
-    residuals, fixed = _all_residuals(scene, problem)
+    fixed = np.zeros((0, 2)) if problem.fixed is None else fixed_residuals(scene, problem.fixed)
     return Adjustment(
         scene, covariance, boards, sigma, residuals, fixed, cost, rank, weakest, condition,
         iterations, stop,
@@ -98,103 +103,71 @@ def _minimise(
     scene: Scene, problem: Problem, sigma: Array, converged: float
 ) -> tuple[Scene, float, int, str]:
     damping, growth = 1e-4, 4.0
-    cost = _cost(scene, problem, sigma)
     normal = normal_equations(scene, problem, sigma)
     for iteration in range(1, MOST_ITERATIONS + 1):
         shared, boards = damped_step(normal, problem.free, damping)
         fall = float(shared @ normal.shared_slope + np.sum(boards * normal.board_slopes)) / 2.0
         if not np.isfinite(fall):
-            return scene, cost, iteration, "the normal equations cannot be solved"
+            return scene, normal.cost, iteration, "the normal equations cannot be solved"
         trial = moved(scene, shared, boards)
-        trial_cost = _cost(trial, problem, sigma)
-        if trial_cost <= cost:
-            scene, cost = trial, trial_cost
+        new: Normal = normal_equations(trial, problem, sigma)
+        if new.cost <= normal.cost:
+            scene, normal = trial, new
             if fall < converged and damping <= 1e-3:
-                return scene, cost, iteration, "converged"
-            normal = normal_equations(scene, problem, sigma)
+                return scene, normal.cost, iteration, "converged"
             damping, growth = max(damping * 0.1, 1e-12), 4.0
         elif fall < converged:
-            return scene, cost, iteration, "converged to rounding"
+            return scene, normal.cost, iteration, "converged to rounding"
         else:
             damping, growth = damping * growth, growth * 2.0
-    return scene, cost, MOST_ITERATIONS, f"stopped after {MOST_ITERATIONS} steps"
+    return scene, normal.cost, MOST_ITERATIONS, f"stopped after {MOST_ITERATIONS} steps"
 
 
-def _all_residuals(scene: Scene, problem: Problem) -> tuple[Array, Array]:
-    board = np.full(problem.views.pixels.shape, np.nan)
-    for index in range(len(scene.cameras)):
-        own = problem.views.camera == index
-        views = problem.views.select(own)
-        board[own] = board_residuals(scene, problem.board_points_m, views, index)
-    fixed = problem.fixed
-    if fixed is None:
-        return board, np.zeros((0, 2))
-    return board, fixed_residuals(scene, fixed)
-
-
-def _cost(scene: Scene, problem: Problem, sigma: Array) -> float:
-    board, fixed = _all_residuals(scene, problem)
-    seen = problem.views.seen
-    noise = sigma[problem.views.camera][:, None] * relative_std(problem.views)
-    errors = [np.hypot(*np.moveaxis(board, -1, 0)) / noise]
-    errors[0] = errors[0][seen]
-    prior = 0.0
-    if problem.fixed is not None:
-        noise = sigma[problem.fixed.camera] * problem.fixed.std_scale
-        errors.append(np.hypot(fixed[:, 0], fixed[:, 1]) / noise)
-        change = (scene.base_points_m - problem.fixed.points_base_m) / problem.fixed.std_m[:, None]
-        prior = 0.5 * float(np.sum(change**2))
-    error = np.concatenate(errors)
-    if not np.isfinite(error).all():
-        return np.inf
-    knee = HUBER_SIGMAS
-    loss = np.where(error < knee, 0.5 * error**2, knee * error - 0.5 * knee**2)
-    return float(loss.sum()) + prior
-
-
-def _noise(scene: Scene, problem: Problem, last: Array | None) -> Array:
+def _noise(scene: Scene, problem: Problem, residuals: Array, last: Array | None) -> Array:
     """Noise of each camera's typical corner: rms of residuals within the knee, freedom-corrected.
 
     The first call has no scale and takes the median; cameras without views get the others' mean.
     """
-    board, _ = _all_residuals(scene, problem)
-    board = board / relative_std(problem.views)[..., None]
-    count = len(scene.cameras)
-    sigma = np.full(count, np.nan)
-    for index in range(count):
-        residuals = board[problem.views.camera == index]
-        length = np.hypot(residuals[..., 0], residuals[..., 1])
+    white = problem.views.whitened(residuals)
+    size = white.shape[-1]
+    lengths = np.linalg.norm(white, axis=-1)
+    knee = length_with_share(WITHIN_KNEE, size)
+    middle = length_with_share(0.5, size)
+    sigma = np.full(len(scene.cameras), np.nan)
+    for index in range(len(sigma)):
+        length = lengths[problem.views.camera == index]
         length = length[np.isfinite(length)]
         if not length.size:
             continue
-        median = max(float(np.median(length)) / MEDIAN_OF_RAYLEIGH, 1e-4)
+        median = max(float(np.median(length)) / middle, 1e-4)
         if last is None:
             sigma[index] = median
             continue
-        inside = length < HUBER_SIGMAS * median
-        freedom = 1.0 - _unknowns_per_residual(problem, index)
-        mean_square = float(np.mean(length[inside] ** 2)) / 2.0 / _kept_share()
+        inside = length < knee * median
+        freedom = 1.0 - _unknowns_per_residual(scene, problem, index)
+        mean_square = float(np.mean(length[inside] ** 2)) / size / _kept_share(size)
         sigma[index] = np.sqrt(mean_square / max(freedom, 0.1))
     known = np.isfinite(sigma)
     return np.where(known, sigma, sigma[known].mean() if known.any() else 1.0)
 
 
-def _kept_share() -> float:
-    """Mean square of a unit 2-D normal error cut at the knee, over its full value."""
-    knee2 = HUBER_SIGMAS**2 / 2.0
-    inside = 1.0 - np.exp(-knee2)
-    return float((1.0 - np.exp(-knee2) * (1.0 + knee2)) / inside)
+@cache
+def _kept_share(size: int) -> float:
+    """Mean square of a unit normal error in `size` axes cut at the knee, over its full value."""
+    from scipy.special import gammainc
+
+    knee = length_with_share(WITHIN_KNEE, size)
+    return float(gammainc(size / 2.0 + 1.0, knee**2 / 2.0)) / WITHIN_KNEE
 
 
-def _unknowns_per_residual(problem: Problem, index: int) -> float:
+def _unknowns_per_residual(scene: Scene, problem: Problem, index: int) -> float:
     """Share of a camera's residuals that its unknowns, and its share of the boards', use up."""
     seen = problem.views.seen.sum(axis=1).astype(float)
-    per_moment = np.bincount(problem.views.moment, weights=seen)
+    per_piece = np.bincount(problem.views.piece, weights=seen)
     own = problem.views.camera == index
-    boards = float(np.sum(6.0 * seen[own] / per_moment[problem.views.moment[own]]))
-    return (boards + problem.free.sum() / (problem.views.camera.max() + 1)) / (
-        2.0 * seen[own].sum()
-    )
+    piece = problem.views.piece[own]
+    boards = float(np.sum(scene.board_unknowns * seen[own] / per_piece[piece]))
+    return (boards + problem.free.sum() / len(scene.cameras)) / (2.0 * seen[own].sum())
 
 
 def named(scene: Scene) -> list[str]:
@@ -208,8 +181,3 @@ def named(scene: Scene) -> list[str]:
     names += ["board.sag_x_m", "board.sag_y_m", "board.tag_growth_m"]
     points = range(len(scene.base_points_m))
     return names + [f"base_point_{index}.{axis}_m" for index in points for axis in "xyz"]
-
-
-def with_free(problem: Problem, free: np.ndarray) -> Problem:
-    """The same problem with other unknowns free."""
-    return replace(problem, free=free)

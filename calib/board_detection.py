@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from calib.boards import Board
 from calib.camera_models import Array
-from calib.corners import fit_tag, rimmed_cells
+from calib.corners import TagFit, fit_tag, rimmed_cells
 from calib.tag_patterns import cut_dictionary
 
 Image = NDArray[np.uint8]
@@ -26,6 +26,25 @@ _WINDOW_MARGIN = 0.3
 _WINDOW_MARGIN_PX = 6.0
 _LEAST_EXPLAINED = 0.8
 _LEAST_STD_PX = 0.003
+
+
+@dataclass(frozen=True, slots=True)
+class BoardCorners:
+    """A board's corners in one image.
+
+    Attributes:
+        pixels: x, y, NaN where unseen, (n_points, 2).
+        covariance_px2: of each group of c corners that were found together (four of a tag, one of
+            a chessboard), (n_points / c, 2 c, 2 c); the chessboard's is the identity.
+    """
+
+    pixels: Array
+    covariance_px2: Array
+
+    @property
+    def count(self) -> int:
+        """Corners found."""
+        return int(np.isfinite(self.pixels[:, 0]).sum())
 
 
 @dataclass(slots=True)
@@ -45,23 +64,32 @@ class BoardDetector:
             cut = cut_dictionary(self.board.dictionary, ids)
             self._tags = [(border, _tag_detector(cut, border)) for border in borders]
 
-    def detect(self, image: Image) -> Array | None:
-        """Corners x, y in pixels and their standard deviation, (n_points, 3), NaN where unseen.
+    @property
+    def border_cells(self) -> int:
+        """Width of the tags' black border in cells, as last found."""
+        return self._tags[0][0] if self._tags else 1
 
-        None when there is no board.
-        """
+    def nothing(self) -> BoardCorners:
+        """No corner at all."""
+        size = 1 if self.board.kind == "chessboard" else 4
+        blank = np.full((self._points // size, 2 * size, 2 * size), np.nan)
+        return BoardCorners(np.full((self._points, 2), np.nan), blank)
+
+    def detect(self, image: Image) -> BoardCorners | None:
+        """The board's corners with their covariance; None when there is no board."""
         if self.board.kind == "chessboard":
             corners = self._find_chessboard(image)
-            return None if corners is None else np.column_stack([corners, np.ones(len(corners))])
-        best: Array | None = None
+            alike = np.tile(np.eye(2), (self._points, 1, 1))
+            return None if corners is None else BoardCorners(corners, alike)
+        best = self.nothing()
         for border, detector in self._tags:
             found = self._tag_corners(image, border, detector)
-            if best is None or _count(found) > _count(best):
+            if found.count > best.count:
                 best = found
-            if _count(best) >= 4 * LEAST_CORNERS:
+            if best.count >= 4 * LEAST_CORNERS:
                 self._tags = [(border, detector)]  # the border is printed one way only
                 break
-        return best if best is not None and _count(best) >= LEAST_CORNERS else None
+        return best if best.count >= LEAST_CORNERS else None
 
     def _find_chessboard(self, image: Image) -> Array | None:
         size = (self.board.columns, self.board.rows)
@@ -71,25 +99,28 @@ class BoardDetector:
             return None
         return _oriented(image, np.reshape(corners, (*size[::-1], 2)).astype(float))
 
-    def _tag_corners(self, image: Image, border: int, detector: cv2.aruco.ArucoDetector) -> Array:
-        """Fitted corners of every tag that is found, and their noise, (n_points, 3)."""
-        corners = np.full((self._points, 3), np.nan)
+    def _tag_corners(
+        self, image: Image, border: int, detector: cv2.aruco.ArucoDetector
+    ) -> BoardCorners:
+        """Fitted corners of every tag that is found."""
+        corners = self.nothing()
         quads, ids, _ = detector.detectMarkers(image)
-        for quad, tag in zip(quads, [] if ids is None else np.ravel(ids).tolist(), strict=True):
+        for quad, tag in zip(quads, [] if ids is None else map(int, np.ravel(ids)), strict=True):
             cells = rimmed_cells(
                 self.board.dictionary,
-                int(tag),
+                tag,
                 border,
                 corner_squares=self.board.kind == "aprilgrid",
             )
-            fitted = _fitted(image, np.reshape(quad, (4, 2)).astype(float), cells)
-            if fitted is not None:
-                corners[4 * tag : 4 * tag + 4] = fitted
+            fit = _fitted(image, np.reshape(quad, (4, 2)).astype(float), cells)
+            if fit is not None:
+                corners.pixels[4 * tag : 4 * tag + 4] = fit.rays
+                corners.covariance_px2[tag] = fit.rays_covariance + _LEAST_STD_PX**2 * np.eye(8)
         return corners
 
 
-def _fitted(image: Image, quad: Array, cells: Array) -> Array | None:
-    """Corners TL TR BR BL of a tag's pattern fitted around a guess, and their noise, (4, 3)."""
+def _fitted(image: Image, quad: Array, cells: Array) -> TagFit | None:
+    """The tag's pattern fitted around a guess of its corners, in pixels."""
     low, high = quad.min(axis=0), quad.max(axis=0)
     margin = _WINDOW_MARGIN * float((high - low).max()) + _WINDOW_MARGIN_PX
     left, top = np.maximum(np.floor(low - margin), 0).astype(int)
@@ -98,14 +129,7 @@ def _fitted(image: Image, quad: Array, cells: Array) -> Array | None:
     rows, columns = np.indices(window.shape)
     rays = np.stack([columns + left, rows + top], axis=-1).astype(np.float64)
     fit = fit_tag(window, rays, quad, quad - [left, top], cells)
-    if fit is None or fit.explained < _LEAST_EXPLAINED:
-        return None
-    variance = np.diag(fit.rays_covariance).reshape(4, 2).mean(axis=1)
-    return np.column_stack([fit.rays, np.hypot(np.sqrt(variance), _LEAST_STD_PX)])
-
-
-def _count(corners: Array) -> int:
-    return int(np.isfinite(corners[:, 0]).sum())
+    return None if fit is None or fit.explained < _LEAST_EXPLAINED else fit
 
 
 def _tag_detector(cut: cv2.aruco.Dictionary, border_bits: int) -> cv2.aruco.ArucoDetector:

@@ -17,6 +17,7 @@ from calib.camera_models import Array
 from calib.cameras_file import write_cameras
 from calib.clocks import board_moves, coarse_offsets_s
 from calib.intrinsics import CameraStart
+from calib.lens_bend import straightened
 from calib.recordings import find_recordings
 from calib.rig import Rig, solve_rig, start_cameras, tie_to_base
 from calib.sightings import Sightings, gather, see_boards
@@ -98,7 +99,7 @@ def calibrate_session(
         lambda label, share: told(label, 0.7 * share),
     )
     told("adjusting", 0.7)
-    rig, alone_px, n_moments = _board_rig(sightings, board, frame_rate_hz, model)
+    rig, alone_px = rig_from_sightings(sightings, board, frame_rate_hz, model)
     warnings: list[str] = []
     survey: SurveyCheck | None = None
     if base_tags:
@@ -115,7 +116,7 @@ def calibrate_session(
     told("checking against truth", 0.9)
     verdict = judge(rig, check_truth(rig, board.edges), survey, alone_px)
     verdict = replace(verdict, warnings=(*warnings, *verdict.warnings))
-    document = _document(rig, board, sightings, verdict, n_moments)
+    document = _document(rig, board, sightings, verdict)
     if results_folder is not None:
         write_json(Path(results_folder) / "calibration.json", document)
     if not verdict.usable:
@@ -126,29 +127,38 @@ def calibrate_session(
     return CalibrationResult(rig.cameras, document, rig)
 
 
-def _board_rig(
-    sightings: tuple[Sightings, ...], board: Board, frame_rate_hz: float | None, model: str
-) -> tuple[Rig, Array, int]:
-    """The rig from the board, what each camera reached alone (px), and the number of moments."""
+def rig_from_sightings(
+    sightings: tuple[Sightings, ...],
+    board: Board,
+    frame_rate_hz: float | None,
+    model: str = DEFAULT_MODEL,
+) -> tuple[Rig, Array]:
+    """The rig in a frame of its own, and what each camera reached alone, px.
+
+    Raises:
+        DataError: when a camera never sees the board or the sightings make no rig.
+    """
     for camera in sightings:
         if len(camera.numbers) == 0:
             raise DataError(
                 f"camera {camera.name}: the board was found in none of {camera.n_frames} frames; "
                 "check the board's kind and numbers in session.toml, focus and light"
             )
-    views, times = gather(sightings, frame_rate_hz)
-    starts = _starts(sightings, board, model, views)
+    seen = gather(sightings, frame_rate_hz)
+    starts = _starts(sightings, board, model, seen.views)
     offsets = np.zeros(len(sightings))
-    moving = board_moves(views.velocity_px_s, views.camera, len(sightings))
-    if moving:
-        stamps = tuple(times[start.views.moment] + start.views.lag_s for start in starts)
+    line = seen.line
+    if line is not None and board_moves(seen.speed_px_s, seen.views.camera, len(sightings)):
+        stamps = tuple(line.times_s[start.views.moment] + start.views.lag_s for start in starts)
         offsets = coarse_offsets_s(starts, stamps)
-        views, times = gather(sightings, frame_rate_hz, offsets)
-        views = views.select(np.abs(views.velocity_px_s).max(axis=(1, 2)) > 0.0)
-        starts = _starts(sightings, board, model, views)
+        seen = gather(sightings, frame_rate_hz, offsets)
+        line = seen.line
+        starts = _starts(sightings, board, model, seen.views)
+    else:
+        line = None
     alone = np.array([start.rms_px for start in starts])
-    rig = solve_rig(board.points_m, starts, offsets, clocks=moving)
-    return rig, alone, len(times)
+    rig = solve_rig(board.points_m, starts, offsets, line)
+    return rig, alone
 
 
 def _starts(
@@ -156,7 +166,11 @@ def _starts(
 ) -> tuple[CameraStart, ...]:
     names = tuple(camera.name for camera in sightings)
     sizes = tuple(camera.size_px for camera in sightings)
-    return start_cameras(names, sizes, (model,) * len(names), board.points_m, views)
+    starts = start_cameras(names, sizes, (model,) * len(names), board.points_m, views)
+    return tuple(
+        straightened(start, board, camera.border_cells)
+        for start, camera in zip(starts, sightings, strict=True)
+    )
 
 
 def _moved_warnings(moved: tuple[tuple[str, float], ...]) -> list[str]:
@@ -179,7 +193,6 @@ def _document(
     board: Board,
     sightings: tuple[Sightings, ...],
     verdict: Verdict,
-    n_moments: int,
 ) -> dict[str, Any]:
     entries = camera_entries(rig)
     for entry, camera, judged in zip(entries, sightings, verdict.by_camera, strict=True):
@@ -196,7 +209,7 @@ def _document(
         "base_frame": _base_frame(rig),
         "cameras": entries,
         "checks": verdict.checks,
-        "moments": n_moments,
+        "moments": len(np.unique(rig.problem.views.moment)),
         "board": {
             "kind": board.kind,
             "points": len(board.points_m),

@@ -17,6 +17,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from calib.lens_kernels import lens_jacobians, lens_pixels
+
 Array = NDArray[np.float64]
 
 FULL_NAMES = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
@@ -43,10 +45,16 @@ def _selection(model: str) -> Array:
             selection[row, column] = full_name == name or (
                 name == "f" and full_name in ("fx", "fy")
             )
-    return selection
+    return np.eye(len(FULL_NAMES), 8) if model == FISHEYE else selection
 
 
-_SELECTIONS = {model: _selection(model) for model in PARAMETER_NAMES if model != FISHEYE}
+_SELECTIONS = {model: _selection(model) for model in PARAMETER_NAMES}
+
+
+def parameter_columns(model: str) -> NDArray[np.int64]:
+    """Which of a model's parameters each entry of the full list is, -1 for none, (12,)."""
+    selection = _SELECTIONS[model]
+    return np.where(selection.any(axis=1), selection.argmax(axis=1), -1)
 
 
 def focal_and_centre(model: str, params: Array) -> tuple[Array, Array]:
@@ -57,26 +65,32 @@ def focal_and_centre(model: str, params: Array) -> tuple[Array, Array]:
 
 
 def full_parameters(model: str, params: Array) -> Array:
-    """The perspective model's parameters as the full list `FULL_NAMES`, (12,)."""
+    """The parameters as the full list `FULL_NAMES`, the fisheye's in its first eight, (12,)."""
     return _SELECTIONS[model] @ params
 
 
 def project(model: str, points: Array, params: Array) -> Array:
     """Pixels (..., 2) of camera-frame points (..., 3); NaN where the model cannot see them."""
-    if model == FISHEYE:
-        return _fisheye(points, params, jacobians=False)[0]
-    return _perspective(points, full_parameters(model, params), jacobians=False)[0]
+    flat = _flat(points)
+    pixels = lens_pixels(model == FISHEYE, full_parameters(model, params), flat)
+    return pixels.reshape(*points.shape[:-1], 2)
 
 
 def project_jacobian(model: str, points: Array, params: Array) -> tuple[Array, Array, Array]:
     """Pixels (..., 2) with their derivatives by the point (..., 2, 3) and params (..., 2, k)."""
-    if model == FISHEYE:
-        return _fisheye(points, params, jacobians=True)
     full = full_parameters(model, params)
-    pixels, d_point, d_full = _perspective(points, full, jacobians=True)
-    if model == "FULL_OPENCV":
-        return pixels, d_point, d_full
-    return pixels, d_point, d_full @ _SELECTIONS[model]
+    pixels, d_point, d_full = lens_jacobians(model == FISHEYE, full, _flat(points))
+    d_params = d_full if model == "FULL_OPENCV" else d_full @ _SELECTIONS[model]
+    batch = points.shape[:-1]
+    return (
+        pixels.reshape(*batch, 2),
+        d_point.reshape(*batch, 2, 3),
+        d_params.reshape(*batch, 2, len(params)),
+    )
+
+
+def _flat(points: Array) -> Array:
+    return np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 3)
 
 
 def radius_limit(model: str, params: Array) -> float:
@@ -120,47 +134,6 @@ def normalise(model: str, pixels: Array, params: Array) -> Array:
     return _perspective_undistort(distorted, model, params)
 
 
-def _perspective(points: Array, full: Array, *, jacobians: bool) -> tuple[Array, Array, Array]:
-    fx, fy, cx, cy, k1, k2, p1, p2, k3, k4, k5, k6 = full
-    z = np.where(points[..., 2] > 0.0, points[..., 2], np.nan)
-    inverse_z = 1.0 / z
-    x, y = points[..., 0] * inverse_z, points[..., 1] * inverse_z
-    r2 = x * x + y * y
-    above = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
-    below = 1.0 / (1.0 + r2 * (k4 + r2 * (k5 + r2 * k6)))
-    gain = above * below
-    xd = x * gain + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x)
-    yd = y * gain + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y
-    pixels = np.stack([fx * xd + cx, fy * yd + cy], axis=-1)
-    if not jacobians:
-        return pixels, pixels, pixels
-    d_gain = below * (
-        k1 + r2 * (2.0 * k2 + 3.0 * k3 * r2) - gain * (k4 + r2 * (2.0 * k5 + 3.0 * k6 * r2))
-    )  # by r2
-    cross = 2.0 * x * y * d_gain + 2.0 * (p1 * x + p2 * y)
-    xx = gain + 2.0 * x * x * d_gain + 2.0 * p1 * y + 6.0 * p2 * x
-    yy = gain + 2.0 * y * y * d_gain + 6.0 * p1 * y + 2.0 * p2 * x
-    d_point = np.empty((*x.shape, 2, 3))
-    d_point[..., 0, 0] = fx * xx * inverse_z
-    d_point[..., 0, 1] = fx * cross * inverse_z
-    d_point[..., 0, 2] = -fx * (xx * x + cross * y) * inverse_z
-    d_point[..., 1, 0] = fy * cross * inverse_z
-    d_point[..., 1, 1] = fy * yy * inverse_z
-    d_point[..., 1, 2] = -fy * (cross * x + yy * y) * inverse_z
-    d_full = np.zeros((*x.shape, 2, 12))
-    d_full[..., 0, 0], d_full[..., 1, 1] = xd, yd
-    d_full[..., 0, 2] = d_full[..., 1, 3] = 1.0
-    d_full[..., 0, 6], d_full[..., 1, 6] = 2.0 * fx * x * y, fy * (r2 + 2.0 * y * y)
-    d_full[..., 0, 7], d_full[..., 1, 7] = fx * (r2 + 2.0 * x * x), 2.0 * fy * x * y
-    powers = (r2, r2 * r2, r2 * r2 * r2)
-    for power, numerator, denominator in zip(powers, (4, 5, 8), (9, 10, 11), strict=True):
-        step = below * power
-        d_full[..., 0, numerator], d_full[..., 1, numerator] = fx * x * step, fy * y * step
-        d_full[..., 0, denominator] = -gain * d_full[..., 0, numerator]
-        d_full[..., 1, denominator] = -gain * d_full[..., 1, numerator]
-    return pixels, d_point, d_full
-
-
 def _perspective_undistort(distorted: Array, model: str, params: Array) -> Array:
     """Newton on the two-dimensional distortion, started inside its one-to-one region."""
     unit = full_parameters(model, params)
@@ -170,7 +143,9 @@ def _perspective_undistort(distorted: Array, model: str, params: Array) -> Array
     guess = distorted * np.minimum(1.0, 0.9 * limit / np.maximum(radius, 1e-12))
     ones = np.ones((*distorted.shape[:-1], 1))
     for _ in range(_NEWTON_STEPS):
-        value, jacobian, _ = _perspective(np.concatenate([guess, ones], -1), unit, jacobians=True)
+        value, jacobian, _ = project_jacobian(
+            "FULL_OPENCV", np.concatenate([guess, ones], -1), unit
+        )
         a, b = jacobian[..., 0, 0], jacobian[..., 0, 1]
         c, d = jacobian[..., 1, 0], jacobian[..., 1, 1]
         error = distorted - value
@@ -187,46 +162,10 @@ def _perspective_undistort(distorted: Array, model: str, params: Array) -> Array
         guess = guess * np.minimum(1.0, limit / np.maximum(size, 1e-12))
         if not np.any(np.abs(step) > _CONVERGED):
             break
-    value = _perspective(np.concatenate([guess, ones], -1), unit, jacobians=False)[0]
+    value = project("FULL_OPENCV", np.concatenate([guess, ones], -1), unit)
     solved = np.linalg.norm(distorted - value, axis=-1) < 1e-9
     solved &= np.linalg.norm(guess, axis=-1) < limit
     return np.where(solved[..., None], guess, np.nan)
-
-
-def _fisheye(points: Array, params: Array, *, jacobians: bool) -> tuple[Array, Array, Array]:
-    fx, fy, cx, cy, k1, k2, k3, k4 = params
-    x, y, z = points[..., 0], points[..., 1], points[..., 2]
-    rho2 = x * x + y * y
-    rho = np.sqrt(rho2)
-    theta = np.arctan2(rho, z)
-    t2 = theta * theta
-    theta_d = theta * (1.0 + t2 * (k1 + t2 * (k2 + t2 * (k3 + t2 * k4))))
-    near_axis = rho < _SMALL_SINE * np.abs(z)
-    safe_rho = np.where(near_axis, 1.0, rho)
-    scale = np.where(near_axis, 1.0 / np.where(z == 0.0, np.nan, z), theta_d / safe_rho)
-    scale = np.where(near_axis & (z <= 0.0), np.nan, scale)
-    pixels = np.stack([fx * scale * x + cx, fy * scale * y + cy], axis=-1)
-    if not jacobians:
-        return pixels, pixels, pixels
-    slope = 1.0 + t2 * (3.0 * k1 + t2 * (5.0 * k2 + t2 * (7.0 * k3 + t2 * 9.0 * k4)))
-    d2 = rho2 + z * z
-    # d theta/d(x, y, z) = (x z / rho, y z / rho, -rho) / d2
-    inner = np.where(near_axis, 0.0, (slope * z / d2 - scale) / safe_rho**2)
-    d_point = np.empty((*x.shape, 2, 3))
-    d_point[..., 0, 0] = fx * (scale + inner * x * x)
-    d_point[..., 0, 1] = fx * inner * x * y
-    d_point[..., 0, 2] = -fx * slope * x / d2
-    d_point[..., 1, 0] = fy * inner * x * y
-    d_point[..., 1, 1] = fy * (scale + inner * y * y)
-    d_point[..., 1, 2] = -fy * slope * y / d2
-    d_params = np.zeros((*x.shape, 2, 8))
-    d_params[..., 0, 0], d_params[..., 1, 1] = scale * x, scale * y
-    d_params[..., 0, 2] = d_params[..., 1, 3] = 1.0
-    power = np.where(near_axis, 0.0, theta / safe_rho)
-    for column in range(4, 8):
-        power = power * t2
-        d_params[..., 0, column], d_params[..., 1, column] = fx * power * x, fy * power * y
-    return pixels, d_point, d_params
 
 
 def _fisheye_undistort(distorted: Array, params: Array) -> Array:

@@ -2,7 +2,7 @@
 
 The angular speed of a rigid board does not depend on who looks at it, so each camera's own track
 of it is slid over the others' until they agree. The bundle adjustment then refines the offsets
-through the image velocities (`calib.reprojection`).
+with the board's motion (`calib.board_motion`).
 """
 
 from __future__ import annotations
@@ -89,8 +89,7 @@ def _gap(times: Array, at: Array) -> Array:
     return times[after] - times[after - 1]
 
 
-def board_moves(velocity_px_s: Array, camera: np.ndarray, count: int) -> bool:
-    """Whether every camera has enough views of a board in known motion to tell its time."""
-    speed = np.linalg.norm(velocity_px_s, axis=-1).max(axis=1, initial=0.0)
-    moving = np.bincount(camera, speed > LEAST_SPEED_PX_S, count)
+def board_moves(speed_px_s: Array, camera: np.ndarray, count: int) -> bool:
+    """Whether every camera has enough views of a board in smooth motion to tell its time."""
+    moving = np.bincount(camera, speed_px_s > LEAST_SPEED_PX_S, count)
     return bool(moving.min() >= LEAST_MOVING)

@@ -37,7 +37,7 @@ def coverage_of(camera: Camera, index: int, views: Views, T_base_boards: Array) 
     own = views.camera == index
     pixels = views.pixels[own]
     seen = pixels[np.isfinite(pixels[..., 0])]
-    poses = camera.T_camera_base @ T_base_boards[views.moment[own]]
+    poses = camera.T_camera_base @ T_base_boards[views.piece[own]]
     normals = poses[:, :3, 2]
     cosines = np.clip(normals @ normals.T, -1.0, 1.0)
     distance = np.linalg.norm(poses[:, :3, 3], axis=1)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,8 +17,9 @@ from calib.planar_pose import (
     focal_guess,
     homographies,
 )
-from calib.reprojection import CLOCK, POSE, WARP, Scene
-from calib.views import Views, make_views
+from calib.reprojection import Scene
+from calib.view_kernels import CLOCK, POSE, WARP
+from calib.views import Views
 from cdpr.documents import DataError
 
 LEAST_VIEWS = 4
@@ -157,15 +158,9 @@ def _plain_camera(name: str, size_px: tuple[int, int], model: str, focal: float)
 
 
 def _alone(views: Views) -> Views:
-    """The views as those of camera 0, each its own moment, still."""
-    count = len(views)
-    return make_views(
-        np.zeros(count),
-        np.arange(count),
-        views.pixels,
-        label=views.label,
-        std_px=views.std_px,
-    )
+    """The views as those of camera 0, each its own moment."""
+    each = np.arange(len(views))
+    return replace(views, camera=np.zeros(len(views), dtype=int), moment=each, piece=each)
 
 
 def _require(name: str, count: int, n_dropped: int) -> None:

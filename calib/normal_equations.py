@@ -1,13 +1,14 @@
 """Normal equations of a rig, and their solution with every board pose eliminated block by block.
 
-The equations of cameras, warp and base points (shared, p of them) and of n_moments board poses are
-an arrow; eliminating the 6 x 6 blocks leaves a dense p x p system (Schur complement, Triggs et al.
+The equations of cameras, warp and base points (shared, p of them) and of n board motions are an
+arrow; eliminating the b x b blocks leaves a dense p x p system (Schur complement, Triggs et al.
 2000, "Bundle Adjustment", sec. 6.1).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -15,13 +16,16 @@ from calib.camera_models import Array
 from calib.reprojection import (
     WARP,
     Scene,
-    board_jacobians,
     camera_slices,
     fixed_jacobians,
+    kernel_board,
+    kernel_cameras,
 )
-from calib.views import FixedPoints, Views, relative_std
+from calib.view_kernels import add_views
+from calib.views import FixedPoints, Views
 
-HUBER_SIGMAS = 3.0
+# share of normal errors within Huber's knee; for single corners the knee is at 3 sigma
+WITHIN_KNEE = 1.0 - np.exp(-4.5)
 _RANK_TOLERANCE = 1e-13
 
 
@@ -44,62 +48,66 @@ class Problem:
 
 @dataclass(frozen=True, slots=True)
 class Normal:
-    """Blocks of the normal equations: J'WJ and J'Wr of shared unknowns and board poses."""
+    """Blocks of the normal equations, J'WJ and J'Wr of shared unknowns and boards; and the cost."""
 
     shared: Array  # (p, p)
-    cross: Array  # (n_moments, p, 6)
-    boards: Array  # (n_moments, 6, 6)
+    cross: Array  # (n_pieces, p, b)
+    boards: Array  # (n_pieces, b, b)
     shared_slope: Array  # (p,)
-    board_slopes: Array  # (n_moments, 6)
+    board_slopes: Array  # (n_pieces, b)
+    cost: float
+
+
+@cache
+def length_with_share(share: float, size: int) -> float:
+    """Length that a share of `size` unit normal numbers stays within."""
+    from scipy.special import gammaincinv
+
+    return float(np.sqrt(2.0 * gammaincinv(size / 2.0, share)))
 
 
 def normal_equations(scene: Scene, problem: Problem, sigma: Array) -> Normal:
     """Normal equations at `scene`, robust weights included; `sigma` is each camera's noise, px."""
-    slices = camera_slices(scene.cameras)
-    end = slices[-1].stop
-    p, n_moments = len(problem.free), len(scene.T_base_boards)
-    shared, slope = np.zeros((p, p)), np.zeros(p)
-    cross, boards = np.zeros((n_moments, p, 6)), np.zeros((n_moments, 6, 6))
-    board_slopes = np.zeros((n_moments, 6))
-    warp = slice(end, end + WARP)
-    relative = relative_std(problem.views)
-    for index, own in enumerate(slices):
-        views_of = problem.views.camera == index
-        views = problem.views.select(views_of)
-        if not len(views):
-            continue
-        residuals, *blocks = board_jacobians(scene, problem.board_points_m, views, index)
-        scale = _root_weights(residuals, sigma[index] * relative[views_of])[..., None, None]
-        r, d_camera, d_board, d_warp = (
-            _rows(np.where(scale > 0.0, array * scale, 0.0))
-            for array in (residuals[..., None], *blocks)
-        )
-        wide = np.concatenate([d_camera, d_warp], axis=-1)
-        flat = wide.reshape(-1, wide.shape[-1])
-        columns = np.r_[own, warp]
-        shared[np.ix_(columns, columns)] += flat.T @ flat
-        slope[columns] += flat.T @ r.reshape(-1)
-        d_board_t = np.swapaxes(d_board, 1, 2)
-        np.add.at(boards, views.moment, d_board_t @ d_board)
-        np.add.at(board_slopes, views.moment, (d_board_t @ r)[..., 0])
-        block = np.swapaxes(d_board_t @ wide, 1, 2)
-        cross[views.moment, own] = block[:, :-WARP]
-        cross[views.moment, warp] += block[:, -WARP:]
+    end = camera_slices(scene.cameras)[-1].stop
+    p, n, b = len(problem.free), len(scene.T_base_boards), scene.board_unknowns
+    views = problem.views
+    blocks = (np.zeros((p, p)), np.zeros((n, p, b)), np.zeros((n, b, b)))
+    slopes = (np.zeros(p), np.zeros((n, b)))
+    cost = add_views(
+        views.camera,
+        views.piece,
+        views.pixels,
+        views.lag_s,
+        views.whitening,
+        sigma,
+        length_with_share(WITHIN_KNEE, 2 * views.group_size),
+        *kernel_cameras(scene.cameras),
+        *kernel_board(scene, problem.board_points_m),
+        end,
+        (*blocks, *slopes),
+    )
     if problem.fixed is not None:
-        _add_fixed(scene, problem.fixed, sigma, shared, slope)
-    return Normal(shared, cross, boards, slope, board_slopes)
+        cost += _add_fixed(scene, problem.fixed, sigma, blocks[0], slopes[0])
+    return Normal(*blocks, *slopes, cost)
 
 
-def _add_fixed(scene: Scene, fixed: FixedPoints, sigma: Array, shared: Array, slope: Array) -> None:
-    """Add the fixed points' sightings and their survey to the shared block."""
+def _add_fixed(
+    scene: Scene, fixed: FixedPoints, sigma: Array, shared: Array, slope: Array
+) -> float:
+    """Add the fixed points' sightings and their survey to the shared block; their cost."""
     slices = camera_slices(scene.cameras)
     first = slices[-1].stop + WARP
+    knee = length_with_share(WITHIN_KNEE, 2)
+    cost = 0.0
     for index, own in enumerate(slices):
         some = fixed.select(fixed.camera == index)
         if not len(some.point):
             continue
         residuals, d_camera, d_point = fixed_jacobians(scene, some, index)
-        scale = _root_weights(residuals, sigma[index] * some.std_scale)[:, None]
+        noise = sigma[index] * some.std_scale
+        error = np.hypot(residuals[:, 0], residuals[:, 1]) / noise
+        cost += float(np.where(error < knee, 0.5 * error**2, knee * error - 0.5 * knee**2).sum())
+        scale = (np.sqrt(np.minimum(1.0, knee / np.maximum(error, 1e-12))) / noise)[:, None]
         rows = np.zeros((len(some.point), 2, len(slope)))
         rows[..., own] = d_camera
         for axis in range(3):
@@ -109,26 +117,15 @@ def _add_fixed(scene: Scene, fixed: FixedPoints, sigma: Array, shared: Array, sl
         shared += rows.T @ rows
         slope += rows.T @ (residuals * scale).reshape(-1)
     information = np.repeat(1.0 / fixed.std_m**2, 3)
+    change = (fixed.points_base_m - scene.base_points_m).reshape(-1)
     diagonal = first + np.arange(information.size)
     shared[diagonal, diagonal] += information
-    slope[diagonal] += information * (fixed.points_base_m - scene.base_points_m).reshape(-1)
-
-
-def _rows(array: Array) -> Array:
-    """(n, n_points, 2, c) -> (n, 2 n_points, c)."""
-    return array.reshape(array.shape[0], -1, array.shape[-1])
-
-
-def _root_weights(residuals: Array, sigma: Array | float) -> Array:
-    """Square roots of the robust weights over sigma; zero where unseen. (..., 2) -> (...)."""
-    error = np.hypot(residuals[..., 0], residuals[..., 1]) / sigma
-    with np.errstate(invalid="ignore"):
-        weight = np.sqrt(np.minimum(1.0, HUBER_SIGMAS / np.maximum(error, 1e-12))) / sigma
-    return np.where(np.isfinite(error), weight, 0.0)
+    slope[diagonal] += information * change
+    return cost + 0.5 * float(np.sum(information * change**2))
 
 
 def damped_step(normal: Normal, free: np.ndarray, damping: float) -> tuple[Array, Array]:
-    """Levenberg-Marquardt step of shared unknowns (p,) and boards (n, 6); NaN when singular."""
+    """Levenberg-Marquardt step of shared unknowns (p,) and boards (n, b); NaN when singular."""
     boards = normal.boards.copy()
     diagonal = np.einsum("nii->ni", boards)
     diagonal *= 1.0 + damping
@@ -158,17 +155,16 @@ def _reduced(shared: Array, cross: Array, boards: Array) -> tuple[Array, Array]:
 
 
 def covariances(normal: Normal, free: np.ndarray) -> tuple[Array, Array, int, Array, float]:
-    """Covariances of shared unknowns (p, p) and boards (n, 6, 6), rank, weakest, condition.
+    """Covariances of shared unknowns (p, p) and boards (n, b, b), rank, weakest, condition.
 
     Directions without rank are left out; `weakest` is the least determined one, a unit vector.
     """
+    boards = normal.boards + 1e-12 * np.eye(normal.boards.shape[1])
     if not free.any():
         nothing = np.zeros(len(free))
         covariance = np.zeros((len(free), len(free)))
-        inverse = np.linalg.inv(normal.boards + 1e-12 * np.eye(6)).astype(np.float64)
-        return covariance, inverse, 0, nothing, 1.0
+        return covariance, np.linalg.inv(boards).astype(np.float64), 0, nothing, 1.0
     cross = normal.cross[:, free]
-    boards = normal.boards + 1e-12 * np.eye(6)
     reduced, weighted = _reduced(normal.shared[np.ix_(free, free)], cross, boards)
     scale = 1.0 / np.sqrt(np.maximum(np.diag(normal.shared)[free], 1e-300))
     values, vectors = np.linalg.eigh(reduced * scale[:, None] * scale)

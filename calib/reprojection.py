@@ -1,29 +1,24 @@
-"""Reprojection residuals of a camera rig and their normal equations, block by block.
+"""Unknowns of a camera rig and their reprojection residuals.
 
 Unknowns of camera c, in this order: lens parameters (k), pose (dt, dr as in `calib.camera.Camera`),
 clock offset, line time. After the cameras come three numbers of the board's shape (`shape_modes`)
 and the base points.
-Every moment has a board pose of its own, tangent (dt, dr) in the base frame: t + dt, exp(dr) R.
-
-A corner seen at stamp t is moved to the moment t_m by its image velocity before it is compared:
-residual = pixel - velocity (lag + clock_offset + row line_time) - projection.
+Every piece of a recording has a board motion of its own (`calib.view_kernels`): the pose at its
+middle, tangent (dt, dr) in the base frame: t + dt, exp(dr) R, then the motion's coefficients.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 import numpy as np
 
 from calib.camera import Camera
-from calib.camera_models import Array
+from calib.camera_models import FISHEYE, Array, full_parameters, parameter_columns
+from calib.view_kernels import CLOCK, POSE, WARP, all_residuals
 from calib.views import FixedPoints, Views
 from cdpr.rotation import exp_rotation
-
-POSE = 6
-CLOCK = 2
-WARP = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,15 +27,34 @@ class Scene:
 
     Attributes:
         cameras: the rig.
-        T_base_boards: board poses, (n_moments, 4, 4).
+        T_base_boards: board poses at the middles of the pieces, (n_pieces, 4, 4).
         warp_m: the board's sag along x and along y at its middle, and its tags' growth, (3,).
         base_points_m: the fixed points, (n, 3).
+        motion: shift and turn by the powers of time over `motion_scale_s`, from the first,
+            (n_pieces, degree, 6); a board at rest when left out.
+        motion_scale_s: the unit of time of `motion`.
     """
 
     cameras: tuple[Camera, ...]
     T_base_boards: Array
     warp_m: Array
     base_points_m: Array
+    motion: Array = field(default_factory=lambda: np.zeros((0, 0, 6)))
+    motion_scale_s: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not self.motion.size:
+            rest = np.zeros((len(self.T_base_boards), 0, 6))
+            object.__setattr__(self, "motion", rest)
+
+    @property
+    def board_unknowns(self) -> int:
+        """Unknowns of each piece."""
+        return 6 * (1 + self.motion.shape[1])
+
+    def pieces(self, keep: np.ndarray) -> Scene:
+        """The scene with the pieces picked by a mask or an index array."""
+        return replace(self, T_base_boards=self.T_base_boards[keep], motion=self.motion[keep])
 
 
 def camera_slices(cameras: tuple[Camera, ...]) -> list[slice]:
@@ -82,13 +96,44 @@ def warped(board_points_m: Array, warp_m: Array) -> Array:
     return board_points_m + shape_modes(board_points_m) @ warp_m
 
 
-def board_residuals(scene: Scene, board_points_m: Array, views: Views, index: int) -> Array:
-    """Residuals of one camera's views in pixels, (n, n_points, 2), NaN where unseen."""
-    camera = scene.cameras[index]
-    points = warped(board_points_m, scene.warp_m)
-    T = camera.T_camera_base @ scene.T_base_boards[views.moment]
-    in_camera = points @ np.swapaxes(T[:, :3, :3], 1, 2) + T[:, None, :3, 3]
-    return _measured(camera, views) - camera.project(in_camera)
+def kernel_cameras(cameras: tuple[Camera, ...]) -> tuple[tuple, tuple]:
+    """Lenses and places of the rig as `calib.view_kernels` takes them."""
+    lenses = (
+        np.array([camera.model == FISHEYE for camera in cameras]),
+        np.array([full_parameters(camera.model, camera.params) for camera in cameras]),
+        np.array([parameter_columns(camera.model) for camera in cameras]),
+        np.array([len(camera.params) for camera in cameras]),
+        np.array([own.start for own in camera_slices(cameras)]),
+    )
+    poses = np.stack([camera.T_camera_base for camera in cameras])
+    places = (
+        np.ascontiguousarray(poses[:, :3, :3]),
+        np.ascontiguousarray(poses[:, :3, 3]),
+        np.array([[camera.clock_offset_s, camera.line_time_s] for camera in cameras]),
+    )
+    return lenses, places
+
+
+def kernel_board(scene: Scene, board_points_m: Array) -> tuple[tuple, tuple]:
+    """Motions and shape of the board as `calib.view_kernels` takes them."""
+    boards = (
+        np.ascontiguousarray(scene.T_base_boards),
+        np.ascontiguousarray(scene.motion),
+        scene.motion_scale_s,
+    )
+    return boards, (warped(board_points_m, scene.warp_m), shape_modes(board_points_m))
+
+
+def board_residuals(scene: Scene, board_points_m: Array, views: Views) -> Array:
+    """Residuals of all views in pixels, (n, n_points, 2), NaN where unseen."""
+    return all_residuals(
+        views.camera,
+        views.piece,
+        views.pixels,
+        views.lag_s,
+        *kernel_cameras(scene.cameras),
+        *kernel_board(scene, board_points_m),
+    )
 
 
 def fixed_residuals(scene: Scene, fixed: FixedPoints) -> Array:
@@ -99,44 +144,6 @@ def fixed_residuals(scene: Scene, fixed: FixedPoints) -> Array:
         points = camera.to_camera(scene.base_points_m[fixed.point[own]])
         residuals[own] = fixed.pixels[own] - camera.project(points)
     return residuals
-
-
-def _measured(camera: Camera, views: Views) -> Array:
-    """Corner pixels carried to the moment by their velocity."""
-    delay = views.lag_s[:, None] + camera.clock_offset_s + views.pixels[..., 1] * camera.line_time_s
-    return views.pixels - views.velocity_px_s * delay[..., None]
-
-
-def board_jacobians(
-    scene: Scene, board_points_m: Array, views: Views, index: int
-) -> tuple[Array, Array, Array, Array]:
-    """Residuals and minus their derivatives, of one camera's views.
-
-    Returns:
-        Residuals (n, n_points, 2); derivatives of the projection by the camera's unknowns
-        (n, n_points, 2, k + 8), by the board pose (..., 6) and by the warp (..., 2).
-    """
-    camera = scene.cameras[index]
-    points = warped(board_points_m, scene.warp_m)
-    poses = scene.T_base_boards[views.moment]
-    R_camera_base = camera.T_camera_base[:3, :3]
-    turned = points @ np.swapaxes(poses[:, :3, :3], 1, 2)  # base axes, from the board's origin
-    in_base = turned + poses[:, None, :3, 3]
-    arm = in_base @ R_camera_base.T  # camera axes, from the base's origin
-    pixels, d_point, d_params = camera.project_jacobian(arm + camera.T_camera_base[:3, 3])
-    k = len(camera.params)
-    d_camera = np.empty((*pixels.shape, k + POSE + CLOCK))
-    d_camera[..., :k] = d_params
-    d_camera[..., k : k + 3] = d_point
-    d_camera[..., k + 3 : k + 6] = _cross(arm[..., None, :], d_point)
-    d_camera[..., k + 6] = views.velocity_px_s
-    d_camera[..., k + 7] = views.velocity_px_s * views.pixels[..., 1:]
-    d_base = d_point @ R_camera_base
-    d_board = np.empty((*pixels.shape, POSE))
-    d_board[..., :3] = d_base
-    d_board[..., 3:] = _cross(turned[..., None, :], d_base)
-    d_warp = d_base @ poses[:, None, :3, :3] @ shape_modes(board_points_m)
-    return _measured(camera, views) - pixels, d_camera, d_board, d_warp
 
 
 def fixed_jacobians(scene: Scene, fixed: FixedPoints, index: int) -> tuple[Array, Array, Array]:
@@ -151,7 +158,7 @@ def fixed_jacobians(scene: Scene, fixed: FixedPoints, index: int) -> tuple[Array
 
 
 def moved(scene: Scene, shared: Array, boards: Array) -> Scene:
-    """The scene after a step of the shared unknowns (p,) and of the boards (n_moments, 6)."""
+    """The scene after a step of the shared unknowns (p,) and of the boards (n_pieces, b)."""
     cameras = []
     slices = camera_slices(scene.cameras)
     for camera, own in zip(scene.cameras, slices, strict=True):
@@ -167,11 +174,13 @@ def moved(scene: Scene, shared: Array, boards: Array) -> Scene:
             )
         )
     end = slices[-1].stop
-    return Scene(
-        tuple(cameras),
-        _moved_pose(scene.T_base_boards, boards),
-        scene.warp_m + shared[end : end + WARP],
-        scene.base_points_m + shared[end + WARP :].reshape(-1, 3),
+    return replace(
+        scene,
+        cameras=tuple(cameras),
+        T_base_boards=_moved_pose(scene.T_base_boards, boards[:, :6]),
+        warp_m=scene.warp_m + shared[end : end + WARP],
+        base_points_m=scene.base_points_m + shared[end + WARP :].reshape(-1, 3),
+        motion=scene.motion + boards[:, 6:].reshape(scene.motion.shape),
     )
 
 

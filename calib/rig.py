@@ -8,19 +8,22 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calib.adjustment import MEDIAN_OF_RAYLEIGH, ROUGHLY_CONVERGED, Adjustment, adjust
+from calib.board_motion import Timeline, in_pieces
 from calib.camera import Camera
 from calib.camera_models import Array
 from calib.intrinsics import CameraStart, DroppedView, start_camera
-from calib.normal_equations import Problem
-from calib.reprojection import CLOCK, POSE, WARP, Scene, camera_slices, shape_modes
+from calib.normal_equations import Problem, length_with_share
+from calib.reprojection import Scene, camera_slices, shape_modes
 from calib.rig_start import place_in_base, start_rig
-from calib.views import FixedPoints, Views, relative_std
+from calib.view_kernels import CLOCK, POSE, WARP
+from calib.views import FixedPoints, Views
 
 Progress = Callable[[str, float], None]
 
 VIEW_OUTLIER_SIGMAS = 5.0
 VIEW_OUTLIER_FLOOR_PX = 0.5
-CORNER_OUTLIER_SIGMAS = 6.0
+# share of normal errors within the limit of a corner's: 6 sigma for a corner on its own
+CORNER_WITHIN = 1.0 - np.exp(-18.0)
 _LEAST_CORNERS = 4
 LINE_TIME_SIGMAS = 5.0
 SHAPE_SIGMAS = 6.0
@@ -74,8 +77,7 @@ def solve_rig(
     board_points_m: Array,
     starts: tuple[CameraStart, ...],
     offsets_s: Array | None = None,
-    *,
-    clocks: bool = False,
+    line: Timeline | None = None,
 ) -> Rig:
     """All cameras and board poses at once, in the frame of the reference camera.
 
@@ -83,7 +85,8 @@ def solve_rig(
         board_points_m: the board's corners, (n_points, 3).
         starts: every camera on its own; equal moments of two cameras are simultaneous.
         offsets_s: clock offsets to start from, (n_cameras,).
-        clocks: whether clocks are estimated (the board moves); time is then the first camera's.
+        line: times and pieces of the moments when the board moves: clocks are then estimated, and
+            time is the first camera's; None for a board that rests at each moment.
 
     Raises:
         DataError: when the cameras do not share enough views.
@@ -95,12 +98,15 @@ def solve_rig(
         replace(start.camera, clock_offset_s=float(offset))
         for start, offset in zip(starts, offsets, strict=True)
     )
-    views, _ = views.compacted()
+    views, moments = views.compacted()
     start = start_rig(cameras, board_points_m, views, poses)
+    scene, clocks = start.scene, line is not None
+    if line is not None:
+        scene, views = in_pieces(scene, views, Timeline(line.times_s[moments], line.piece[moments]))
     free = free_unknowns(cameras, held_pose=start.reference, clocks=clocks)
     dropped = tuple(drop for camera in starts for drop in camera.dropped)
     problem = Problem(board_points_m, views, None, free)
-    rig = refine(start.scene, problem, start.reference, dropped)
+    rig = refine(scene, problem, start.reference, dropped)
     return _with_board_shape(_without_idle_lines(rig) if clocks else rig)
 
 
@@ -187,10 +193,16 @@ def refine(
             for i in np.flatnonzero(~enough)
         )
         n_trimmed += int(problem.views.seen[enough].sum() - trimmed.seen[enough].sum())
-        views, moments = trimmed.select(enough).compacted()
+        enough &= _determined(trimmed.select(enough), result.scene)[trimmed.piece]
+        views, pieces = trimmed.select(enough).compacted()
         problem = replace(problem, views=views)
-        scene = replace(result.scene, T_base_boards=result.scene.T_base_boards[moments])
-        result = adjust(scene, problem, result.sigma_px, rounds=1, converged=ROUGHLY_CONVERGED)
+        result = adjust(
+            result.scene.pieces(pieces),
+            problem,
+            result.sigma_px,
+            rounds=1,
+            converged=ROUGHLY_CONVERGED,
+        )
     result = adjust(result.scene, problem, result.sigma_px, rounds=1)
     return Rig(result, problem, reference, dropped, n_trimmed)
 
@@ -211,13 +223,21 @@ def _views_kept(result: Adjustment, problem: Problem) -> tuple[np.ndarray, Array
     return errors <= limits, limits, errors
 
 
+def _determined(views: Views, scene: Scene) -> np.ndarray:
+    """Whether a piece still has as many moments as its motion has coefficients, (n_pieces,)."""
+    pairs = np.unique(np.stack([views.piece, views.moment]), axis=1)
+    return np.bincount(pairs[0], minlength=len(scene.motion)) > scene.motion.shape[1]
+
+
 def _trimmed(result: Adjustment, problem: Problem) -> Views:
-    """The views with far-off corners blanked."""
-    length = np.linalg.norm(result.residuals_px, axis=-1) / relative_std(problem.views)
-    limit = CORNER_OUTLIER_SIGMAS * result.sigma_px[problem.views.camera]
+    """The views with far-off corners blanked, all that were found together."""
+    views = problem.views
+    white = views.whitened(result.residuals_px)
+    limit = length_with_share(CORNER_WITHIN, white.shape[-1]) * result.sigma_px[views.camera]
     with np.errstate(invalid="ignore"):
-        far = length > limit[:, None]
-    return replace(problem.views, pixels=np.where(far[..., None], np.nan, problem.views.pixels))
+        far = np.linalg.norm(white, axis=-1) > limit[:, None]
+    far = np.repeat(far, views.group_size, axis=1)
+    return replace(views, pixels=np.where(far[..., None], np.nan, views.pixels))
 
 
 def tie_to_base(rig: Rig, fixed: FixedPoints, *, estimate_survey: bool = True) -> Rig:
@@ -264,9 +284,9 @@ def _joined(parts: list[Views]) -> Views:
     return Views(
         np.concatenate([part.camera for part in parts]),
         np.concatenate([part.moment for part in parts]),
+        np.concatenate([part.piece for part in parts]),
         np.concatenate([part.pixels for part in parts]),
-        np.concatenate([part.velocity_px_s for part in parts]),
         np.concatenate([part.lag_s for part in parts]),
-        np.concatenate([part.std_px for part in parts]),
+        np.concatenate([part.whitening for part in parts]),
         tuple(label for part in parts for label in part.label),
     )

@@ -9,7 +9,8 @@ import numpy as np
 from calib.board_pose import best_poses
 from calib.camera import Camera
 from calib.camera_models import Array
-from calib.reprojection import WARP, Scene
+from calib.reprojection import Scene
+from calib.view_kernels import WARP
 from calib.views import FixedPoints, Views
 from cdpr.documents import DataError
 from cdpr.rotation import invert
@@ -158,7 +159,15 @@ def place_in_base(scene: Scene, fixed: FixedPoints) -> Scene:
         replace(camera, T_camera_base=camera.T_camera_base @ T_rig_base) for camera in scene.cameras
     )
     boards = invert(T_rig_base) @ scene.T_base_boards
-    return Scene(cameras, boards, scene.warp_m, fixed.points_base_m.copy())
+    turn = T_rig_base[:3, :3]  # from the right: rows of vectors in the rig's frame
+    motion = np.concatenate([scene.motion[..., :3] @ turn, scene.motion[..., 3:] @ turn], axis=-1)
+    return replace(
+        scene,
+        cameras=cameras,
+        T_base_boards=boards,
+        base_points_m=fixed.points_base_m.copy(),
+        motion=motion,
+    )
 
 
 def _fixed_cost(scene: Scene, fixed: FixedPoints, T_rig_base: Array) -> float:

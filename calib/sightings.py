@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib.board_detection import BoardDetector
+from calib.board_motion import Timeline, linked, timeline
 from calib.boards import Board
 from calib.camera_models import Array
 from calib.recordings import Recording, read_frames, stamps_of
@@ -34,7 +35,9 @@ class Sightings:
         stamps_s: their stamps by the camera's own clock, NaN when unknown, (n,).
         labels: how a person finds them, (n,).
         pixels: corners, NaN where unseen, (n, n_points, 2).
-        std_px: what the detector says of each corner's noise, (n, n_points).
+        covariance_px2: what the detector says of their noise, by groups of corners found
+            together, (n, n_groups, 2 c, 2 c).
+        border_cells: width of the border of the board's tags as found.
         still_frames: a few images spread over the recording, for what does not move.
     """
 
@@ -45,7 +48,8 @@ class Sightings:
     stamps_s: Array
     labels: tuple[str, ...]
     pixels: Array
-    std_px: Array
+    covariance_px2: Array
+    border_cells: int = 1
     still_frames: tuple[np.ndarray, ...] = ()
 
 
@@ -82,7 +86,7 @@ def _see_board(
     wanted = _wanted(count)
     still_at = set(np.linspace(0, count - 1, n_still).round().astype(int)) if n_still else set()
     detector = BoardDetector(board)
-    numbers, labels, pixels, stills, size = [], [], [], [], (0, 0)
+    numbers, labels, found, stills, size = [], [], [], [], (0, 0)
     for position, (number, label, image) in enumerate(read_frames(recording)):
         size = (image.shape[1], image.shape[0])
         if position in still_at:
@@ -93,19 +97,19 @@ def _see_board(
         if corners is not None:
             numbers.append(number)
             labels.append(label)
-            pixels.append(corners)
-    found = np.array(numbers, dtype=int)
-    stack = np.array(pixels) if pixels else np.zeros((0, len(board.points_m), 3))
-    stamps = stamps_of(recording, found, frame_rate_hz)
+            found.append(corners)
+    frames = np.array(numbers, dtype=int)
+    empty = detector.nothing()
     return Sightings(
         recording.name,
         size,
         count,
-        found,
-        stamps,
+        frames,
+        stamps_of(recording, frames, frame_rate_hz),
         tuple(labels),
-        stack[..., :2],
-        stack[..., 2],
+        np.stack([empty.pixels, *(corners.pixels for corners in found)])[1:],
+        np.stack([empty.covariance_px2, *(corners.covariance_px2 for corners in found)])[1:],
+        detector.border_cells,
         tuple(stills),
     )
 
@@ -125,50 +129,28 @@ def _wanted(count: int) -> set[int]:
     return {int(start + k) for start in starts for k in range(BURST)}
 
 
-def velocities(sightings: Sightings) -> Array:
-    """Image velocity of every corner in px/s, NaN where the frames around do not tell.
+def smoothness(sightings: Sightings) -> tuple[np.ndarray, Array]:
+    """How the board moves through each frame.
 
-    Five-point stencil where four neighbours exist, else the central difference; a neighbour that
-    does not continue the motion (a cut, a new pose) gives no velocity. The moving plane's smooth
-    flow is then fitted to each view, which fills corners that a neighbour lost. (n, n_points, 2).
+    Returns:
+        1 where the frame and its two neighbours show one smooth motion, -1 where they do not (a
+        cut, a new pose), 0 where a neighbour lacks, (n,); and the largest image speed of a corner
+        in px/s where the motion is smooth, else 0, (n,).
     """
     at = {int(number): row for row, number in enumerate(sightings.numbers)}
     pixels, stamps = sightings.pixels, sightings.stamps_s
-    result = np.full(pixels.shape, np.nan)
+    smooth, speed = np.zeros(len(at), dtype=int), np.zeros(len(at))
     for number, row in at.items():
         before, after = at.get(number - 1), at.get(number + 1)
         if before is None or after is None:
             continue
         span = stamps[after] - stamps[before]
         ahead, behind = pixels[after] - pixels[row], pixels[row] - pixels[before]
-        if not (span > 0.0 and _continues(ahead, behind)):
-            continue
-        near = (pixels[after] - pixels[before]) / span
-        two_before, two_after = at.get(number - 2), at.get(number + 2)
-        if two_before is not None and two_after is not None:
-            span = stamps[two_after] - stamps[two_before]
-            wide = (pixels[two_after] - pixels[two_before]) / span
-            finer = (4.0 * near - wide) / 3.0
-            smooth = np.abs(wide - near) < 0.3 * np.abs(near) + 6.0 / span
-            if np.where(np.isfinite(finer), smooth, True).all():
-                near = finer if np.isfinite(finer[:, 0]).sum() >= LEAST_FLOW else near
-        result[row] = _plane_flow(pixels[row], near)
-    return result
-
-
-def _plane_flow(pixels: Array, velocity: Array) -> Array:
-    """Velocity of all seen corners by a quadratic field fitted to the known ones; NaN if too few.
-
-    The image velocity of a moving plane is a quadratic in the pixel (Longuet-Higgins 1984).
-    """
-    known = np.isfinite(velocity[:, 0] + pixels[:, 0])
-    if known.sum() < LEAST_FLOW:
-        return np.full_like(velocity, np.nan)
-    scaled = (pixels - np.nanmean(pixels, axis=0)) / np.nanstd(pixels, axis=0)
-    x, y = scaled[:, 0], scaled[:, 1]
-    basis = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=-1)
-    weights, *_ = np.linalg.lstsq(basis[known], velocity[known], rcond=None)
-    return np.asarray(basis @ weights, dtype=np.float64)
+        smooth[row] = 1 if span > 0.0 and _continues(ahead, behind) else -1
+        if smooth[row] > 0:
+            lengths = np.linalg.norm(pixels[after] - pixels[before], axis=-1)
+            speed[row] = np.nanmax(lengths) / span
+    return smooth, speed
 
 
 def _continues(ahead: Array, behind: Array) -> bool:
@@ -181,11 +163,27 @@ def _continues(ahead: Array, behind: Array) -> bool:
     return bool(np.median(bend[known]) < 0.35 * np.median(step[known]) + 1.0)
 
 
+@dataclass(frozen=True, slots=True)
+class Gathered:
+    """Simultaneous frames of the cameras put together.
+
+    Attributes:
+        views: the sightings; a view's lag is its own stamp minus its moment's base time, so it
+            holds the clock offset too.
+        line: the moments' base times and the pieces of smooth motion; None without stamps.
+        speed_px_s: image speed of the board in each view, 0 where unknown, (n_views,).
+    """
+
+    views: Views
+    line: Timeline | None
+    speed_px_s: Array
+
+
 def gather(
     all_sightings: tuple[Sightings, ...],
     frame_rate_hz: float | None,
     offsets_s: Array | None = None,
-) -> tuple[Views, Array]:
+) -> Gathered:
     """Put simultaneous frames of the cameras together.
 
     Frames are matched by stamps to within half a frame where every camera has its own stamps,
@@ -195,10 +193,6 @@ def gather(
         all_sightings: one a camera.
         frame_rate_hz: nominal rate, None when unknown.
         offsets_s: what is known of each camera's clock offset, zero when None.
-
-    Returns:
-        The views, and the base time of every moment, NaN when stamps are unknown, (n_moments,).
-        A view's lag is its own stamp minus that time, so it holds the clock offset too.
     """
     stamped = all(np.isfinite(s.stamps_s).all() for s in all_sightings)
     offsets = np.zeros(len(all_sightings)) if offsets_s is None or not stamped else offsets_s
@@ -207,29 +201,63 @@ def gather(
         for s, offset in zip(all_sightings, offsets, strict=True)
     ]
     joined = np.concatenate(keys) if keys else np.zeros(0)
-    reach = 0.5 / frame_rate_hz if stamped and frame_rate_hz else _half_step(keys)
-    order = np.argsort(joined, kind="stable")
-    group = np.zeros(len(joined), dtype=int)
-    start, current = -np.inf, -1
-    for index in order:
-        if joined[index] - start > reach:
-            start, current = joined[index], current + 1
-        group[index] = current
-    count = current + 1
-    times = np.bincount(group, joined, count) / np.maximum(np.bincount(group, minlength=count), 1)
+    group, times = _moments(keys, _reach(all_sightings, keys, frame_rate_hz))
     camera = np.repeat(np.arange(len(keys)), [len(key) for key in keys])
-    lag = joined - offsets[camera] - times[group] if stamped else np.zeros(len(joined))
+    moves = [smoothness(s) for s in all_sightings]
     _, first = np.unique(np.stack([camera, group]), axis=1, return_index=True)
+    first = np.sort(first)
+    lag = joined - offsets[camera] - times[group] if stamped else np.zeros(len(joined))
     views = make_views(
-        camera,
-        group,
-        np.concatenate([s.pixels for s in all_sightings]),
-        np.concatenate([velocities(s) for s in all_sightings]),
-        lag,
-        tuple(label for s in all_sightings for label in s.labels),
-        np.concatenate([s.std_px for s in all_sightings]),
-    ).select(np.arange(len(first)))
-    return views, times if stamped else np.full(count, np.nan)
+        camera[first],
+        group[first],
+        np.concatenate([s.pixels for s in all_sightings])[first],
+        lag[first],
+        tuple(np.array([label for s in all_sightings for label in s.labels])[first].tolist()),
+        np.concatenate([s.covariance_px2 for s in all_sightings])[first],
+    )
+    speed = np.concatenate([speed for _, speed in moves])[first]
+    if not stamped:
+        return Gathered(views, None, speed)
+    smooth = np.concatenate([smooth for smooth, _ in moves])
+    goes_on = np.bincount(group, smooth > 0, len(times)) > 0
+    goes_on &= np.bincount(group, smooth < 0, len(times)) == 0
+    line = timeline(times, linked(times, goes_on, 2.0 * _half_step(keys)))
+    return Gathered(views, line, speed)
+
+
+def _reach(
+    all_sightings: tuple[Sightings, ...], keys: list[Array], frame_rate_hz: float | None
+) -> float:
+    """How far apart two cameras' frames of one moment may be."""
+    stamped = all(np.isfinite(s.stamps_s).all() for s in all_sightings)
+    return 0.5 / frame_rate_hz if stamped and frame_rate_hz else _half_step(keys)
+
+
+def _moments(keys: list[Array], reach: float) -> tuple[np.ndarray, Array]:
+    """Moment of each frame, camera after camera, and each moment's mean time.
+
+    The first camera's frames are moments; another camera's frame joins the nearest moment within
+    reach, or is one of its own.
+    """
+    times = np.zeros(0)
+    group = np.zeros(0, dtype=int)
+    for key in keys:
+        order = np.argsort(times, kind="stable")
+        own = len(times) + np.arange(len(key))
+        if len(times):
+            right = np.clip(np.searchsorted(times[order], key), 1, max(len(times) - 1, 1))
+            beside = order[np.stack([right - 1, np.minimum(right, len(times) - 1)])]
+            nearest = beside[np.abs(times[beside] - key).argmin(axis=0), np.arange(len(key))]
+            own = np.where(np.abs(times[nearest] - key) <= reach, nearest, own)
+        new = np.unique(own[own >= len(times)])
+        renumbered = len(times) + np.searchsorted(new, own)
+        times = np.concatenate([times, key[new - len(times)]])
+        group = np.concatenate([group, np.where(own < len(times) - len(new), own, renumbered)])
+    joined = np.concatenate(keys) if keys else times
+    mean = np.bincount(group, joined, len(times)) / np.bincount(group, minlength=len(times))
+    place = np.empty(len(times), dtype=int)
+    place[np.argsort(mean, kind="stable")] = np.arange(len(times))
+    return place[group], np.sort(mean)
 
 
 def _half_step(keys: list[Array]) -> float:

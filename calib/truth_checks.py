@@ -9,10 +9,9 @@ import numpy as np
 from calib.adjustment import Adjustment, Problem, adjust
 from calib.camera import Camera
 from calib.camera_models import Array
-from calib.reprojection import Scene, camera_slices, warped
+from calib.reprojection import Scene, board_residuals, camera_slices, warped
 from calib.rig import Rig
 from calib.triangulation import triangulate
-from calib.views import Views
 
 LEAST_HALF = 4
 _VOLUME_POINTS = 200
@@ -64,12 +63,14 @@ def check_truth(rig: Rig, edges: np.ndarray) -> TruthChecks:
     errors: list[Array] = []
     true: list[Array] = []
     for parity, cameras in enumerate(solved):
-        views, _ = problem.views.select(problem.views.moment % 2 != parity).compacted()
+        views, _ = problem.views.select(problem.views.piece % 2 != parity).compacted()
         used = replace(problem, views=views)
-        for index, residuals in enumerate(_held_out(cameras, rig, used, parity)):
+        held = _held_out(cameras, rig, used, parity)
+        for index in range(count):
+            residuals = held.residuals_px[views.camera == index]
             squares[index] += float(np.nansum(residuals**2))
             numbers[index] += np.isfinite(residuals).sum()
-        measured, known = _lengths(cameras, used, scene.warp_m, edges)
+        measured, known = _lengths(held.scene, used, edges)
         errors.append(measured - known)
         true.append(known)
     with np.errstate(invalid="ignore"):
@@ -90,49 +91,52 @@ def check_truth(rig: Rig, edges: np.ndarray) -> TruthChecks:
 
 def _half(rig: Rig, parity: int) -> tuple[Camera, ...] | None:
     """Cameras from the moments of one parity alone; None when they are too few."""
-    keep = rig.problem.views.moment % 2 == parity
-    views, moments = rig.problem.views.select(keep).compacted()
+    keep = rig.problem.views.piece % 2 == parity
+    views, pieces = rig.problem.views.select(keep).compacted()
     per_camera = np.bincount(views.camera, minlength=len(rig.cameras))
     if per_camera.min() < LEAST_HALF:
         return None
-    scene = rig.adjustment.scene
-    start = replace(scene, T_base_boards=scene.T_base_boards[moments])
+    start = rig.adjustment.scene.pieces(pieces)
     problem = replace(rig.problem, views=views)
     return adjust(start, problem, rig.adjustment.sigma_px, rounds=1).scene.cameras
 
 
-def _held_out(cameras: tuple[Camera, ...], rig: Rig, problem: Problem, parity: int) -> list[Array]:
-    """Residuals of unused moments by camera: only the board poses are fitted to them."""
-    moments = np.unique(rig.problem.views.moment)
-    poses = rig.adjustment.scene.T_base_boards[moments[moments % 2 != parity]]
-    start = replace(rig.adjustment.scene, cameras=cameras, T_base_boards=poses)
+def _held_out(cameras: tuple[Camera, ...], rig: Rig, problem: Problem, parity: int) -> Adjustment:
+    """Unused pieces with the cameras of the others: only the board's motion is fitted to them."""
+    pieces = np.unique(rig.problem.views.piece)
+    scene = rig.adjustment.scene.pieces(pieces[pieces % 2 != parity])
     held = replace(problem, free=np.zeros_like(problem.free))
-    result = adjust(start, held, rig.adjustment.sigma_px, rounds=1)
-    return [result.residuals_px[problem.views.camera == i] for i in range(len(cameras))]
+    return adjust(replace(scene, cameras=cameras), held, rig.adjustment.sigma_px, rounds=1)
 
 
-def _lengths(
-    cameras: tuple[Camera, ...], problem: Problem, warp_m: Array, edges: np.ndarray
-) -> tuple[Array, Array]:
+def _lengths(scene: Scene, problem: Problem, edges: np.ndarray) -> tuple[Array, Array]:
     """Measured and true lengths of board edges triangulated by two or more cameras."""
-    views = problem.views
+    views, cameras = problem.views, scene.cameras
     moments = int(views.moment.max()) + 1
     pixels = np.full((len(cameras), moments, len(problem.board_points_m), 2), np.nan)
-    pixels[views.camera, views.moment] = _at_moment(cameras, views)
+    pixels[views.camera, views.moment] = _at_moment(scene, problem)
     points = triangulate(cameras, pixels)
-    board = warped(problem.board_points_m, warp_m)
+    board = warped(problem.board_points_m, scene.warp_m)
     known = np.linalg.norm(board[edges[:, 0]] - board[edges[:, 1]], axis=-1)
     measured = np.linalg.norm(points[:, edges[:, 0]] - points[:, edges[:, 1]], axis=-1)
     seen = np.isfinite(measured)
     return measured[seen], np.broadcast_to(known, measured.shape)[seen]
 
 
-def _at_moment(cameras: tuple[Camera, ...], views: Views) -> Array:
-    """Corner pixels carried to the common moment by their image velocity."""
-    offset = np.array([camera.clock_offset_s for camera in cameras])[views.camera]
-    line = np.array([camera.line_time_s for camera in cameras])[views.camera]
-    delay = (views.lag_s + offset)[:, None] + views.pixels[..., 1] * line[:, None]
-    return views.pixels - views.velocity_px_s * delay[..., None]
+def _at_moment(scene: Scene, problem: Problem) -> Array:
+    """Corner pixels carried to an instant common to the moment's views by the board's motion."""
+    views = problem.views
+    if not scene.motion.any():
+        return views.pixels
+    offsets = np.array([camera.clock_offset_s for camera in scene.cameras])
+    own = views.lag_s + offsets[views.camera]
+    number = np.bincount(views.moment)
+    common = (np.bincount(views.moment, own) / np.maximum(number, 1))[views.moment]
+    at_once = tuple(replace(c, clock_offset_s=0.0, line_time_s=0.0) for c in scene.cameras)
+    then = replace(views, lag_s=common)
+    shown = board_residuals(scene, problem.board_points_m, views)
+    moved = board_residuals(replace(scene, cameras=at_once), problem.board_points_m, then)
+    return views.pixels + shown - moved
 
 
 def _volume_points(scene: Scene, board_points_m: Array) -> Array:

@@ -13,22 +13,27 @@ from calib.camera_models import Array
 class Views:
     """Sightings of one rigid board; a view is one camera at one moment.
 
+    A moment is an instant at which frames count as simultaneous, a piece a stretch of moments along
+    which the board's motion is one polynomial: a single moment for a board at rest.
+
     Attributes:
         camera: index of the camera, (n,).
-        moment: index of the moment (board pose), (n,).
+        moment: index of the moment, (n,).
+        piece: index of the piece of the board's motion, (n,).
         pixels: corners, NaN where unseen, (n, n_points, 2).
-        velocity_px_s: image velocity of the corners, zero where unknown, (n, n_points, 2).
-        lag_s: the view's own stamp minus the moment's time, (n,).
-        std_px: what the detector says of each corner's noise; only ratios count, (n, n_points).
+        lag_s: the view's own stamp minus the middle of its piece, (n,).
+        whitening: lower triangles F with F'F the inverse covariance of a group of corners that
+            were found together (a tag's four), over that of the camera's typical corner,
+            (n, n_groups, 2 c, 2 c).
         label: how a person finds the view: recording and frame, (n,) text.
     """
 
     camera: np.ndarray
     moment: np.ndarray
+    piece: np.ndarray
     pixels: Array
-    velocity_px_s: Array
     lag_s: Array
-    std_px: Array
+    whitening: Array
     label: tuple[str, ...]
 
     def __len__(self) -> int:
@@ -39,68 +44,91 @@ class Views:
         """Which corners were seen, bool (n, n_points)."""
         return np.isfinite(self.pixels[..., 0])
 
+    @property
+    def group_size(self) -> int:
+        """Corners to a group."""
+        return self.whitening.shape[-1] // 2
+
     def select(self, keep: np.ndarray) -> Views:
         """The views picked by a mask or an index array."""
         index = np.arange(len(self))[keep]
         return Views(
             self.camera[index],
             self.moment[index],
+            self.piece[index],
             self.pixels[index],
-            self.velocity_px_s[index],
             self.lag_s[index],
-            self.std_px[index],
+            self.whitening[index],
             tuple(self.label[i] for i in index),
         )
 
     def compacted(self) -> tuple[Views, np.ndarray]:
-        """The same views with moments renumbered from 0 without gaps, and the old numbers."""
-        moments, renumbered = np.unique(self.moment, return_inverse=True)
-        return (
-            replace(self, moment=renumbered),
-            moments,
-        )
+        """The same views, moments and pieces renumbered from 0; and the old numbers of pieces."""
+        _, moment = np.unique(self.moment, return_inverse=True)
+        pieces, piece = np.unique(self.piece, return_inverse=True)
+        return replace(self, moment=moment, piece=piece), pieces
+
+    def whitened(self, residuals: Array) -> Array:
+        """Residuals (n, n_points, 2) in units of the typical corner's, (n, n_groups, 2 c)."""
+        grouped = residuals.reshape(*self.whitening.shape[:-1])
+        return (self.whitening @ grouped[..., None])[..., 0]
 
 
 def make_views(
     camera: object,
     moment: object,
     pixels: object,
-    velocity_px_s: Array | None = None,
     lag_s: Array | None = None,
     label: tuple[str, ...] | None = None,
-    std_px: Array | None = None,
+    covariance_px2: Array | None = None,
 ) -> Views:
-    """Views with unknown velocities, lags and labels filled in; order is camera, then moment."""
+    """Views of a board at rest at every moment; order is camera, then moment.
+
+    Args:
+        camera: (n,).
+        moment: (n,).
+        pixels: (n, n_points, 2).
+        lag_s: stamp minus the moment's time, zero when None, (n,).
+        label: (n,) text.
+        covariance_px2: what the detector says of the noise of corners that were found together,
+            (n, n_groups, 2 c, 2 c), of which only ratios count; all corners alike when None.
+    """
     cameras, moments = np.asarray(camera, dtype=int), np.asarray(moment, dtype=int)
-    points = np.asarray(pixels, dtype=np.float64)
-    count = len(cameras)
+    points = np.array(pixels, dtype=np.float64)
     order = np.lexsort((moments, cameras))
-    velocity = np.zeros_like(points) if velocity_px_s is None else velocity_px_s
-    lag = np.zeros(count) if lag_s is None else np.asarray(lag_s, dtype=np.float64)
-    std = np.ones(points.shape[:2]) if std_px is None else np.asarray(std_px, dtype=np.float64)
+    lag = np.zeros(len(cameras)) if lag_s is None else np.asarray(lag_s, dtype=np.float64)
     names = label or tuple(f"camera {c} moment {m}" for c, m in zip(cameras, moments, strict=True))
+    if covariance_px2 is None:
+        whitening = np.broadcast_to(np.eye(2), (*points.shape[:2], 2, 2))
+    else:
+        whitening = _whitening(cameras, points, np.asarray(covariance_px2, dtype=np.float64))
     return Views(
         cameras[order],
         moments[order],
+        moments[order],
         points[order],
-        np.where(np.isfinite(velocity), velocity, 0.0)[order],
         lag[order],
-        std[order],
+        np.ascontiguousarray(whitening[order]),
         tuple(names[i] for i in order),
     )
 
 
-def relative_std(views: Views) -> Array:
-    """Noise of each corner relative to its camera's typical (median) corner, (n, n_points)."""
-    result = np.ones_like(views.std_px)
-    if np.ptp(views.std_px, axis=None) == 0.0:
-        return result
-    for index in np.unique(views.camera):
-        own = views.camera == index
-        seen = views.seen[own]
-        if seen.any():
-            result[own] = views.std_px[own] / np.median(views.std_px[own][seen])
-    return np.where(np.isfinite(result), np.clip(result, 0.1, 100.0), 1.0)
+def _whitening(camera: np.ndarray, pixels: Array, covariance_px2: Array) -> Array:
+    """Whitening of each group relative to its camera's typical corner; blanks `pixels` unseen."""
+    size = covariance_px2.shape[-1]
+    shape = covariance_px2.shape[:2]
+    known = np.asarray(np.isfinite(covariance_px2).all(axis=(2, 3)))
+    known = known & np.isfinite(pixels).reshape(*shape, size).all(axis=2)
+    pixels[~np.repeat(known, size // 2, axis=1)] = np.nan
+    safe = np.where(known[..., None, None], covariance_px2, np.eye(size))
+    variance = np.trace(safe, axis1=2, axis2=3) / size
+    typical = np.ones(len(camera))
+    for index in np.unique(camera):
+        own = camera == index
+        if known[own].any():
+            typical[own] = np.median(variance[own][known[own]])
+    root = np.linalg.cholesky(safe / typical[:, None, None, None])
+    return np.asarray(np.linalg.inv(root), dtype=np.float64)
 
 
 @dataclass(frozen=True, slots=True)

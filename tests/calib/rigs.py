@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from calib.camera import Camera
@@ -65,6 +67,36 @@ def observe(
             if np.isfinite(pixels[:, 0]).sum() >= 8:
                 rows.append((index, moment, pixels))
     return make_views([r[0] for r in rows], [r[1] for r in rows], np.array([r[2] for r in rows]))
+
+
+def hand_motion(cameras: tuple[Camera, ...], seed: int) -> Callable[[np.ndarray], tuple]:
+    """A board waved about by hand: times (...) -> positions (..., 3), rotations (..., 3, 3)."""
+    rng = np.random.default_rng(seed)
+    speed, phase = 2 * np.pi * rng.uniform(0.2, 1.0, (6, 4)), rng.uniform(0, 2 * np.pi, (6, 4))
+    share = rng.uniform(0.3, 1.0, (6, 4))
+    share *= np.array([0.35] * 3 + [0.75] * 3)[:, None] / share.sum(axis=1, keepdims=True)
+    face = facing(cameras)
+
+    def motion(times_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        angle = speed * np.asarray(times_s, dtype=float)[..., None, None] + phase
+        values = (np.sin(angle) * share).sum(axis=-1)
+        return values[..., :3], face @ exp_rotation(values[..., 3:])
+
+    return motion
+
+
+def film_points(
+    camera: Camera, motion: Callable[[np.ndarray], tuple], stamps_s: np.ndarray, points: np.ndarray
+) -> np.ndarray:
+    """Pixels of moving points, each row at its own time, NaN outside, (n_stamps, n_points, 2)."""
+    pixels = np.full((len(stamps_s), len(points), 2), 0.5 * camera.size_px[1])
+    for _ in range(6):
+        rows = pixels[..., 1] * camera.line_time_s
+        places, turns = motion(stamps_s[:, None] + camera.clock_offset_s + rows)
+        seen = camera.to_camera(np.einsum("npij,pj->npi", turns, points) + places)
+        pixels = camera.project(seen)
+    pixels[~camera.sees(seen)] = np.nan
+    return pixels
 
 
 def errors(scene: Scene, cameras: tuple[Camera, ...], reference: int | None) -> np.ndarray:

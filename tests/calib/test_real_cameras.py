@@ -27,7 +27,7 @@ def board_views(board: Board, files: list[Path]):
     detector = BoardDetector(board)
     found = [(file.name, detector.detect(cv2.imread(str(file), 0))) for file in files]
     found = [(name, corners) for name, corners in found if corners is not None]
-    pixels = np.array([corners[:, :2] for _, corners in found])
+    pixels = np.array([corners.pixels for _, corners in found])
     names = tuple(name for name, _ in found)
     return make_views(np.zeros(len(found)), np.arange(len(found)), pixels, label=names)
 

@@ -59,7 +59,7 @@ def test_corners_have_no_bias(kind):
         assert found is not None
         T = near @ FLIP @ np.linalg.inv(to_patch) if kind == "aprilgrid" else near
         points = board.points_m @ T[:3, :3].T + T[:3, 3]
-        error = found[:, :2] - camera.project(camera.to_camera(points))
+        error = found.pixels - camera.project(camera.to_camera(points))
         errors.append(error[np.isfinite(error[:, 0])])
     error = np.concatenate(errors)
     bias, rms = error.mean(axis=0), float(np.sqrt(np.mean(error**2)))

@@ -11,13 +11,21 @@ from calib.adjustment import adjust
 from calib.coverage import coverage_of
 from calib.normal_equations import Problem
 from calib.planar_pose import homographies
-from calib.reprojection import WARP, Scene, board_jacobians, board_residuals, camera_slices, moved
+from calib.reprojection import (
+    Scene,
+    board_residuals,
+    camera_slices,
+    kernel_board,
+    kernel_cameras,
+    moved,
+)
 from calib.rig import free_unknowns, solve_rig, start_cameras, tie_to_base
 from calib.survey_check import check_survey
 from calib.triangulation import triangulate
 from calib.trust import judge
 from calib.truth_checks import check_truth
-from calib.views import FixedPoints, make_views
+from calib.view_kernels import CLOCK, POSE, WARP, view_rows
+from calib.views import FixedPoints
 from cdpr.documents import DataError
 from tests.calib import rigs
 
@@ -35,31 +43,66 @@ def edges_of(points):
     return np.argwhere(np.triu(np.abs(gap - gap[gap > 0].min()) < 1e-9))
 
 
-def test_jacobians_match_differences():
-    cameras, points = rigs.rig(2), rigs.board()
+def rows_of(scene, points, views, index):
+    """Derivatives of the projection in one view by its local unknowns, (2 n_points, n)."""
+    lenses, places = kernel_cameras(scene.cameras)
+    (poses, motion, scale), shape = kernel_board(scene, points)
+    c, piece = views.camera[index], views.piece[index]
+    columns = lenses[3][c] + POSE + CLOCK + WARP + scene.board_unknowns
+    rows, residuals = np.zeros((2 * len(points), columns)), np.zeros(2 * len(points))
+    view_rows(
+        views.pixels[index],
+        views.lag_s[index],
+        tuple(part[c] for part in lenses[:4]),
+        tuple(part[c] for part in places),
+        (poses[piece], motion[piece], scale),
+        shape,
+        True,
+        rows,
+        residuals,
+    )
+    return rows
+
+
+@pytest.mark.parametrize("degree", [0, 3])
+def test_jacobians_match_differences(degree):
+    """A camera with clock and line time before a board that moves along a polynomial."""
+    rng = np.random.default_rng(0)
+    points = rigs.board()
+    cameras = tuple(
+        replace(c, clock_offset_s=0.004 * k, line_time_s=1e-5 * k)
+        for k, c in enumerate(rigs.rig(2))
+    )
     boards = rigs.poses(cameras, 3)
-    views = rigs.observe(cameras, boards, points, 0.0)
-    velocity = np.random.default_rng(0).normal(size=views.pixels.shape) * 100
-    views = replace(views, velocity_px_s=velocity).select(views.camera == 1)
-    scene = Scene(cameras, boards, np.zeros(WARP), np.zeros((0, 3)))
-    _, d_camera, d_board, d_warp = board_jacobians(scene, points, views, 1)
+    lags = rng.uniform(-0.02, 0.02, 6)
+    views = replace(rigs.observe(cameras, boards, points, 0.0), lag_s=lags)
+    motion = 0.2 * rng.normal(size=(3, degree, 6))
+    warp = np.array([1e-3, -2e-3, 0.0])
+    scene = Scene(cameras, boards, warp, np.zeros((0, 3)), motion, 0.03)
+    view = int(np.flatnonzero(views.camera == 1)[1])
     own = camera_slices(cameras)[1]
-    size = own.stop + WARP
-    for column in range(own.start, size):
-        step = np.zeros(size)
-        step[column] = 1e-6
-        ahead = board_residuals(moved(scene, step, np.zeros((3, 6))), points, views, 1)
-        behind = board_residuals(moved(scene, -step, np.zeros((3, 6))), points, views, 1)
-        local = column - own.start
-        k = own.stop - own.start
-        expected = d_camera[..., local] if local < k else d_warp[..., local - k]
-        np.testing.assert_allclose((behind - ahead) / 2e-6, expected, atol=2e-4)
-    for column in range(6):
-        step = np.zeros((3, 6))
-        step[:, column] = 1e-6
-        ahead = board_residuals(moved(scene, np.zeros(size), step), points, views, 1)
-        behind = board_residuals(moved(scene, np.zeros(size), -step), points, views, 1)
-        np.testing.assert_allclose((behind - ahead) / 2e-6, d_board[..., column], atol=2e-4)
+    shared, size = own.stop + WARP, own.stop - own.start + WARP
+    rows, line_time = rows_of(scene, points, views, view), own.stop - own.start - 1
+
+    def difference(at, column, step=1e-6):
+        steps = [np.zeros(shared), np.zeros((3, scene.board_unknowns))]
+        if at:
+            steps[1][views.piece[view], column] = step
+        else:
+            steps[0][column] = step
+        sides = [
+            board_residuals(moved(scene, sign * steps[0], sign * steps[1]), points, views)[view]
+            for sign in (1, -1)
+        ]
+        return (sides[1] - sides[0]).ravel() / (2 * step)
+
+    for local in range(size):
+        expected = difference(0, own.start + local, 1e-9 if local == line_time else 1e-6)
+        size_of = np.abs(expected).max() + 1.0
+        np.testing.assert_allclose(rows[:, local], expected, rtol=1e-5, atol=1e-5 * size_of)
+    for column in range(scene.board_unknowns):
+        expected = difference(1, column)
+        np.testing.assert_allclose(rows[:, size + column], expected, rtol=1e-5, atol=1e-3)
 
 
 def test_covariance_is_that_of_the_errors():
@@ -99,38 +142,6 @@ def test_sagging_board_is_found_and_flat_one_left_alone():
     rig, _ = solve(cameras, points, rigs.observe(cameras, boards, bent, 0.1))
     sag = rig.adjustment.scene.warp_m
     assert sag[0] == pytest.approx(0.002, abs=1e-4), sag
-
-
-def test_clocks_from_image_velocity():
-    """Offsets to 0.1 ms and a line time of 12 us from a board moved by hand, exact velocities."""
-    cameras = rigs.rig(3)
-    clocks = ((0.0, 0.0), (0.0043, 0.0), (-0.0068, 1.2e-5))
-    cameras = tuple(
-        replace(c, clock_offset_s=o, line_time_s=line)
-        for c, (o, line) in zip(cameras, clocks, strict=True)
-    )
-    points, rng = rigs.board(), np.random.default_rng(8)
-    boards = rigs.poses(cameras, 30)
-    speed = rng.normal(size=(30, 3)) * 0.3
-    rows = []
-    for index, camera in enumerate(cameras):
-        for moment, T in enumerate(boards):
-            place = points @ T[:3, :3].T + T[:3, 3]
-            _, d_point, _ = camera.project_jacobian(camera.to_camera(place))
-            v = d_point @ camera.T_camera_base[:3, :3] @ speed[moment]
-            pixels = camera.project(camera.to_camera(place))
-            for _ in range(3):
-                delay = camera.clock_offset_s + pixels[:, 1] * camera.line_time_s
-                shown = camera.to_camera(place + delay[:, None] * speed[moment])
-                pixels = camera.project(shown)
-            rows.append((index, moment, pixels + 0.05 * rng.normal(size=pixels.shape), v))
-    camera, moment, pixels, velocity = (list(column) for column in zip(*rows, strict=True))
-    views = make_views(camera, moment, np.array(pixels), np.array(velocity))
-    rig, _ = solve(cameras, points, views, clocks=True)
-    for found, true in zip(rig.cameras, cameras, strict=True):
-        error_ms = 1e3 * (found.clock_offset_s - true.clock_offset_s)
-        assert abs(error_ms) < 0.1, f"{true.name}: {error_ms} ms"
-        assert found.line_time_s == pytest.approx(true.line_time_s, abs=3e-7), true.name
 
 
 def survey_of(cameras, sigma=0.02, seed=3):
