@@ -160,7 +160,7 @@ def identify(
         best=best,
         free_coordinates=prepared.free,
         amplification=prepared.amplification,
-        notes=tuple(_session_notes(model, prepared, failures)),
+        notes=tuple(session_notes(model, prepared, failures)),
         prepared=prepared,
     )
 
@@ -271,7 +271,8 @@ def _validated(
     return tuple(found)
 
 
-def _session_notes(model: Model, prepared: PreparedRuns, failures: dict[str, str]) -> list[str]:
+def session_notes(model: Model, prepared: PreparedRuns, failures: dict[str, str]) -> list[str]:
+    """Sentences on what a reader of the numbers must know, the failures first."""
     notes = [f"{name} is absent: {why}" for name, why in failures.items()]
     if prepared.amplification > LARGEST_AMPLIFICATION:
         notes.append(

@@ -127,7 +127,7 @@ def _from_starts(
 ) -> tuple[Estimate, LikelihoodFit]:
     """The first fit from several starts that follows the runs, or else the likeliest of all.
 
-    A fit follows when its residuals are small beside the swings and a body can have its inertia.
+    A fit follows when its residuals are small beside the swings and no body is ruled out by it.
     """
     found: list[tuple[Estimate, LikelihoodFit]] = []
     failure: Exception | None = None
@@ -137,7 +137,7 @@ def _from_starts(
         except (ValueError, np.linalg.LinAlgError) as error:
             failure = failure or error
             continue
-        if is_possible(entry.values) and astray(result) < _ASTRAY:
+        if not entry.consistency.is_refuted and astray(result) < _ASTRAY:
             return entry, result
         found.append((entry, result))
     if not found:

@@ -13,23 +13,26 @@ from cdpr.documents import DataError
 from cdpr.effects import catalogue
 from cdpr.model import build_model
 from cdpr.robot import INERTIA_NAMES, POSE_COORDINATES, Array, Robot
+from ident.calibration import with_calibration
+from ident.diagnose.base import base_fit, refuse_few
+from ident.diagnose.decision import Candidate
 from ident.diagnose.experiments import separating_experiment
 from ident.diagnose.heldout import HeldOut, held_out
 from ident.diagnose.refit import Refit
-from ident.diagnose.search import Candidate, Search
+from ident.diagnose.search import Round, Search
 from ident.diagnose.unexplained import Unexplained, unexplained
-from ident.identify import IdentifySettings, identify
-from ident.joint import State
+from ident.fidim_stage import fidim_estimates
+from ident.identify import session_notes
 from ident.likelihood import LikelihoodFit, fit
-from ident.maximum_likelihood import started
-from ident.prepare import PreparedRun
+from ident.prepare import PreparedRun, prepare_runs
 from ident.runs import SwingRun
 from ident.samples import UNIT_NOISE_M, UNIT_NOISE_RAD
+from ident.signals import SignalSettings
+from ident.starts import likelihood_starts
 
 Progress = Callable[[str, float], None]
 
 FORMAT = "freeswing-diagnosis/1"
-LEAST_RUNS = 3
 # Effects whose best mixture explains less than this of the excess are the nearest, not the cause.
 LEAST_SHARE_EXPLAINED = 0.5
 
@@ -110,31 +113,37 @@ def diagnose(
     Raises:
         DataError: when fewer than three runs can be fitted, or no validation run is usable.
     """
-    known = identify(
-        runs,
-        robot,
-        IdentifySettings(maximum_likelihood=False, predict=False),
-        _part(progress, 0.0, 0.05),
-    )
-    estimate = known.estimates[known.best]
-    full = all(set(run.signals.coordinates) == set(POSE_COORDINATES) for run in known.prepared.runs)
-    free = None if full else known.free_coordinates
-    fitted = _of_role(known.prepared.runs, "identify")
-    checked = _of_role(known.prepared.runs, "validate")
-    _refuse_few(fitted, checked)
+    model = build_model(robot)
+    first_part = _part(progress, 0.0, 0.05)
+    try:
+        prepared = prepare_runs(runs, model, SignalSettings(), first_part)
+    except ValueError as error:
+        raise DataError(str(error)) from error
+    prepared, by_fidim, _ = fidim_estimates(model, prepared, "published", first_part)
+    full = all(set(run.signals.coordinates) == set(POSE_COORDINATES) for run in prepared.runs)
+    free = None if full else prepared.free
+    fitted = _of_role(prepared.runs, "identify")
+    checked = _of_role(prepared.runs, "validate")
+    refuse_few(fitted)
+    if not checked:
+        raise DataError(
+            "no usable run has role validate: before and after are measured on such runs alone; "
+            "give at least one run that role"
+        )
     noise_scales = _noise_scales([*fitted, *checked], free)
     names = tuple(catalogue()) if candidates is None else candidates
     barred = _barred(fitted, robot)
     considered = tuple(name for name in names if name not in barred)
-    base, fitted, dropped = _base_fit(
-        robot, fitted, free, estimate.values, noise_scales, _part(progress, 0.05, 0.2)
+    starts = likelihood_starts(model, prepared, tuple(one.values for one in by_fidim.values()))
+    base, fitted, dropped = base_fit(
+        robot, fitted, free, starts, noise_scales, _part(progress, 0.05, 0.2)
     )
     search = Search(noise_scales, considered, workers, executor, _part(progress, 0.2, 0.85))
     last = search.run(base)
-    notes = [*known.notes, *dropped]
+    notes = [*session_notes(model, prepared, {}), *dropped]
     share = _share_explained(search, last)
     rest = unexplained(last.fit, fitted, full, noise_scales)
-    accepted = [one for one in search.rounds if one.winner is not None]
+    accepted = [one for one in search.rounds if one.decision.winner is not None]
     if accepted and rest.present and share < LEAST_SHARE_EXPLAINED:
         notes.append(
             f"{', '.join(last.effects)} would remove only {100 * share:.0f} % of the excess: the "
@@ -144,14 +153,14 @@ def diagnose(
         accepted = []
         rest = unexplained(last.fit, fitted, full, noise_scales)
     ladder = _ladder(search, accepted, checked, free, _part(progress, 0.85, 0.95))
-    final = _with_own_noise(last.fit)
-    first = final if not accepted else _with_own_noise(search.rounds[0].before.fit)
-    groups = {one.winner.effects[-1]: one.group for one in accepted if one.winner is not None}
+    final = _with_own_noise(last.fit, fitted)
+    first = final if not accepted else _with_own_noise(search.rounds[0].before.fit, fitted)
+    groups = {one.after.effects[-1]: one.decision.group for one in accepted}
     if progress:
         progress("diagnosis", 1.0)
     return Diagnosis(
         ladder,
-        _last_words(search, accepted, barred, names),
+        _last_words(search, last.effects if accepted else (), barred, names),
         groups,
         first,
         final,
@@ -168,19 +177,6 @@ def _part(progress: Progress | None, low: float, high: float) -> Progress | None
 
 def _of_role(runs: tuple[PreparedRun, ...] | list[PreparedRun], role: str) -> list[PreparedRun]:
     return [run for run in runs if run.run.role == role and run.run.payload is None]
-
-
-def _refuse_few(fitted: list[PreparedRun], checked: list[PreparedRun]) -> None:
-    if len(fitted) < LEAST_RUNS:
-        raise DataError(
-            f"{len(fitted)} usable runs with role identify: at least {LEAST_RUNS} are needed to "
-            "decide on runs left out; record more swings about other equilibria"
-        )
-    if not checked:
-        raise DataError(
-            "no usable run has role validate: before and after are measured on such runs alone; "
-            "give at least one run that role"
-        )
 
 
 def _noise_scales(runs: list[PreparedRun], free: tuple[str, ...] | None) -> Array:
@@ -211,36 +207,13 @@ def _barred(runs: list[PreparedRun], robot: Robot) -> dict[str, str]:
     return barred
 
 
-def _base_fit(
-    robot: Robot,
-    runs: list[PreparedRun],
-    free: tuple[str, ...] | None,
-    inertia: Array,
-    noise_scales: Array,
-    progress: Progress | None,
-) -> tuple[LikelihoodFit, list[PreparedRun], list[str]]:
-    """The declared model fitted to the runs that can be started, in units of the noise."""
-    model = build_model(robot)
-    samples, states, kept, dropped = [], [], [], []
-    for run in runs:
-        try:
-            one, state = started(model, run, free, inertia)
-        except (ValueError, np.linalg.LinAlgError) as error:
-            dropped.append(f"run {run.name} left out: {error}")
-            continue
-        samples.append(one)
-        states.append(state)
-        kept.append(run)
-    _refuse_few(kept, kept)
-    start = State(inertia, model.start_values, np.array(states), noise_scales)
-    rough = fit(model, samples, start, progress=progress)
-    exact = replace(rough.state, scales=noise_scales)
-    return fit(model, samples, exact, estimate_scales=False, grow=False), kept, dropped
+def _with_own_noise(found: LikelihoodFit, runs: list[PreparedRun]) -> LikelihoodFit:
+    """The same fit for honest standard deviations.
 
-
-def _with_own_noise(found: LikelihoodFit) -> LikelihoodFit:
-    """The same fit with scales that follow its residuals: for honest standard deviations."""
-    return fit(found.model, found.samples, found.state, grow=False)
+    Its scales follow its residuals, and errors of the cameras' calibration are unknowns too.
+    """
+    own = fit(found.model, found.samples, found.state, grow=False)
+    return with_calibration(own, [run.run.pose_errors for run in runs]).fit
 
 
 def _share_explained(search: Search, last: Refit) -> float:
@@ -251,12 +224,12 @@ def _share_explained(search: Search, last: Refit) -> float:
 
 def _ladder(
     search: Search,
-    accepted: list,
+    accepted: list[Round],
     runs: list[PreparedRun],
     free: tuple[str, ...] | None,
     progress: Progress | None,
 ) -> tuple[Rung, ...]:
-    stages: list[Refit] = [search.rounds[0].before, *(one.winner for one in accepted)]
+    stages: list[Refit] = [search.rounds[0].before, *(one.after for one in accepted)]
     rungs = []
     for k, stage in enumerate(stages):
         if progress:
@@ -269,19 +242,20 @@ def _ladder(
 
 
 def _last_words(
-    search: Search, accepted: list, barred: dict[str, str], names: tuple[str, ...]
+    search: Search, final: tuple[str, ...], barred: dict[str, str], names: tuple[str, ...]
 ) -> tuple[Candidate, ...]:
     """Each effect's verdict in the round that accepted it, else in the first."""
     words: dict[str, Candidate] = {}
     for one in search.rounds:
-        for candidate in one.candidates:
+        stays = any(name in final for name in one.decision.group)
+        for candidate in one.decision.candidates:
+            if candidate.verdict != "rejected" and not stays:
+                candidate = replace(candidate, verdict="rejected", confounded_with=())
             if candidate.effect not in words or candidate.verdict != "rejected":
                 words[candidate.effect] = candidate
-    if not accepted:
-        words = {
-            name: replace(one, verdict="rejected", confounded_with=())
-            for name, one in words.items()
-        }
+        for name in one.removed:
+            why = f"superfluous since {one.after.effects[-1]} is in the model: removed again"
+            words[name] = replace(words[name], verdict="rejected", confounded_with=(), reason=why)
     for name, why in barred.items():
         if name in names:
             words[name] = Candidate(name, "not_identifiable", 0.0, 0.0, (), why)

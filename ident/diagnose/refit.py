@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -96,6 +96,29 @@ def refit(
         own_values=_with_new(start.own_values, len(model.own_values)),
     )
     return rescored(_fitted(model, current, state), noise_scales, colour)
+
+
+def polished(found: LikelihoodFit, noise_scales: Array) -> Refit:
+    """A fit that goes on to convergence."""
+    colour = colour_of(found, noise_scales)
+    state = replace(found.state, scales=noise_scales * np.sqrt(colour))
+    exact = fit(found.model, found.samples, state, estimate_scales=False, grow=False)
+    return rescored(exact, noise_scales, colour)
+
+
+def without(found: LikelihoodFit, name: str, noise_scales: Array) -> Refit:
+    """A fit without one of its effects, from where it stands, converged."""
+    model = found.model
+    place = [k for k, other in enumerate(model.names) if other.split(".")[0] == name]
+    fewer = build_model(model.robot, tuple(other for other in model.effects if other != name))
+    start = found.state
+    own = start.own_values
+    if own is not None:
+        own = own[:, ~np.isin(model.own_values, place)]
+    values = np.delete(start.values, place)
+    state = State(start.inertia, values, start.starts, start.scales, own_values=own)
+    exact = fit(fewer, found.samples, state, estimate_scales=False, grow=False)
+    return rescored(exact, noise_scales, colour_of(exact, noise_scales))
 
 
 def _fitted(model: Model, current: LikelihoodFit, state: State) -> LikelihoodFit:

@@ -1,0 +1,107 @@
+"""The declared model fitted to the runs of a session: where a diagnosis starts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from cdpr.documents import DataError
+from cdpr.model import Model, build_model
+from cdpr.robot import Array, Robot
+from ident.joint import State
+from ident.likelihood import LikelihoodFit, fit
+from ident.likelihood_run import Samples, residuals
+from ident.maximum_likelihood import astray, started
+from ident.prepare import PreparedRun
+from ident.starts import is_possible
+
+Progress = Callable[[str, float], None]
+
+LEAST_RUNS = 3
+MOST_STARTS = 3
+ROUGH_TOLERANCE = 1.0
+# What an effect leaves is small beside the swings; what a fit in the wrong valley leaves is not.
+SMALL_BESIDE_SWINGS = 0.05
+AT_THE_NOISE = 2.0
+
+
+def base_fit(
+    robot: Robot,
+    runs: list[PreparedRun],
+    free: tuple[str, ...] | None,
+    starts: list[Array],
+    noise_scales: Array,
+    progress: Progress | None,
+) -> tuple[LikelihoodFit, list[PreparedRun], list[str]]:
+    """The fit without effects in units of the noise, the runs in it, and sentences on the others.
+
+    The first start that leads to residuals small beside the swings serves, else the likeliest.
+
+    Args:
+        robot: declared geometry.
+        runs: with role identify.
+        free: coordinates to use of them, or None for full poses.
+        starts: inertias to start from, each (9,), in the order in which to try them.
+        noise_scales: of metres and radians, (2,).
+        progress: told a label and a fraction.
+
+    Raises:
+        DataError: when fewer than three runs can be started, or no start leads to a fit.
+    """
+    model = build_model(robot)
+    found: list[tuple[LikelihoodFit, list[PreparedRun], list[str]]] = []
+    failure = ""
+    for inertia in starts[:MOST_STARTS]:
+        samples, states, kept, dropped = _begun(model, runs, free, inertia)
+        start = State(inertia, model.start_values, states, noise_scales)
+        try:
+            refuse_few(kept)
+            rough = fit(model, samples, start, progress=progress, tolerance=ROUGH_TOLERANCE)
+        except (ValueError, np.linalg.LinAlgError) as error:
+            failure = failure or str(error)
+            continue
+        found.append((rough, kept, dropped))
+        if is_possible(rough.inertia) and _follows(rough, noise_scales):
+            break
+    if not found:
+        raise DataError(f"the declared model could not be fitted to the runs: {failure}")
+    most = max(len(kept) for _, kept, _ in found)
+    best = min((one for one in found if len(one[1]) == most), key=lambda one: one[0].deviance)
+    rough, kept, dropped = best
+    exact = replace(rough.state, scales=noise_scales)
+    return fit(model, rough.samples, exact, estimate_scales=False, grow=False), kept, dropped
+
+
+def refuse_few(runs: list[PreparedRun]) -> None:
+    """Raises DataError where runs are too few to leave one out."""
+    if len(runs) < LEAST_RUNS:
+        raise DataError(
+            f"{len(runs)} usable runs with role identify: at least {LEAST_RUNS} are needed to "
+            "decide on runs left out; record more swings about other equilibria"
+        )
+
+
+def _begun(
+    model: Model, runs: list[PreparedRun], free: tuple[str, ...] | None, inertia: Array
+) -> tuple[list[Samples], Array, list[PreparedRun], list[str]]:
+    samples, states, kept, dropped = [], [], [], []
+    for run in runs:
+        try:
+            one, state = started(model, run, free, inertia)
+        except (ValueError, np.linalg.LinAlgError) as error:
+            dropped.append(f"run {run.name} left out: {error}")
+            continue
+        samples.append(one)
+        states.append(state)
+        kept.append(run)
+    return samples, np.array(states), kept, dropped
+
+
+def _follows(found: LikelihoodFit, noise_scales: Array) -> bool:
+    if astray(found) < SMALL_BESIDE_SWINGS:
+        return True
+    pairs = zip(found.motions, found.samples, strict=True)
+    power = np.mean([np.mean(residuals(m, s, noise_scales) ** 2) for m, s in pairs])
+    return float(power) < AT_THE_NOISE

@@ -1,0 +1,54 @@
+"""Backward removal: an effect that a later one makes superfluous leaves the model again."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ident.diagnose.decision import (
+    CONFOUNDED_DIFFERENCE,
+    LARGEST_DELTA_BIC,
+    delta_bic,
+    parameter_count,
+)
+from ident.diagnose.refit import Refit, colour_of
+from ident.diagnose.screen import BASE
+
+
+def superfluous(current: Refit, kept: Sequence[str], noise_scales: np.ndarray) -> str:
+    """The effect whose values differ least from doing nothing, by its covariance; or "".
+
+    Args:
+        current: the fit with all effects.
+        kept: effects that may not leave: the one that came last and its group.
+        noise_scales: of metres and radians, (2,).
+    """
+    colour = colour_of(current.fit, noise_scales)
+    count = float(current.evidence.counts.sum())
+    rises = {}
+    for name in current.effects:
+        if name in kept:
+            continue
+        where = current.values_of(name)
+        parameters = current.fit.model.parameters[where]
+        if any(parameter.per_run for parameter in parameters):
+            continue
+        tested = [k for k, parameter in enumerate(parameters) if parameter.amplitude]
+        away = current.fit.values[where] - [parameter.start for parameter in parameters]
+        columns = BASE + where.start + np.array(tested)
+        covariance = current.fit.covariance[np.ix_(columns, columns)]
+        rise = float(away[tested] @ np.linalg.solve(covariance, away[tested])) / colour
+        rises[name] = rise - len(parameters) * np.log(count)
+    if not rises:
+        return ""
+    least = min(rises, key=lambda name: rises[name])
+    return least if rises[least] < -LARGEST_DELTA_BIC else ""
+
+
+def is_no_worse(fewer: Refit, more: Refit, name: str, noise_scales: np.ndarray) -> bool:
+    """Whether a fit without an effect is as good as the one with it, its unknowns counted."""
+    colour = colour_of(more.fit, noise_scales)
+    by_likelihood = delta_bic(fewer, more.score, parameter_count(fewer, name), colour)
+    by_held_out = (fewer.held_out - more.held_out) / colour
+    return by_likelihood > LARGEST_DELTA_BIC and by_held_out < CONFOUNDED_DIFFERENCE
