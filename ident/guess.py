@@ -14,8 +14,10 @@ from cdpr.robot import POSE_COORDINATES, Array
 from cdpr.statics import Equilibrium, equilibrium_at_lengths, modes, random_poses
 from ident.likelihood_run import Samples
 
-SMOOTHED_S = 0.4
+SMOOTHED_S = (0.1, 0.15, 0.2, 0.3, 0.4)
 SMOOTHED_DEGREE = 4
+LEAST_SMOOTHED = 8  # samples
+SMOOTH = 2.0  # times the residual over the shortest span up to which a longer one still follows
 MODAL_S = 1.5
 LEAD_IN = 40
 EQUILIBRIUM_STARTS = 40
@@ -65,19 +67,36 @@ def taut_equilibrium(model: Model, lengths_m: Array, inertia: Array, run: str) -
 
 
 def _smoothed_start(times_s: Array, values: Array) -> tuple[Array, Array]:
-    """Value and rate at the first sample of a polynomial through the first samples."""
-    inside = times_s <= times_s[0] + SMOOTHED_S
-    inside[: 2 * (SMOOTHED_DEGREE + 1)] = True
-    polynomial = np.polynomial.polynomial.polyfit(
-        times_s[inside] - times_s[0], values[inside], SMOOTHED_DEGREE
-    )
-    return polynomial[0], polynomial[1]
+    """Value and rate at the first sample of a polynomial through the first samples.
+
+    Over as long a span as the polynomial follows: fast modes turn round within 0.4 s.
+    """
+    start, shortest = None, None
+    for span in SMOOTHED_S:
+        inside = _first(times_s, span)
+        since = times_s[inside] - times_s[0]
+        polynomial = np.polynomial.polynomial.polyfit(since, values[inside], SMOOTHED_DEGREE)
+        off = values[inside] - np.polynomial.polynomial.polyval(since, polynomial).T
+        size = np.sqrt(np.sum(off**2, axis=0) / max(1, len(since) - SMOOTHED_DEGREE - 1))
+        shortest = size if shortest is None else shortest
+        if start is not None and not (size <= SMOOTH * shortest).all():
+            break
+        start = polynomial[0], polynomial[1]
+    if start is None:
+        raise ValueError("no sample to start from")
+    return start
+
+
+def _first(times_s: Array, span_s: float) -> Array:
+    """Which samples lie within a span from the first, at least so many as a start needs."""
+    inside = times_s <= times_s[0] + span_s
+    inside[:LEAST_SMOOTHED] = True
+    return inside
 
 
 def _assembled_start(model: Model, samples: Samples, rest: Equilibrium) -> Array:
     """Dependent coordinates from the lengths (FIDIM 2022, eq. 44), then smoothed."""
-    inside = samples.times_s <= samples.times_s[0] + SMOOTHED_S
-    inside[: 2 * (SMOOTHED_DEGREE + 1)] = True
+    inside = _first(samples.times_s, SMOOTHED_S[-1])
     free = samples.values[inside]
     fractions = np.linspace(0.0, 1.0, LEAD_IN, endpoint=False)[:, None]
     home = rest.zeta[samples.columns]

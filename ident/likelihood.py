@@ -21,6 +21,7 @@ from ident.likelihood_run import Samples, predicted, residuals
 
 Progress = Callable[[str, float], None]
 
+FIRST_STATES_S = 0.4  # short enough that no mode turns round: rough first states become good
 FIRST_STRETCH_S = 1.5
 STRETCH_GROWTH = 2.5
 STEPS = 30
@@ -136,8 +137,10 @@ def fit(
             progress(f"maximum likelihood: first {end_s:.1f} s", index / total)
         parts = [run.until(run.span_s[0] + end_s).loosened(LOOSE_LENGTH_STD_M) for run in samples]
         if index == 0:
-            states_alone = Problem(model, parts, none, estimate_scales)
-            state = _minimised(states_alone, state, STEPS, ROUGH_DECREASE)[0]
+            for first_s in (FIRST_STATES_S, end_s):
+                short = [run.until(run.span_s[0] + first_s) for run in parts]
+                states_alone = Problem(model, short, none, estimate_scales)
+                state = _minimised(states_alone, state, STEPS, ROUGH_DECREASE)[0]
         problem = Problem(model, parts, free, estimate_scales, consistent=consistent)
         state = _minimised(problem, state, STEPS, ROUGH_DECREASE)[0]
     if progress:

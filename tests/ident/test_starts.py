@@ -5,12 +5,17 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from cdpr.model import build_model
 from cdpr.robot import POSE_COORDINATES
+from cdpr.trajectory import Trajectory
+from ident.consistency import is_possible
+from ident.guess import first_state
 from ident.prepare import prepare_runs
+from ident.samples import prepare
 from ident.signals import SignalSettings
-from ident.starts import is_possible, likelihood_starts
+from ident.starts import likelihood_starts
 from tests.ident.swings import REGULAR, TRUE_INERTIA, paper_model, recorded, swing
 
 
@@ -44,3 +49,20 @@ def test_impossible_results_are_passed_over():
     bad = -TRUE_INERTIA
     starts = likelihood_starts(model, prepared, (bad,))
     assert all(is_possible(start) for start in starts), f"{starts}"
+
+
+FAST = np.array([0.002, -0.0025, 0.198, 0.0647, 0.0513, 0.0377, 0.0, -4e-4, 5e-4])
+
+
+@pytest.mark.parametrize("rate_hz", [100, 50])
+def test_modes_that_turn_round_quickly_are_started_well(rate_hz: int):
+    """A light platform swings at 3 Hz: a polynomial over 0.4 s was off by 1.5 rad/s."""
+    motion = swing(11, duration_s=5.0, inertia=tuple(FAST))
+    run = recorded(motion, "fast", np.random.default_rng(5), 1e-4)
+    every = 100 // rate_hz
+    values, times = run.trajectory.values[::every], run.trajectory.times_s[::every]
+    run = replace(run, trajectory=Trajectory(times, ("x", "y"), values))
+    state = first_state(paper_model(), prepare(run, (0.0, 5.0)), TRUE_INERTIA)
+    off = np.abs(state - np.concatenate([motion.zetas[0], motion.rates[0]]))
+    assert off[:6].max() < 0.02, f"pose off by {np.round(off[:6], 4)}"
+    assert off[6:].max() < 0.5, f"rates off by {np.round(off[6:], 3)}"
