@@ -22,6 +22,7 @@ from calib.corners import (
 )
 from vision.detect import TagFinder, detect_tags
 from vision.markers import Blob, find_blobs
+from vision.occlusion import Plates
 from vision.single_pose import Pose, extrapolate, refine_pose, start_pose
 from vision.watch import Watch
 
@@ -86,9 +87,12 @@ class Follower:
     count: int = 0
     _rays: Array = field(init=False, repr=False)
     _finder: TagFinder = field(init=False, repr=False)
+    _plates: Plates = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         self._rays = lens_rays(self.camera)
+        cells = [rimmed_cells(family, number).shape[0] - 2 for family, number in self.watch.tags]
+        self._plates = Plates.of(self.watch.tag_corners_m, np.array(cells, dtype=float))
         self._finder = TagFinder.of((*self.watch.tags, *self.watch.base_tags))
 
     def look(self, image: Image, time_s: float) -> FrameView:
@@ -108,6 +112,9 @@ class Follower:
         bright = {k for k, fit in found.items() if fit.black + fit.contrast > _SATURATED}
         kept = {k: fit for k, fit in found.items() if k not in bright}
         pose = self._settle(kept, time_s)
+        if pose is not None:
+            covered = self._plates.hidden(*pose)
+            kept = {k: fit for k, fit in kept.items() if k >= len(covered) or not covered[k]}
         sightings = [self._sighting(k, fit) for k, fit in sorted(kept.items())]
         sightings += self._look_for_markers(image, pose)
         return FrameView(self._status(image, sightings, bright), tuple(sightings), pose)
@@ -122,7 +129,9 @@ class Follower:
         slant = np.einsum("ni,ni->n", normals, centres) / (
             np.linalg.norm(normals, axis=1) * np.linalg.norm(centres, axis=1)
         )
-        seen = (slant < -_FACING) & self.camera.sees(corners).all(axis=1)
+        seen = (
+            (slant < -_FACING) & self.camera.sees(corners).all(axis=1) & ~self._plates.hidden(*pose)
+        )
         found: dict[int, TagFit] = {}
         if not seen.any():
             return found

@@ -25,7 +25,7 @@ from vision.watch import Watch
 Array = NDArray[np.float64]
 
 FRAMES_A_PIECE = 400
-_VERSION = b"freeswing-sightings/2"
+_VERSION = b"freeswing-sightings/3"
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,7 +2,8 @@
 
 Geometry is exact: pixels see area-sampled planes through the camera's own distortion, each image
 row at its own time (clock offset, rolling shutter) and averaged over the exposure. Everything is
-decided by the seed.
+decided by the seed. Each plane is blurred by itself: where one covers another, print within two
+blur widths of the covering edge is a little too bright.
 """
 
 from __future__ import annotations
