@@ -9,43 +9,77 @@ from freeswing.commands.arguments import add_session, open_session
 from freeswing.console import Console
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
 
+    from freeswing.printing.sheet import Sheet
     from freeswing.session import Session
     from vision.patterns import Patch
 
 
+FORMATS = ("pdf", "svg", "png")
+MOST_DPI = 4800.0
+
+
 def add_arguments(parser: ArgumentParser) -> None:
-    """The session."""
+    """The session, the kinds of file and their resolution."""
     add_session(parser)
+    parser.add_argument(
+        "--format",
+        choices=FORMATS,
+        action="append",
+        dest="formats",
+        help="default pdf; may be repeated",
+    )
+    parser.add_argument(
+        "--dpi", type=float, default=600.0, help="dots per inch of png, default 600"
+    )
 
 
 def run(options: Namespace, console: Console) -> None:
-    """One SVG file for the board and for each tag on the platform and on the frame."""
-    from cdpr.documents import DataError, replace_file
-    from freeswing.printing import sheet_svg
+    """A file for the board and for each tag on the platform and on the frame."""
+    from cdpr.documents import DataError, InputError, replace_file
 
+    if not 10.0 <= options.dpi <= MOST_DPI:
+        raise InputError(f"--dpi {options.dpi:g} must lie in 10 to {MOST_DPI:g}")
     session = open_session(options)
     written = []
-    for name, label, patch in _sheets(session):
-        path = session.results / "print" / f"{name}.svg"
-        replace_file(path, sheet_svg(patch.cells, patch.size_m, label).encode("utf-8"))
-        console.say(str(path))
-        written.append(str(path))
+    for name, sheet in _sheets(session):
+        for kind in dict.fromkeys(options.formats or FORMATS[:1]):
+            path = session.results / "print" / f"{name}.{kind}"
+            replace_file(path, _bytes(sheet, kind, options.dpi))
+            console.say(f"{path}: {sheet.width_mm:.6g} mm wide")
+            written.append(str(path))
     if not written:
         raise DataError(f"{session.path}: names neither a calibration board nor tags to print")
+    console.say("print at 100 % (no fit to page), then measure the width with a ruler")
     console.say_json({"format": "freeswing-board/1", "sheets": written})
 
 
-def _sheets(session: Session) -> Iterator[tuple[str, str, Patch]]:
+def _bytes(sheet: Sheet, kind: str, dpi: float) -> bytes:
+    if kind == "pdf":
+        from freeswing.printing.pdf import sheet_pdf
+
+        return sheet_pdf(sheet)
+    if kind == "png":
+        from freeswing.printing.png import sheet_png
+
+        return sheet_png(sheet, dpi)
+    from freeswing.printing.svg import sheet_svg
+
+    return sheet_svg(sheet)
+
+
+def _sheets(session: Session) -> Iterator[tuple[str, Sheet]]:
     import numpy as np
 
+    from freeswing.printing.sheet import Sheet
     from freeswing.swings import load_target
     from vision.patterns import tag_patch
 
     calibration = session.calibration
     if calibration is not None and calibration.board is not None:
-        yield "board", f"{calibration.board['kind']} board", _board_patch(calibration.board)
+        patch = _board_patch(calibration.board)
+        yield "board", Sheet(patch.cells, patch.size_m, _board_label(calibration.board))
     target = load_target(session)
     tags = [(tag.family, tag.id, tag.size_m) for tag in target.tags] if target else []
     for tag in calibration.base_tags if calibration is not None else ():
@@ -53,10 +87,24 @@ def _sheets(session: Session) -> Iterator[tuple[str, str, Patch]]:
         tags.append((tag.family, tag.id, side))
     for family, number, side in tags:
         label = f"{family} {number}, black border {1e3 * side:.6g} mm"
-        yield f"{family}-{number}", label, tag_patch(family, number, side)
+        patch = tag_patch(family, number, side)
+        yield f"{family}-{number}", Sheet(patch.cells, patch.size_m, label)
 
 
-def _board_patch(table) -> Patch:
+def _board_label(table: Mapping[str, object]) -> str:
+    from calib.boards import board_from
+
+    board = board_from(table)
+    counts = f"{board.columns} x {board.rows}"
+    side_mm = 1e3 * board.square_m
+    if board.kind == "charuco":
+        return f"charuco {board.dictionary}, {counts} squares of {side_mm:.6g} mm"
+    if board.kind == "chessboard":
+        return f"chessboard, {counts} inner corners, squares of {side_mm:.6g} mm"
+    return f"aprilgrid {board.dictionary}, {counts} tags of {side_mm:.6g} mm"
+
+
+def _board_patch(table: Mapping[str, object]) -> Patch:
     from calib.boards import board_from
     from vision.patterns import aprilgrid_patch, charuco_patch, chessboard_patch
 

@@ -68,37 +68,6 @@ def test_simulate_refuses_lengths_of_another_robot(tmp_path: Path) -> None:
     assert simulate(tmp_path / "a.csv", "--amplitude-m", "1e-3", lengths="0.01,0.01,9.0") == 1
 
 
-def test_board_has_its_size_and_its_tags(tmp_path: Path) -> None:
-    (tmp_path / "robot.toml").write_bytes(ROBOT.read_bytes())
-    (tmp_path / "session.toml").write_text(
-        """format = "freeswing-session/1"
-name = "print"
-robot = "robot.toml"
-[calibration]
-recordings = "calibration"
-board.kind = "charuco"
-board.squares = [5, 4]
-board.square_m = 0.04
-board.marker_m = 0.03
-board.dictionary = "DICT_5X5_100"
-[[calibration.base_tags]]
-family = "tag36h11"
-id = 100
-corners_base_m = [[0,0,0],[0.1,0,0],[0.1,-0.1,0],[0,-0.1,0]]
-[[runs]]
-name = "a"
-role = "identify"
-video = "a"
-""",
-        encoding="utf-8",
-    )
-    assert main(["board", str(tmp_path), "--quiet"]) == 0
-    sheet = ET.parse(tmp_path / "results" / "print" / "board.svg").getroot()
-    width_mm = float(str(sheet.get("width")).removesuffix("mm"))
-    assert width_mm == pytest.approx(40 * (5 + 1), abs=1e-6)
-    assert (tmp_path / "results" / "print" / "tag36h11-100.svg").is_file()
-
-
 def identified(session: Path) -> None:
     values = (0.01, -0.02, 0.19, 0.056, 0.066, 0.037, 1e-4, -9e-4, 7e-4)
     rows = [

@@ -1,0 +1,1 @@
+"""Boards and tags as files that print at their true size."""
