@@ -11,6 +11,7 @@ from calib.cameras_file import read_cameras, write_cameras
 from cdpr.documents import InputError
 
 FORMATS = ("freeswing", "opencv", "kalibr", "ros", "anipose", "colmap", "qualisys")
+_LOOKED_AT_BYTES = 20_000
 _MODULES = {
     "opencv": "opencv_yaml",
     "kalibr": "kalibr",
@@ -60,7 +61,8 @@ def guess(path: Path) -> str:
         return "colmap" if (path / "cameras.txt").is_file() else "ros"
     if not path.is_file():
         raise InputError(f"{path}: no such file")
-    start = path.read_bytes()[:20000].decode(errors="replace")
+    with path.open("rb") as file:
+        start = file.read(_LOOKED_AT_BYTES).decode(errors="replace")
     signs = (
         ("freeswing", 'format = "freeswing-cameras'),
         ("opencv", "!!opencv-matrix"),

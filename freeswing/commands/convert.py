@@ -1,4 +1,4 @@
-"""Convert a trajectory from one format to another (.csv .tum .trc .c3d)."""
+"""Convert a trajectory or cameras from one program's format to another's."""
 
 from __future__ import annotations
 
@@ -8,13 +8,24 @@ from pathlib import Path
 from freeswing.console import Console
 
 SUFFIXES = (".csv", ".tum", ".trc", ".c3d")
+CAMERA_FORMATS = ("freeswing", "opencv", "kalibr", "ros", "anipose", "colmap", "qualisys")
 
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Source, destination and what a change between poses and markers needs."""
-    kinds = ", ".join(SUFFIXES)
-    parser.add_argument("source", metavar="FROM", help=f"trajectory to read: {kinds}")
-    parser.add_argument("result", metavar="TO", help=f"file to write: {kinds}")
+    kinds, cameras = ", ".join(SUFFIXES), ", ".join(CAMERA_FORMATS)
+    parser.add_argument("source", metavar="FROM", help=f"trajectory ({kinds}) or cameras")
+    parser.add_argument("result", metavar="TO", help="what to write; its ending tells a trajectory")
+    parser.add_argument(
+        "--to", choices=CAMERA_FORMATS, metavar="FORMAT", help=f"of the new cameras: {cameras}"
+    )
+    parser.add_argument(
+        "--from",
+        choices=CAMERA_FORMATS,
+        metavar="FORMAT",
+        dest="source_format",
+        help="of the cameras that are there, where their file does not tell",
+    )
     parser.add_argument("--robot", metavar="FILE", help="robot.toml, names the free coordinates")
     parser.add_argument("--target", metavar="FILE", help="target.toml, places the markers")
 
@@ -24,18 +35,45 @@ def run(options: Namespace, console: Console) -> None:
     from cdpr.documents import InputError
 
     source, result = Path(options.source), Path(options.result)
-    for path in (source, result):
-        if path.suffix.lower() not in SUFFIXES:
-            known = ", ".join(SUFFIXES)
-            raise InputError(f"{path}: {path.suffix or 'no ending'!r} is not one of {known}")
     if result.exists() and source.exists() and result.samefile(source):
         raise InputError(f"{result}: source and result are the same file; name another")
+    losses: list[str] = []
+    if _is_of_cameras(source, options):
+        from freeswing.camera_conversion import convert_cameras
+
+        _refuse_trajectory(result)
+        losses = convert_cameras(source, result, options.source_format, options.to)
+    else:
+        _convert_trajectory(source, result, options)
+    console.say(str(result))
+    for loss in losses:
+        console.complain(f"{result}: {loss}")
+    console.say_json({"format": "freeswing-conversion/1", "result": str(result), "losses": losses})
+
+
+def _is_of_cameras(source: Path, options: Namespace) -> bool:
+    told = options.source_format is not None or options.to is not None
+    return told or source.suffix.lower() not in SUFFIXES
+
+
+def _refuse_trajectory(result: Path) -> None:
+    from cdpr.documents import InputError
+
+    if result.suffix.lower() in SUFFIXES:
+        raise InputError(f"{result}: cameras do not become a trajectory; its ending says it is one")
+
+
+def _convert_trajectory(source: Path, result: Path, options: Namespace) -> None:
+    from cdpr.documents import InputError
+
+    if result.suffix.lower() not in SUFFIXES:
+        known = ", ".join(SUFFIXES)
+        ending = result.suffix or "no ending"
+        raise InputError(f"{result}: {ending!r} is not one of a trajectory: {known}")
     if result.suffix.lower() in (".trc", ".c3d"):
         _write_markers(source, result, options)
     else:
         _write_poses(source, result, options)
-    console.say(str(result))
-    console.say_json({"format": "freeswing-conversion/1", "result": str(result)})
 
 
 def _write_poses(source: Path, result: Path, options: Namespace) -> None:

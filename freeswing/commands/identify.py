@@ -5,7 +5,6 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING, Any
 
-from cdpr.documents import InputError
 from freeswing.commands.arguments import add_session, open_session
 from freeswing.console import Console
 
@@ -60,6 +59,7 @@ def make(
     session: Session, console: Console, settings: dict[str, Any], crew: Crew
 ) -> list[tuple[str, dict[str, Any]]]:
     """identification.json and motion.json as documents."""
+    from cdpr.documents import InputError
     from freeswing.motions import predicted_motions
     from freeswing.places import swing_places
     from freeswing.swings import load_robot, load_swings, load_target
