@@ -87,7 +87,7 @@ def run_share(
     focal = np.array([v.camera.focal_px.mean() for v in views])
     roots = noise.roots()
     found = []
-    for block in blocks(views, watch, poses.times_s):
+    for block in blocks(views, watch, poses.times_s, poses):
         mine = chosen[(chosen >= block.first) & (chosen < block.first + len(block.starts) - 1)]
         if len(mine):
             slopes = _pose_slopes(

@@ -99,7 +99,7 @@ def fuse(
         positions, rotations = poses.positions_m.copy(), poses.rotations.copy()
         covariances, known = np.full((n, 6, 6), np.nan), np.zeros(n, dtype=bool)
         account = _Account(n_c)
-        for block in blocks(views, watch, instants_s):
+        for block in blocks(views, watch, instants_s, poses):
             span = slice(block.first, block.first + len(block.starts) - 1)
             start_position, start_rotation, can = _starts(
                 block, positions[span], rotations[span], poses.motions[span]

@@ -46,7 +46,7 @@ def layout_sums(poses: Poses, fit: Fit, views: Sequence[CameraViews], watch: Wat
     size = 6 * len(watch.tags)
     normal, right = np.zeros((size, size)), np.zeros(size)
     noise = fit.floor_px / np.array([v.camera.focal_px.mean() for v in views])
-    for block in blocks(views, watch, poses.times_s):
+    for block in blocks(views, watch, poses.times_s, poses):
         _add_block(block, poses, views, watch, noise, normal, right)
     return LayoutSums(normal, right)
 

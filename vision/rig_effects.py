@@ -146,7 +146,7 @@ def rig_step(
     normal, right = np.zeros((size, size)), np.zeros(size)
     focal = np.array([v.camera.focal_px.mean() for v in views])
     cameras = camera_matrices(views)
-    for block in blocks(views, watch, poses.times_s):
+    for block in blocks(views, watch, poses.times_s, poses):
         span = slice(block.first, block.first + len(block.starts) - 1)
         known = poses.known[span] & (np.abs(poses.motions[span]).sum(axis=1) > 0.0)
         n_o = len(block.things)

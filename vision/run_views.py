@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,11 @@ from calib.camera import Camera
 from cdpr.rotation import invert
 from vision.follow import USED
 from vision.pieces import Piece, load_piece
+from vision.rolling import rolling_bias
 from vision.watch import Watch
+
+if TYPE_CHECKING:
+    from vision.fuse import Poses
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -172,12 +177,20 @@ def instants_of(views: Sequence[CameraViews]) -> Array:
     return np.concatenate(grid)
 
 
-def blocks(views: Sequence[CameraViews], watch: Watch, instants_s: Array) -> Iterator[Block]:
-    """All sightings of the platform, each at the instant nearest to its frame."""
+def blocks(
+    views: Sequence[CameraViews], watch: Watch, instants_s: Array, poses: Poses | None = None
+) -> Iterator[Block]:
+    """All sightings of the platform, each at the instant nearest to its frame.
+
+    With `poses` at these instants, the corners are freed of what rolling shutters did to them.
+    """
     nearest = [_nearest(v, instants_s) for v in views]
     for first in range(0, len(instants_s), INSTANTS_A_BLOCK):
         last = min(first + INSTANTS_A_BLOCK, len(instants_s))
-        yield _block(views, nearest, watch, first, last)
+        block = _block(views, nearest, watch, first, last)
+        if poses is not None and any(v.camera.line_time_s != 0.0 for v in views):
+            block = replace(block, rays=block.rays - rolling_bias(block, views, poses))
+        yield block
 
 
 def _nearest(views: CameraViews, instants_s: Array) -> Ints:

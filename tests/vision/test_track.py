@@ -3,70 +3,23 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from calib.camera import Camera
 from cdpr.documents import InputError
-from cdpr.rotation import log_rotation
 from cdpr.target import Target
 from cdpr.trajectory_files import read_trajectory
-from tests.vision.scenes import (
-    OPENCV_PARAMS,
-    SurveyedTag,
-    arc_of_cameras,
-    platform_tags,
-    scene_of,
-    standing_tags,
-    swing,
-)
+from tests.vision.films import BASE, FRAMES, TARGET, cameras, errors, film, track
 from vision import pieces, sightings
-from vision.record import record
 from vision.rig_effects import moved_by
 from vision.settings import Settings
-from vision.simulate import Look
 from vision.track import track_session
 
-FRAMES = 60
-STAMPS = 0.3 + np.arange(FRAMES) / 50.0
-TARGET = Target(platform_tags())
-BASE = tuple(SurveyedTag(tag) for tag in standing_tags())
 LATE_S = -0.006
 KNOCK_RAD = np.array([0.0035, -0.0045, 0.002])
-
-
-@dataclass
-class FilmedRun:
-    name: str
-    video: Path
-
-
-def cameras() -> tuple[Camera, ...]:
-    half = [v / 2 for v in OPENCV_PARAMS[:4]] + OPENCV_PARAMS[4:]
-    return arc_of_cameras(3, 1.9, size_px=(360, 288), params=half)
-
-
-def film(folder, true_cameras, frames=FRAMES, **changes) -> FilmedRun:
-    scene = scene_of(TARGET.tags, standing_tags(), **changes)
-    look = Look(noise=2.0, subpixels=3)
-    record(folder / "runs" / "swing", true_cameras, scene, STAMPS[:frames], look, seed=2)
-    return FilmedRun("swing", folder / "runs" / "swing")
-
-
-def track(run, folder, view=None, **settings):
-    return track_session(
-        [run],
-        view or cameras(),
-        TARGET,
-        results=folder / "results",
-        base_tags=BASE,
-        workers=1,
-        **settings,
-    )
 
 
 @pytest.fixture(scope="module")
@@ -81,13 +34,6 @@ def session(tmp_path_factory):
     )
     run = film(folder, truth)
     return folder, run, track(run, folder)
-
-
-def errors(trajectory) -> np.ndarray:
-    """Position and small-rotation errors, (n, 6)."""
-    positions, rotations = swing(trajectory.times_s)
-    turn = log_rotation(trajectory.rotations() @ np.swapaxes(rotations, 1, 2))
-    return np.concatenate([trajectory.positions() - positions, turn], axis=1)
 
 
 def test_poses_scatter_as_they_claim(session) -> None:

@@ -1,0 +1,66 @@
+"""A small filmed run that the tests of tracking share, and its errors."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from calib.camera import Camera
+from cdpr.rotation import log_rotation
+from cdpr.target import Target
+from tests.vision.scenes import (
+    OPENCV_PARAMS,
+    SurveyedTag,
+    arc_of_cameras,
+    platform_tags,
+    scene_of,
+    standing_tags,
+    swing,
+)
+from vision.record import record
+from vision.simulate import Look
+from vision.track import track_session
+
+FRAMES = 60
+STAMPS = 0.3 + np.arange(FRAMES) / 50.0
+TARGET = Target(platform_tags())
+BASE = tuple(SurveyedTag(tag) for tag in standing_tags())
+
+
+@dataclass
+class FilmedRun:
+    name: str
+    video: Path
+
+
+def cameras() -> tuple[Camera, ...]:
+    half = [v / 2 for v in OPENCV_PARAMS[:4]] + OPENCV_PARAMS[4:]
+    return arc_of_cameras(3, 1.9, size_px=(360, 288), params=half)
+
+
+def film(folder, true_cameras, frames=FRAMES, **changes) -> FilmedRun:
+    scene = scene_of(TARGET.tags, standing_tags(), **changes)
+    look = Look(noise=2.0, subpixels=3)
+    record(folder / "runs" / "swing", true_cameras, scene, STAMPS[:frames], look, seed=2)
+    return FilmedRun("swing", folder / "runs" / "swing")
+
+
+def track(run, folder, view=None, **settings):
+    return track_session(
+        [run],
+        view or cameras(),
+        TARGET,
+        results=folder / "results",
+        base_tags=BASE,
+        workers=1,
+        **settings,
+    )
+
+
+def errors(trajectory) -> np.ndarray:
+    """Position and small-rotation errors, (n, 6)."""
+    positions, rotations = swing(trajectory.times_s)
+    turn = log_rotation(trajectory.rotations() @ np.swapaxes(rotations, 1, 2))
+    return np.concatenate([trajectory.positions() - positions, turn], axis=1)
