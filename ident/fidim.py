@@ -101,7 +101,7 @@ def rank_loss_sentence(solution: TotalLeastSquares) -> str:
         "the swings do not determine the nine inertial parameters: the regressor's ninth singular "
         f"value is {solution.singular_values[-2]:.3g}, {solution.gap:.2g} times the tenth (at "
         f"least {LEAST_GAP:g} is needed), blind along {', '.join(names)}; record larger swings in "
-        "all modes about more equilibria"
+        "all modes about more equilibria, and see that each is a free swing of this robot"
     )
 
 

@@ -14,7 +14,7 @@ from ident.comparison import ParameterComparison, compare
 from ident.estimate import Estimate
 from ident.fidim_stage import Weighting, fidim_estimates
 from ident.geometry import GeometryPriors, corrected
-from ident.law import WORST_ACCELERATION, LawlessError, unexplained_acceleration
+from ident.law import LawlessError, fidim_complaint
 from ident.maximum_likelihood import Asked, best_ml_estimate
 from ident.prepare import (
     LARGEST_AMPLIFICATION,
@@ -140,7 +140,7 @@ def identify(
     if settings.maximum_likelihood:
         fitted, more, lawless = _likelihood_estimates(prepared, by_fidim, settings, robot, progress)
         failures.update(more)
-    meaningless = _meaningless(model, prepared, by_fidim, lawless and not fitted)
+    meaningless = _meaningless(model, prepared, by_fidim, fitted, lawless)
     failures.update(meaningless)
     estimates = {name: one for name, one in by_fidim.items() if name not in meaningless}
     estimates.update({name: one.estimate for name, one in fitted.items()})
@@ -217,28 +217,20 @@ def _likelihood_estimates(
 
 
 def _meaningless(
-    model: Model, prepared: PreparedRuns, by_fidim: dict[str, Estimate], lawless: bool
+    model: Model,
+    prepared: PreparedRuns,
+    by_fidim: dict[str, Estimate],
+    fitted: dict[str, Fitted],
+    lawless: bool,
 ) -> dict[str, str]:
-    """FIDIM's results that say nothing of a platform, with the reason.
-
-    No body can have them, and either their equations do not give the accelerations of any run or
-    no run follows a free swing at all.
-    """
+    """FIDIM's results that say nothing of a platform, by name, with the reason."""
     found = {}
     for name, one in by_fidim.items():
-        if not one.consistency.is_refuted:
-            continue
         full = name == "fidim_full"
-        left = min(
-            unexplained_acceleration(model, motion_of(run, full), one.values)
-            for run in usable(prepared, full, None)
-        )
-        if lawless or left > WORST_ACCELERATION:
-            found[name] = (
-                f"no body can have its inertia ({one.consistency.size()}), and its equations miss "
-                f"the accelerations of every run by {left:.2g} times their size or more: these are "
-                "no free swings of this robot, or too few of them follow its equations"
-            )
+        motions = [motion_of(run, full) for run in usable(prepared, full, None)]
+        complaint = fidim_complaint(model, motions, one, bool(fitted), lawless and not fitted)
+        if complaint:
+            found[name] = complaint
     return found
 
 

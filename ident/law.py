@@ -14,13 +14,16 @@ from cdpr.batch import evaluate, only
 from cdpr.free_motion import coordinate_indices
 from cdpr.model import Model
 from cdpr.robot import Array
+from ident.estimate import Estimate
 from ident.likelihood import LikelihoodFit
 from ident.likelihood_run import predicted
 from ident.motion import SwingMotion
 
 LEAST_EXPLAINED = 0.25  # of the variance of a run's motion
 LEAST_EXPLAINED_BY_NO_BODY = 0.75  # the same where the fit needs an inertia that no body has
-WORST_ACCELERATION = 0.3  # unexplained, root mean square, that FIDIM's equations may leave
+# Accelerations, unexplained root mean square of the best run, that FIDIM's equations may leave:
+WORST_ACCELERATION = 0.5  # where no fit of the motions stands beside it
+WORST_OF_NO_BODY = 0.3  # where no body has its inertia
 
 
 class LawlessError(ValueError):
@@ -57,6 +60,33 @@ def lawless_sentence(share: float) -> str:
         "the platform was held or driven, a cable was slack, or geometry, cable_lengths_m or "
         "window_s are wrong"
     )
+
+
+def fidim_complaint(
+    model: Model, motions: list[SwingMotion], found: Estimate, supported: bool, lawless: bool
+) -> str:
+    """Why FIDIM's result says nothing of a platform; empty where it may.
+
+    Args:
+        model: the robot.
+        motions: that it was found from.
+        found: the result.
+        supported: whether maximum likelihood, started from it, came to a result.
+        lawless: whether that found no run to swing freely.
+    """
+    least = min(unexplained_acceleration(model, motion, found.values) for motion in motions)
+    lost = f"its equations miss the accelerations of every run by {least:.2g} times their size"
+    if found.consistency.is_refuted and (lawless or least > WORST_OF_NO_BODY):
+        return (
+            f"no body can have its inertia ({found.consistency.size()}), and {lost} or more: these "
+            "are no free swings of this robot"
+        )
+    if not supported and least > WORST_ACCELERATION:
+        return (
+            f"{lost} or more: these are no free swings of this robot, or too small or too few; "
+            "check geometry, cable_lengths_m and window_s"
+        )
+    return ""
 
 
 def unexplained_acceleration(model: Model, motion: SwingMotion, inertia: Array) -> float:

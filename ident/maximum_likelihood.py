@@ -24,7 +24,7 @@ from ident.runs import DroppedRun
 from ident.samples import prepare
 
 _ASTRAY = 0.5  # a lost swing is out of phase with its samples
-_AS_BAD = 0.9  # times the worst run
+_AS_BAD = 0.95  # times the worst run
 
 
 @dataclass(frozen=True, slots=True)
