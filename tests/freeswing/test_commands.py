@@ -103,12 +103,3 @@ def test_exports_agree_with_mujoco(session: Path) -> None:
 def test_export_before_identify_is_1(session: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["export", str(session), "--urdf"]) == 1
     assert "run freeswing identify first" in capsys.readouterr().err
-
-
-def test_demo_leaves_other_folders_alone(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (tmp_path / "thesis.txt").write_text("dear", encoding="utf-8")
-    assert main(["demo", str(tmp_path)]) == 2
-    assert "name a new folder" in capsys.readouterr().err
-    assert [path.name for path in tmp_path.iterdir()] == ["thesis.txt"]

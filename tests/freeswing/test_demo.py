@@ -1,0 +1,68 @@
+"""`freeswing demo` from nothing to the report: the undeclared drag found, the path said last."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from freeswing import stages
+from freeswing.demo import mocap, truth
+from freeswing.main import main
+
+FEW_SWINGS = ("swing-01", "swing-02", "swing-03", "check-01")
+SHORT_S = 5.0
+LEAST_SHARE_CLOSED = 0.9
+
+
+def check_ending(folder: Path, said: str) -> None:
+    """The before/after line, then the report's path; the drag accepted, its rate right."""
+    lines = said.strip().splitlines()
+    page = folder / "results" / "report.html"
+    assert lines[-1] == str(page)
+    assert lines[-2].startswith("  held-out runs: off by "), lines[-2]
+    assert page.stat().st_size > 100_000, f"{page.stat().st_size} bytes"
+    text = page.read_text(encoding="utf-8")
+    assert "The model lacked: translational drag." in text
+    diagnosis = json.loads((folder / "results" / "diagnosis.json").read_text(encoding="utf-8"))
+    assert [entry["effect"] for entry in diagnosis["accepted"]] == [truth.EFFECT]
+    rate = {p["name"]: p for p in diagnosis["accepted"][0]["parameters"]}["rate_1_s"]
+    z = (rate["value"] - truth.EFFECT_VALUES[0]) / rate["std"]
+    assert abs(z) < 4.5, f"rate {rate['value']} ± {rate['std']} 1/s, truly {truth.EFFECT_VALUES[0]}"
+    share = diagnosis["share_closed"]
+    assert share > LEAST_SHARE_CLOSED, f"{share:.3f} of the distance to the noise closed"
+
+
+def test_a_short_one_by_motion_capture(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Fewer and shorter swings, one candidate: the same way in a few seconds."""
+    few = tuple(swing for swing in truth.SWINGS if swing[0] in FEW_SWINGS)
+    monkeypatch.setattr(truth, "SWINGS", few)
+    monkeypatch.setattr(mocap, "DURATION_S", SHORT_S)
+    quick = replace(stages.DIAGNOSE, settings={"only": (truth.EFFECT,)})
+    monkeypatch.setattr(stages, "STAGES", (*stages.STAGES[:-1], quick))
+    folder = tmp_path / "demo"
+    assert main(["demo", str(folder), "--mocap", "--workers", "1"]) == 0
+    check_ending(folder, capsys.readouterr().out)
+
+
+def test_other_folders_are_left_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "thesis.txt").write_text("dear", encoding="utf-8")
+    assert main(["demo", str(tmp_path)]) == 2
+    assert "name a new folder" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["thesis.txt"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("more", [(), ("--mocap",)])
+def test_all_of_it(
+    more: tuple[str, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "demo"
+    assert main(["demo", str(folder), *more]) == 0
+    check_ending(folder, capsys.readouterr().out)
+    names = {path.name for path in (folder / "results").iterdir()}
+    assert {"identification.json", "diagnosis.json", "report.html"} <= names
