@@ -1,1 +1,1 @@
-"""Vision-based position control of driven cable robots (not started: see DESIGN in docs)."""
+"""Vision-based position control of driven cable robots: not started, nothing here yet."""

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from freeswing.main import COMMANDS
+
 ROOT = Path(__file__).parents[2]
 EXAMPLES = re.findall(
     r"^## (.+?)$.*?^```python\n(.*?)^```",
@@ -24,6 +26,28 @@ def test_example_runs(title: str, code: str) -> None:
     )
     assert done.returncode == 0, f"{title}: {done.stderr}"
     assert done.stdout.strip() != "", title
+
+
+def test_it_is_built_without_warnings(tmp_path: Path) -> None:
+    pytest.importorskip("mkdocs", reason="the extra `docs` is not installed")
+    words = ["-m", "mkdocs", "build", "--strict", "--site-dir", str(tmp_path / "site")]
+    done = subprocess.run(
+        [sys.executable, *words], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert "WARNING" not in done.stderr, done.stderr
+    assert (tmp_path / "site" / "api.html").is_file()
+
+
+def test_every_package_has_an_example() -> None:
+    packages = {path.parent.name for path in ROOT.glob("*/__init__.py")} - {"servo"}
+    shown = {title.partition(":")[0] for title, _ in EXAMPLES}
+    assert shown == packages
+
+
+def test_every_command_is_described() -> None:
+    text = (ROOT / "docs" / "commands.md").read_text(encoding="utf-8")
+    assert [name for name in COMMANDS if f"| `freeswing {name} " not in text] == []
 
 
 def test_formats_and_code_know_the_same_effects() -> None:
