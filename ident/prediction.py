@@ -79,14 +79,8 @@ def predict(
     samples, first = started(model, run, free, inertia)
     samples = _thinned(samples)
     state = State(np.array(inertia), values, first[None], np.ones(2))
-    found = _fitted(model, samples, state, grow=False)
+    found = _followed(model, samples, state)
     seen = _seen(found)
-    # A start too far off leaves the simulated swing out of phase: grow into the run instead.
-    spread = np.sqrt(np.mean((samples.values - samples.values.mean(axis=0)) ** 2))
-    if np.sqrt(np.mean((seen - samples.values) ** 2)) > _ASTRAY * spread:
-        careful = _fitted(model, samples, state, grow=True)
-        found = min(found, careful, key=lambda one: one.deviance)
-        seen = _seen(found)
     return Prediction(
         run.name,
         frozen_array(samples.times_s, samples.times_s.shape, "times"),
@@ -95,6 +89,22 @@ def predict(
         frozen_array(seen, seen.shape, "predicted"),
         found.motions[0].values,
     )
+
+
+def _followed(model: Model, samples: Samples, state: State) -> LikelihoodFit:
+    """The fit of the start over the whole run at once, or grown into it where that is astray.
+
+    A start too far off leaves the simulated swing out of phase, or cannot be simulated so long.
+    """
+    try:
+        quick = _fitted(model, samples, state, grow=False)
+    except (ValueError, np.linalg.LinAlgError):
+        return _fitted(model, samples, state, grow=True)
+    spread = np.sqrt(np.mean((samples.values - samples.values.mean(axis=0)) ** 2))
+    if np.sqrt(np.mean((_seen(quick) - samples.values) ** 2)) <= _ASTRAY * spread:
+        return quick
+    careful = _fitted(model, samples, state, grow=True)
+    return min(quick, careful, key=lambda one: one.deviance)
 
 
 def _fitted(model: Model, samples: Samples, state: State, grow: bool) -> LikelihoodFit:
