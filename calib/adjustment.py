@@ -27,6 +27,8 @@ MOST_ITERATIONS = 60
 # expected fall of the cost at which to stop, in units where one residual of 1 sigma counts 1/2
 CONVERGED = 1e-7
 ROUGHLY_CONVERGED = 1e-2
+_COMMON_FREEDOM = 30.0
+_LEAST_FREEDOM = 0.1
 MEDIAN_OF_RAYLEIGH = 1.1774100225154747  # median length of a 2-D error of unit standard deviation
 
 
@@ -126,29 +128,31 @@ def _minimise(
 def _noise(scene: Scene, problem: Problem, residuals: Array, last: Array | None) -> Array:
     """Noise of each camera's typical corner: rms of residuals within the knee, freedom-corrected.
 
-    The first call has no scale and takes the median; cameras without views get the others' mean.
+    The first call has no scale and takes the median. A camera with few residuals cannot tell its
+    noise: the mean of all counts beside it, as `_COMMON_FREEDOM` residuals of its own.
     """
     white = problem.views.whitened(residuals)
     size = white.shape[-1]
     lengths = np.linalg.norm(white, axis=-1)
     knee = length_with_share(WITHIN_KNEE, size)
     middle = length_with_share(0.5, size)
-    sigma = np.full(len(scene.cameras), np.nan)
-    for index in range(len(sigma)):
+    squares, freedoms = np.zeros(len(scene.cameras)), np.zeros(len(scene.cameras))
+    for index in range(len(squares)):
         length = lengths[problem.views.camera == index]
         length = length[np.isfinite(length)]
         if not length.size:
             continue
         median = max(float(np.median(length)) / middle, 1e-4)
         if last is None:
-            sigma[index] = median
+            freedoms[index] = size * length.size
+            squares[index] = freedoms[index] * median**2
             continue
-        inside = length < knee * median
-        freedom = 1.0 - _unknowns_per_residual(scene, problem, index)
-        mean_square = float(np.mean(length[inside] ** 2)) / size / _kept_share(size)
-        sigma[index] = np.sqrt(mean_square / max(freedom, 0.1))
-    known = np.isfinite(sigma)
-    return np.where(known, sigma, sigma[known].mean() if known.any() else 1.0)
+        inside = length[length < knee * median]
+        share = max(1.0 - _unknowns_per_residual(scene, problem, index), _LEAST_FREEDOM)
+        freedoms[index] = share * size * inside.size
+        squares[index] = float(np.sum(inside**2)) / _kept_share(size)
+    common = squares.sum() / freedoms.sum() if freedoms.any() else 1.0
+    return np.sqrt((squares + _COMMON_FREEDOM * common) / (freedoms + _COMMON_FREEDOM))
 
 
 @cache

@@ -21,7 +21,6 @@ from cdpr.rotation import exp_rotation, log_rotation, transform
 
 DEGREE = 4
 PIECE = DEGREE + 1
-_MOST_PIECE = PIECE + 2
 _START_DEGREE = 2
 
 
@@ -39,7 +38,10 @@ class Timeline:
 
 
 def timeline(times_s: Array, linked: np.ndarray) -> Timeline:
-    """Cuts runs of moments into pieces of `PIECE` or a few more.
+    """Cuts runs of moments into pieces of `PIECE`; what is left over belongs to none.
+
+    A piece has as many moments as its motion has coefficients, so that the polynomial is near the
+    truth around each of them even where frames are too slow for it in between.
 
     Args:
         times_s: rising, (n,).
@@ -48,11 +50,8 @@ def timeline(times_s: Array, linked: np.ndarray) -> Timeline:
     piece = np.full(len(times_s), -1)
     number = 0
     for run in np.split(np.arange(len(times_s)), np.flatnonzero(~linked) + 1):
-        parts = len(run) // PIECE
-        if not parts:
-            continue
-        for part in np.array_split(run[: parts * _MOST_PIECE], parts):
-            piece[part] = number
+        for first in range(0, len(run) - PIECE + 1, PIECE):
+            piece[run[first : first + PIECE]] = number
             number += 1
     return Timeline(times_s, piece)
 
@@ -117,3 +116,13 @@ def linked(times_s: Array, smooth: np.ndarray, frame_s: float) -> np.ndarray:
         frame_s: time from a frame to the next.
     """
     return (np.diff(times_s) < 1.5 * frame_s) & (smooth[1:] | smooth[:-1])
+
+
+def boards_at(scene: Scene, piece: np.ndarray, times_s: Array) -> Array:
+    """T_base_board at times from the middles of pieces, both (n,), (n, 4, 4)."""
+    order = np.arange(1, scene.motion.shape[1] + 1)
+    powers = (times_s[:, None] / scene.motion_scale_s) ** order
+    change = np.einsum("nj,nji->ni", powers, scene.motion[piece])
+    poses = scene.T_base_boards[piece]
+    turns = exp_rotation(change[:, 3:]) @ poses[:, :3, :3]
+    return transform(turns, poses[:, :3, 3] + change[:, :3])

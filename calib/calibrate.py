@@ -17,11 +17,11 @@ from calib.camera_models import Array
 from calib.cameras_file import write_cameras
 from calib.clocks import board_moves, coarse_offsets_s
 from calib.intrinsics import CameraStart
-from calib.lens_bend import straightened
 from calib.recordings import find_recordings
 from calib.rig import Rig, solve_rig, start_cameras, tie_to_base
 from calib.sightings import Sightings, gather, see_boards
 from calib.survey_check import SurveyCheck, check_survey
+from calib.tag_bend import straightened
 from calib.trust import Verdict, judge
 from calib.truth_checks import check_truth
 from calib.views import Views
@@ -157,7 +157,14 @@ def rig_from_sightings(
     else:
         line = None
     alone = np.array([start.rms_px for start in starts])
-    rig = solve_rig(board.points_m, starts, offsets, line)
+    borders = [camera.border_cells for camera in sightings]
+    rig = solve_rig(
+        board.points_m,
+        starts,
+        offsets,
+        line,
+        lambda scene, views: straightened(scene, views, board, borders),
+    )
     return rig, alone
 
 
@@ -166,11 +173,7 @@ def _starts(
 ) -> tuple[CameraStart, ...]:
     names = tuple(camera.name for camera in sightings)
     sizes = tuple(camera.size_px for camera in sightings)
-    starts = start_cameras(names, sizes, (model,) * len(names), board.points_m, views)
-    return tuple(
-        straightened(start, board, camera.border_cells)
-        for start, camera in zip(starts, sightings, strict=True)
-    )
+    return start_cameras(names, sizes, (model,) * len(names), board.points_m, views)
 
 
 def _moved_warnings(moved: tuple[tuple[str, float], ...]) -> list[str]:

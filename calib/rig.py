@@ -78,6 +78,7 @@ def solve_rig(
     starts: tuple[CameraStart, ...],
     offsets_s: Array | None = None,
     line: Timeline | None = None,
+    straighten: Callable[[Scene, Views], Views] | None = None,
 ) -> Rig:
     """All cameras and board poses at once, in the frame of the reference camera.
 
@@ -87,6 +88,7 @@ def solve_rig(
         offsets_s: clock offsets to start from, (n_cameras,).
         line: times and pieces of the moments when the board moves: clocks are then estimated, and
             time is the first camera's; None for a board that rests at each moment.
+        straighten: puts the corners right once the rig is nearly known (`calib.tag_bend`).
 
     Raises:
         DataError: when the cameras do not share enough views.
@@ -107,7 +109,13 @@ def solve_rig(
     dropped = tuple(drop for camera in starts for drop in camera.dropped)
     problem = Problem(board_points_m, views, None, free)
     rig = refine(scene, problem, start.reference, dropped)
-    return _with_board_shape(_without_idle_lines(rig) if clocks else rig)
+    if clocks:
+        rig = _without_idle_lines(rig)
+    if straighten is not None:
+        scene = rig.adjustment.scene
+        problem = replace(rig.problem, views=straighten(scene, rig.problem.views))
+        rig = refine(scene, problem, rig.reference, rig.dropped, rig.n_trimmed)
+    return _with_board_shape(rig)
 
 
 def _with_board_shape(rig: Rig) -> Rig:

@@ -19,7 +19,8 @@ Progress = Callable[[str, float], None]
 
 MOST_FRAMES = 600
 BURST = 5
-LEAST_FLOW = 9
+LEAST_FLOW = 4
+_LARGEST_BEND = 0.35
 _WORKERS = 2
 
 
@@ -132,35 +133,32 @@ def _wanted(count: int) -> set[int]:
 def smoothness(sightings: Sightings) -> tuple[np.ndarray, Array]:
     """How the board moves through each frame.
 
+    It moves on smoothly where the bend of its way over three frames is small beside the step, or
+    beside the recording's usual step: where it turns round it hardly moves, and yet is not cut.
+
     Returns:
         1 where the frame and its two neighbours show one smooth motion, -1 where they do not (a
-        cut, a new pose), 0 where a neighbour lacks, (n,); and the largest image speed of a corner
-        in px/s where the motion is smooth, else 0, (n,).
+        cut, a new pose), 0 where too little is seen to tell, (n,); and the image speed of the
+        board in px/s where the motion is smooth, else 0, (n,).
     """
-    at = {int(number): row for row, number in enumerate(sightings.numbers)}
-    pixels, stamps = sightings.pixels, sightings.stamps_s
-    smooth, speed = np.zeros(len(at), dtype=int), np.zeros(len(at))
-    for number, row in at.items():
-        before, after = at.get(number - 1), at.get(number + 1)
-        if before is None or after is None:
-            continue
-        span = stamps[after] - stamps[before]
-        ahead, behind = pixels[after] - pixels[row], pixels[row] - pixels[before]
-        smooth[row] = 1 if span > 0.0 and _continues(ahead, behind) else -1
-        if smooth[row] > 0:
-            lengths = np.linalg.norm(pixels[after] - pixels[before], axis=-1)
-            speed[row] = np.nanmax(lengths) / span
+    pixels, stamps, numbers = sightings.pixels, sightings.stamps_s, sightings.numbers
+    smooth, speed = np.zeros(len(numbers), dtype=int), np.zeros(len(numbers))
+    if len(numbers) < 3:
+        return smooth, speed
+    ahead, behind = pixels[2:] - pixels[1:-1], pixels[1:-1] - pixels[:-2]
+    known = np.isfinite(ahead + behind)[..., 0]
+    span = stamps[2:] - stamps[:-2]
+    told = (numbers[2:] - numbers[:-2] == 2) & (known.sum(axis=1) >= LEAST_FLOW) & (span > 0.0)
+    bend, step = np.full(len(told), np.nan), np.full(len(told), np.nan)
+    for row in np.flatnonzero(told):
+        both = known[row]
+        bend[row] = np.median(np.linalg.norm((ahead - behind)[row, both], axis=-1))
+        step[row] = np.median(np.linalg.norm((ahead + behind)[row, both], axis=-1))
+    usual = float(np.median(step[told])) if told.any() else 0.0
+    goes_on = told & (bend < _LARGEST_BEND * np.maximum(step, usual) + 1.0)
+    smooth[1:-1] = goes_on.astype(int) - (told & ~goes_on)
+    speed[1:-1][goes_on] = (step / span)[goes_on]
     return smooth, speed
-
-
-def _continues(ahead: Array, behind: Array) -> bool:
-    """Whether three frames show one smooth motion: the bend is small beside the step."""
-    bend = np.linalg.norm(ahead - behind, axis=-1)
-    step = np.linalg.norm(ahead + behind, axis=-1)
-    known = np.isfinite(bend)
-    if known.sum() < LEAST_FLOW:
-        return False
-    return bool(np.median(bend[known]) < 0.35 * np.median(step[known]) + 1.0)
 
 
 @dataclass(frozen=True, slots=True)

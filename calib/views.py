@@ -23,7 +23,7 @@ class Views:
         pixels: corners, NaN where unseen, (n, n_points, 2).
         lag_s: the view's own stamp minus the middle of its piece, (n,).
         whitening: lower triangles F with F'F the inverse covariance of a group of corners that
-            were found together (a tag's four), over that of the camera's typical corner,
+            were found together (a tag's four), over that of the rig's typical corner,
             (n, n_groups, 2 c, 2 c).
         label: how a person finds the view: recording and frame, (n,) text.
     """
@@ -101,7 +101,7 @@ def make_views(
     if covariance_px2 is None:
         whitening = np.broadcast_to(np.eye(2), (*points.shape[:2], 2, 2))
     else:
-        whitening = _whitening(cameras, points, np.asarray(covariance_px2, dtype=np.float64))
+        whitening = _whitening(points, np.asarray(covariance_px2, dtype=np.float64))
     return Views(
         cameras[order],
         moments[order],
@@ -113,8 +113,8 @@ def make_views(
     )
 
 
-def _whitening(camera: np.ndarray, pixels: Array, covariance_px2: Array) -> Array:
-    """Whitening of each group relative to its camera's typical corner; blanks `pixels` unseen."""
+def _whitening(pixels: Array, covariance_px2: Array) -> Array:
+    """Whitening of each group relative to the typical corner; blanks `pixels` unseen."""
     size = covariance_px2.shape[-1]
     shape = covariance_px2.shape[:2]
     known = np.asarray(np.isfinite(covariance_px2).all(axis=(2, 3)))
@@ -122,12 +122,8 @@ def _whitening(camera: np.ndarray, pixels: Array, covariance_px2: Array) -> Arra
     pixels[~np.repeat(known, size // 2, axis=1)] = np.nan
     safe = np.where(known[..., None, None], covariance_px2, np.eye(size))
     variance = np.trace(safe, axis1=2, axis2=3) / size
-    typical = np.ones(len(camera))
-    for index in np.unique(camera):
-        own = camera == index
-        if known[own].any():
-            typical[own] = np.median(variance[own][known[own]])
-    root = np.linalg.cholesky(safe / typical[:, None, None, None])
+    typical = float(np.median(variance[known])) if known.any() else 1.0
+    root = np.linalg.cholesky(safe / typical)
     return np.asarray(np.linalg.inv(root), dtype=np.float64)
 
 

@@ -7,7 +7,8 @@ from collections.abc import Callable
 import numpy as np
 
 from calib.camera import Camera
-from calib.reprojection import Scene
+from calib.reprojection import Scene, camera_slices
+from calib.rig import Rig
 from calib.views import Views, make_views
 from cdpr.rotation import exp_rotation, invert, log_rotation, transform
 
@@ -112,3 +113,11 @@ def errors(scene: Scene, cameras: tuple[Camera, ...], reference: int | None) -> 
             [true.clock_offset_s - found.clock_offset_s, true.line_time_s - found.line_time_s],
         ]
     return np.concatenate(parts)
+
+
+def error_square(rig: Rig, cameras: tuple[Camera, ...]) -> tuple[float, int]:
+    """Normalised error squared of the cameras' free unknowns, and their number."""
+    free = rig.problem.free[: camera_slices(cameras)[-1].stop]
+    error = errors(rig.adjustment.scene, cameras, rig.reference)[free]
+    covariance = rig.adjustment.covariance[: len(free), : len(free)][np.ix_(free, free)]
+    return float(error @ np.linalg.solve(covariance, error)), int(free.sum())

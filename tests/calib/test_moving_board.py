@@ -8,7 +8,6 @@ from scipy.stats import chi2
 
 from calib.boards import Board
 from calib.calibrate import rig_from_sightings
-from calib.reprojection import camera_slices
 from calib.sightings import Sightings, gather
 from tests.calib import rigs
 
@@ -44,22 +43,14 @@ def recorded(cameras, seed, rate_hz, count, jump_s=0.0):
     return tuple(sighted(camera, motion, stamps, rng, jump_s) for camera in cameras)
 
 
-def error_square(rig, cameras):
-    """Normalised error squared of the cameras' free unknowns, and their number."""
-    free = rig.problem.free[: camera_slices(cameras)[-1].stop]
-    error = rigs.errors(rig.adjustment.scene, cameras, rig.reference)[free]
-    covariance = rig.adjustment.covariance[: len(free), : len(free)][np.ix_(free, free)]
-    return float(error @ np.linalg.solve(covariance, error)), int(free.sum())
-
-
 @pytest.mark.parametrize("rate_hz", [100.0, 30.0])
 def test_clocks_lines_and_covariance(rate_hz):
     """Offsets of parts of a frame and a rolling shutter: all errors are as large as claimed."""
     total, freedom = 0.0, 0
-    for seed in range(4):
+    for seed in range(3):
         cameras = free_running(seed)
-        rig, _ = rig_from_sightings(recorded(cameras, seed, rate_hz, 80), BOARD, rate_hz)
-        square, count = error_square(rig, cameras)
+        rig, _ = rig_from_sightings(recorded(cameras, seed, rate_hz, 60), BOARD, rate_hz)
+        square, count = rigs.error_square(rig, cameras)
         total, freedom = total + square, freedom + count
         for found, true in zip(rig.cameras, cameras, strict=True):
             error_ms = 1e3 * (found.clock_offset_s - true.clock_offset_s)

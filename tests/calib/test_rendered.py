@@ -1,7 +1,7 @@
 """Calibration from rendered images: corner bias, and the whole way from recordings to a rig."""
 
 import json
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -10,12 +10,11 @@ from calib.board_detection import BoardDetector
 from calib.boards import Board, board_from, read_board
 from calib.calibrate import calibrate_session
 from calib.calibration_result import read_camera_covariance
-from calib.camera import Camera
 from calib.cameras_file import read_cameras
 from calib.triangulation import triangulate
 from cdpr.documents import DataError, InputError
 from cdpr.rotation import exp_rotation, transform
-from tests.calib import rigs
+from tests.calib import films, rigs
 from vision.patterns import aprilgrid_patch, charuco_patch, chessboard_patch, tag_patch
 from vision.record import record
 from vision.simulate import Look, Renderer, Scene, still
@@ -36,18 +35,10 @@ BOARDS = {
 }
 
 
-def small_rig(count: int) -> tuple[Camera, ...]:
-    scale = np.array([0.625] * 4 + [1.0] * 4)
-    return tuple(
-        replace(camera, size_px=(800, 640), params=camera.params * scale)
-        for camera in rigs.rig(count, arc_rad=0.9)
-    )
-
-
 @pytest.mark.parametrize("kind", BOARDS)
 def test_corners_have_no_bias(kind):
     board, patch, to_patch = BOARDS[kind]
-    camera = small_rig(1)[0]
+    camera = films.small_rig(1)[0]
     detector = BoardDetector(board)
     errors = []
     for index, pose in enumerate(rigs.poses((camera,), 6, tilt=0.4)):
@@ -100,7 +91,7 @@ def film(folder, cameras, count, seed=3):
 
 def test_from_images_to_the_base_frame(tmp_path):
     """Two cameras, 16 still poses: points on the platform to 0.1 mm; refusals write no cameras."""
-    cameras = small_rig(2)
+    cameras = films.small_rig(2)
     tags = film(tmp_path / "calibration", cameras, 16)
     table = {
         "kind": "charuco",
