@@ -85,10 +85,13 @@ def lengths_of(motion: Motion) -> Array:
 @cache
 def tilted_swing(equilibrium: int, tilt_rad: float = 0.08, duration_s: float = 10.0) -> Motion:
     """A release at rest from a tilted pose: also where x and y do not settle the pose."""
-    model = paper_model()
-    lengths = PAPER_LENGTHS_M[equilibrium]
-    rest = taut_equilibrium(model, lengths, TRUE_INERTIA, f"equilibrium {equilibrium}").zeta
+    return tilted_release(paper_model(), PAPER_LENGTHS_M[equilibrium], tilt_rad, duration_s)
+
+
+def tilted_release(model: Model, lengths_m: Array, tilt_rad: float, duration_s: float) -> Motion:
+    """The same of a robot that may differ from the paper's."""
+    rest = taut_equilibrium(model, lengths_m, TRUE_INERTIA, "tilted").zeta
     share = np.linspace(0.0, 1.0, 40)[:, None]
     path = rest[3:5] + share * tilt_rad * np.array([0.7, 1.0])
-    start = assemble(model, ("phi", "theta"), lengths, path, rest).zetas[-1]
+    start = assemble(model, ("phi", "theta"), lengths_m, path, rest).zetas[-1]
     return simulate(model, start, np.zeros(6), (0.0, duration_s), TRUE_INERTIA)
