@@ -87,12 +87,12 @@ def extrapolate(past: Sequence[tuple[float, Pose]], time_s: float) -> Pose | Non
     for k, (_, (r, p)) in enumerate(past[:-1]):
         steps[k, :3] = p - position
         steps[k, 3:] = log_rotation(r @ rotation.T)
-    weights = _lagrange(times, time_s)
+    weights = lagrange(times, time_s)
     ahead = weights @ steps
     return exp_rotation(ahead[3:]) @ rotation, position + ahead[:3]
 
 
-def _lagrange(times: Array, time_s: float) -> Array:
+def lagrange(times: Array, time_s: float) -> Array:
     """Weights of the polynomial through samples at `times`, read at `time_s`."""
     weights = np.ones(len(times))
     for i in range(len(times)):

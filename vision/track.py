@@ -88,13 +88,12 @@ def track_session(
     filmed = [run for run in runs if run.video is not None]
     if not filmed:
         raise InputError("no run of the session has a video; there is nothing to track")
-    pairs = [(run.name, _recordings(run, cameras)) for run in filmed]
-    pieces = results / "tracks" / ".sightings"
+    pairs = [(run.name, run_recordings(run, cameras)) for run in filmed]
     jobs = [
         Job(
             f"{name} {camera.name}",
             collect_sightings,
-            (pieces / name, camera, watch, recording, frame_rate_hz),
+            (sightings_folder(results, name), camera, watch, recording, frame_rate_hz),
         )
         for name, found in pairs
         for camera, recording in found
@@ -115,7 +114,17 @@ def track_session(
     return document
 
 
-def _recordings(run: RecordedRun, cameras: Sequence[Camera]) -> list[tuple[Camera, Recording]]:
+def sightings_folder(results: Path, run: str) -> Path:
+    """Where the sightings of a run's cameras are kept."""
+    return results / "tracks" / ".sightings" / run
+
+
+def run_recordings(run: RecordedRun, cameras: Sequence[Camera]) -> list[tuple[Camera, Recording]]:
+    """The recordings of a run with their cameras.
+
+    Raises:
+        InputError: where none is named as a camera.
+    """
     by_name = {camera.name: camera for camera in cameras}
     found = {r.name: r for r in find_recordings(run.video or Path())}
     known = [name for name in by_name if name in found]

@@ -25,6 +25,16 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--refine-layout", action="store_true", help="fit the tags' places to the recordings"
     )
+    parser.add_argument(
+        "--view",
+        action="store_true",
+        help="write results/tracking.rrd for the viewer rerun too (extra: view)",
+    )
+    parser.add_argument(
+        "--overlay",
+        action="store_true",
+        help="draw what was seen over the frames: results/overlay/RUN/CAMERA.mp4",
+    )
 
 
 def run(options: Namespace, console: Console) -> None:
@@ -32,9 +42,15 @@ def run(options: Namespace, console: Console) -> None:
     from freeswing.stages import TRACK
 
     session = open_session(options)
+    if options.view:
+        from vision.view import require_viewer
+
+        require_viewer()
     settings = {"correct_rig": not options.trust_cameras, "refine_layout": options.refine_layout}
     with crew_of(options, session) as crew:
         result = TRACK.take(session, console, settings, crew)
+    if options.view or options.overlay:
+        _draw(session, console, view=options.view, overlay=options.overlay)
     console.say(str(result))
     console.show_file(result)
 
@@ -68,6 +84,39 @@ def make(
     )
     _summarise(document, console)
     return [("tracking.json", document)]
+
+
+def _draw(session: Session, console: Console, *, view: bool, overlay: bool) -> None:
+    """The pictures of a tracked session."""
+    from calib.cameras_file import read_cameras
+    from freeswing.swings import load_target
+    from vision.overlay import write_overlay
+    from vision.tracked import tracked_run
+    from vision.view import write_view
+
+    target = load_target(session)
+    if target is None:
+        return
+    runs = [
+        tracked_run(
+            run,
+            read_cameras(session.cameras),
+            target,
+            results=session.results,
+            base_tags=session.calibration.base_tags if session.calibration else (),
+            frame_rate_hz=session.frame_rate_hz,
+        )
+        for run in session.video_runs
+    ]
+    if view:
+        write_view(session.results / "tracking.rrd", runs)
+        console.say(f"  {session.results / 'tracking.rrd'}: open it with rerun")
+    pairs = [(run, seen) for run in runs for seen in run.cameras] if overlay else []
+    for k, (run, seen) in enumerate(pairs):
+        console.progress(f"overlay {run.name} {seen.camera.name}", k / len(pairs))
+        path = session.results / "overlay" / run.name / f"{seen.camera.name}.mp4"
+        write_overlay(path, run, seen)
+        console.say(f"  {path}")
 
 
 def _summarise(document: dict[str, Any], console: Console) -> None:

@@ -27,6 +27,8 @@ FRAMES = 60
 STAMPS = 0.3 + np.arange(FRAMES) / 50.0
 TARGET = Target(platform_tags())
 BASE = tuple(SurveyedTag(tag) for tag in standing_tags())
+LATE_S = -0.006
+KNOCK_RAD = np.array([0.0035, -0.0045, 0.002])
 
 
 @dataclass

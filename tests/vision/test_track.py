@@ -12,28 +12,19 @@ from scipy.stats import chi2
 from cdpr.documents import InputError
 from cdpr.target import Target
 from cdpr.trajectory_files import read_trajectory
-from tests.vision.films import BASE, FRAMES, TARGET, cameras, errors, film, track
+from tests.vision.films import (
+    BASE,
+    FRAMES,
+    KNOCK_RAD,
+    LATE_S,
+    TARGET,
+    cameras,
+    errors,
+    track,
+)
 from vision import pieces, sightings
-from vision.rig_effects import moved_by
 from vision.settings import Settings
 from vision.track import track_session
-
-LATE_S = -0.006
-KNOCK_RAD = np.array([0.0035, -0.0045, 0.002])
-
-
-@pytest.fixture(scope="module")
-def session(tmp_path_factory):
-    """One camera 6 ms late, one knocked by 0.35 degrees after the calibration."""
-    folder = tmp_path_factory.mktemp("session")
-    first, second, third = cameras()
-    truth = (
-        first,
-        moved_by(second, np.concatenate([np.zeros(3), KNOCK_RAD])),
-        replace(third, clock_offset_s=LATE_S),
-    )
-    run = film(folder, truth)
-    return folder, run, track(run, folder)
 
 
 def test_poses_scatter_as_they_claim(session) -> None:
