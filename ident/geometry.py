@@ -14,7 +14,7 @@ import numpy as np
 
 from cdpr.model import Model, build_model
 from cdpr.robot import Array, Robot
-from ident.likelihood import LikelihoodFit
+from ident.likelihood import LikelihoodFit, fit
 
 _ENTRY, _ATTACHMENT = "anchor_offset", "attachment_offset"
 
@@ -71,6 +71,27 @@ def corrected(robot: Robot, model: Model, values: Array) -> Robot:
         )
     )
     return replace(robot, cables=cables)
+
+
+def weighed_against_priors(found: LikelihoodFit, consistent: bool = False) -> LikelihoodFit:
+    """The fit again with samples that count for no more than their coloured residuals are worth.
+
+    A fit enlarges its covariance for colour, the priors' share included: good where priors are
+    but a help. Cable ends would then come out farther from their declared places than their
+    stated deviations allow, and less certain than stated.
+    """
+    if not len(found.values) or found.enlargement == 1.0 or found.rank < int(found.free.sum()):
+        return found
+    start = replace(found.state, scales=found.scales * np.sqrt(found.enlargement))
+    again = fit(
+        found.model,
+        found.samples,
+        start,
+        estimate_scales=False,
+        grow=False,
+        consistent=consistent,
+    )
+    return replace(again, covariance=again.covariance / again.enlargement)
 
 
 def geometry_document(found: LikelihoodFit) -> dict[str, Any]:

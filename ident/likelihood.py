@@ -28,6 +28,7 @@ STEPS = 30
 LOW_BAND_HZ = 5.0
 CONVERGED_DECREASE = 0.01
 ROUGH_DECREASE = 5.0
+COLOURED = 1.2  # correlation from which residuals are not white
 # Lengths known to a micrometre are walls that a step cannot follow: they are let down in stages.
 LOOSE_LENGTH_STD_M = 5e-4
 TIGHTER_LENGTH_STD_M = 2e-5
@@ -82,6 +83,11 @@ class LikelihoodFit:
     def std(self) -> Array:
         """Standard deviations of the shared unknowns, (9 + k + u,)."""
         return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def enlargement(self) -> float:
+        """By what the covariance was multiplied for residuals that are not white."""
+        return _enlargement(self.correlation)
 
     @property
     def n_samples(self) -> int:
@@ -214,7 +220,7 @@ def _packed(problem: Problem, state: State, step: Step, taken: int, reason: str)
         values=_values(problem, state),
         loads=problem.loads_of(state),
         free=problem.free,
-        covariance=_covariance(problem, step) * max(1.0, correlation if correlation > 1.2 else 1.0),
+        covariance=_covariance(problem, step) * _enlargement(correlation),
         correlation=correlation,
         scales=state.scales,
         noise=noise,
@@ -227,6 +233,10 @@ def _packed(problem: Problem, state: State, step: Step, taken: int, reason: str)
         steps=taken,
         reason=reason,
     )
+
+
+def _enlargement(correlation: float) -> float:
+    return correlation if correlation > COLOURED else 1.0
 
 
 def _values(problem: Problem, state: State) -> Array:

@@ -12,7 +12,7 @@ from ident.calibration import with_calibration
 from ident.consistency import consistency, is_possible, nearest_possible
 from ident.estimate import Estimate
 from ident.fidim import WELL_IDENTIFIED_PERCENT, near_zero
-from ident.geometry import geometry_document
+from ident.geometry import geometry_document, weighed_against_priors
 from ident.guess import first_state
 from ident.joint import State
 from ident.law import LawlessError, is_lawless, lawless_sentence, unexplained_motion
@@ -72,6 +72,8 @@ def ml_estimate(
         held = _held(found, progress)
         found, cost = held, held.deviance - found.deviance
     errors = [run.run.pose_errors for run in kept]
+    if not any(errors):  # which are weighed against coloured residuals by themselves
+        found = weighed_against_priors(found, consistent=cost is not None)
     told = with_calibration(found, errors, consistent=cost is not None)
     entry = _entry(told.fit, dropped + more, cost)
     return replace(
@@ -218,7 +220,7 @@ def _entry(
     std = np.sqrt(np.diag(covariance))
     weak = 100.0 * std > WELL_IDENTIFIED_PERCENT * np.abs(found.inertia)
     notes = []
-    if found.correlation > 1.2:
+    if found.enlargement > 1.0:
         notes.append(
             f"the residuals are not white (power below 5 Hz is {found.correlation:.3g} times that "
             "of white noise): the model misses something; standard deviations are enlarged for it"
