@@ -9,7 +9,7 @@ import os
 import re
 import secrets
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path, PureWindowsPath
 
 import numpy as np
@@ -107,8 +107,8 @@ def write_json(path: Path | str, table: Mapping[str, object]) -> None:
     replace_file(path, f"{text}\n".encode())
 
 
-def replace_file(path: Path | str, data: bytes) -> None:
-    """Put `data` at `path` whole or not at all; folders above are made as needed.
+def replace_file(path: Path | str, data: bytes | Iterable[bytes]) -> None:
+    """Put `data`, at once or in pieces, at `path` whole or not at all; folders above are made.
 
     Raises:
         InputError: when the file cannot be written.
@@ -118,7 +118,7 @@ def replace_file(path: Path | str, data: bytes) -> None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with draft.open("xb") as file:
-            file.write(data)
+            file.writelines([data] if isinstance(data, bytes) else data)
             file.flush()
             os.fsync(file.fileno())
         draft.replace(path)

@@ -5,6 +5,7 @@ An empty cell is a missing sample; optional columns tell the noise (`cdpr.noise_
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +30,7 @@ Array = NDArray[np.float64]
 
 POSE_COLUMNS = ("x_m", "y_m", "z_m", *QUATERNION)
 QUATERNION_TOLERANCE = 0.02
+_ROWS_AT_ONCE = 2000
 
 
 def read_csv(path: Path | str, free_coordinates: tuple[str, ...] | None = None) -> Trajectory:
@@ -75,8 +77,15 @@ def write_csv(path: Path | str, trajectory: Trajectory) -> None:
         names, noise = noise_columns(trajectory)
         header += names
         parts.append(noise)
-    rows = (",".join(map(_cell, row)) for row in np.concatenate(parts, axis=1).tolist())
-    replace_file(path, "\n".join([",".join(header), *rows, ""]).encode())
+    replace_file(path, _lines(header, np.concatenate(parts, axis=1)))
+
+
+def _lines(header: list[str], rows: Array) -> Iterator[bytes]:
+    """The file piece by piece: an hour's text at once would take a gigabyte."""
+    yield (",".join(header) + "\n").encode()
+    for first in range(0, len(rows), _ROWS_AT_ONCE):
+        part = rows[first : first + _ROWS_AT_ONCE].tolist()
+        yield "".join(",".join(map(_cell, row)) + "\n" for row in part).encode()
 
 
 def column_name(coordinate: str) -> str:

@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 
 from calib.camera_models import PARAMETER_NAMES
 from cdpr.pose_errors import PoseErrors, error_terms, fitted_terms
-from vision.fuse import Fit, Poses, camera_matrices, free_of, whitened
+from vision.fuse import Fit, camera_matrices, free_of, whitened
 from vision.pose_kernels import linearise_block
+from vision.poses import Poses
 from vision.run_views import Block, CameraViews, blocks
 from vision.watch import Watch
 
@@ -69,7 +70,7 @@ def read_calibration_noise(path: Path) -> CalibrationNoise | None:
         share = table["covariance"]
         names = tuple(str(name) for name in share["names"])
         matrix = np.array(share["matrix"], dtype=np.float64)
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return None
     if matrix.shape != (len(names), len(names)) or not np.isfinite(matrix).all():
         return None

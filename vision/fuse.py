@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cdpr.rotation import exp_rotation, log_rotation
 from vision.pose_kernels import linearise_block, solve_block
+from vision.poses import Poses, motion_of_poses, unknown_poses
 from vision.run_views import Block, CameraViews, blocks
 from vision.single_pose import whitening
 from vision.watch import Watch
@@ -27,29 +27,7 @@ START_FLOOR_PX = 0.15
 LEAST_FLOOR_PX = 0.002
 _ROBUST_LIMIT = 9.0
 _REJECT = 16.0
-_WINDOW = 5
 _MOTION_PASSES = 3
-
-
-@dataclass(frozen=True, slots=True)
-class Poses:
-    """The platform at the instants of a run.
-
-    Attributes:
-        times_s: base time, (n,).
-        positions_m: NaN where unknown, (n, 3).
-        rotations: R_base_platform, (n, 3, 3).
-        covariances: of position and small rotation in the base frame, (n, 6, 6).
-        known: (n,).
-        motions: velocity, angular velocity, and their rates in the base frame, (n, 12).
-    """
-
-    times_s: Array
-    positions_m: Array
-    rotations: Array
-    covariances: Array
-    known: Mask
-    motions: Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +71,7 @@ def fuse(
     """
     n, n_c = len(instants_s), len(views)
     floors = np.full(n_c, START_FLOOR_PX) if floor_px is None else floor_px
-    poses = _empty(instants_s) if start is None else start
+    poses = unknown_poses(instants_s) if start is None else start
     fit = Fit(floors, np.zeros(n_c), np.zeros(n_c), np.zeros(n_c, np.int64), {}, (0.0, 0))
     for _ in range(passes):
         positions, rotations = poses.positions_m.copy(), poses.rotations.copy()
@@ -130,52 +108,6 @@ def fuse(
 def free_of(watch: Watch) -> int:
     """6 where the target gives a pose, 3 where it is a reference point alone."""
     return 6 if watch.platform_points >= 3 else 3
-
-
-def motion_of_poses(times_s: Array, positions: Array, rotations: Array, known: Mask) -> Array:
-    """Velocity, angular velocity and their rates, (n, 12), from five neighbours.
-
-    A quartic through the five poses, a parabola or a line where fewer are known: over a longer
-    window a fast mode would be smoothed away, and with it the very motion that is sought.
-    """
-    n = len(times_s)
-    motions = np.zeros((n, 12))
-    width = min(_WINDOW, n)
-    if width < 2:
-        return motions
-    first = np.clip(np.arange(n) - width // 2, 0, n - width)
-    index = first[:, None] + np.arange(width)
-    usable = known[index] & known[:, None] & (index != np.arange(n)[:, None])
-    relative = np.matmul(rotations[index], np.swapaxes(rotations, 1, 2)[:, None])
-    relative = np.where(usable[..., None, None], relative, np.eye(3))
-    steps = np.concatenate([positions[index] - positions[:, None], log_rotation(relative)], axis=-1)
-    steps = np.where(usable[..., None], steps, 0.0)
-    scale = float(np.median(np.diff(times_s)))
-    dt = (times_s[index] - times_s[:, None]) / scale
-    count = usable.sum(axis=1)
-    for degree, least in ((1, 1), (2, 2), (4, 4)):
-        design = np.stack([dt ** (k + 1) for k in range(degree)], axis=-1)
-        design = np.where(usable[..., None], design, 0.0)
-        normal = np.einsum("nwa,nwb->nab", design, design)
-        enough = count >= least
-        normal[~enough] = np.eye(degree)
-        found = np.linalg.solve(normal, np.einsum("nwa,nwc->nac", design, steps))
-        motions[enough, :6] = found[enough, 0] / scale
-        if degree > 1:
-            motions[enough, 6:] = 2.0 * found[enough, 1] / scale**2
-    return motions
-
-
-def _empty(instants_s: Array) -> Poses:
-    n = len(instants_s)
-    return Poses(
-        instants_s,
-        np.full((n, 3), np.nan),
-        np.full((n, 3, 3), np.nan),
-        np.full((n, 6, 6), np.nan),
-        np.zeros(n, dtype=bool),
-        np.zeros((n, 12)),
-    )
 
 
 def _starts(
@@ -331,11 +263,3 @@ class _Account:
             dict(sorted(self.rejected.items())),
             (self.total, self.count),
         )
-
-
-def carried(poses: Poses, lag_s: float) -> tuple[Array, Array]:
-    """Positions (n, 3) and rotations (n, 3, 3) `lag_s` after the instants, by the motion."""
-    v, w, a, al = np.split(poses.motions, 4, axis=1)
-    positions = poses.positions_m + v * lag_s + 0.5 * a * lag_s**2
-    turn = exp_rotation(w * lag_s + 0.5 * al * lag_s**2)
-    return positions, turn @ poses.rotations

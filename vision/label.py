@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdpr.rigid_fit import fit_rigid
-from vision.fuse import Poses
 from vision.markers import ball_shrink
+from vision.poses import Poses
 from vision.run_views import Block, CameraViews, blocks
 from vision.single_pose import Pose, extrapolate
 from vision.watch import Watch

@@ -13,8 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from vision.fuse import Fit, Poses, camera_matrices, whitened
+from vision.fuse import Fit, camera_matrices, whitened
 from vision.pose_kernels import linearise_block
+from vision.poses import Poses
 from vision.run_views import Block, CameraViews, blocks
 from vision.watch import Watch
 

@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdpr.rotation import log_rotation
-from vision.fuse import Fit, Poses, fuse
+from vision.fuse import Fit, fuse
 from vision.label import label_markers
+from vision.poses import Poses
 from vision.rig_effects import (
     LEAST_CLOCK_S,
     LEAST_LINE_S,

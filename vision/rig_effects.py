@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from calib.camera import Camera
 from cdpr.rotation import exp_rotation
-from vision.fuse import Fit, Poses, camera_matrices, whitened
+from vision.fuse import Fit, camera_matrices, whitened
 from vision.pose_kernels import linearise_block
+from vision.poses import Poses
 from vision.rig_kernels import CLOCK, LINE, PER_CAMERA, POSE, add_rig_equations
 from vision.run_views import CameraViews, blocks
 from vision.settings import SURVEY_STD_M

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from vision.pose_kernels import linearise_block
 
 if TYPE_CHECKING:
-    from vision.fuse import Poses
+    from vision.poses import Poses
     from vision.run_views import Block, CameraViews
 
 Array = NDArray[np.float64]

@@ -14,8 +14,9 @@ from cdpr.trajectory import Trajectory
 from cdpr.trajectory_files import write_csv
 from vision.calibration_share import CalibrationNoise, RunShare, run_share
 from vision.follow import STATUS_NAMES, USED
-from vision.fuse import Fit, Poses, free_of
+from vision.fuse import Fit, free_of
 from vision.layout import LayoutSums, layout_sums
+from vision.poses import Poses
 from vision.rig_correct import correct_rig
 from vision.rig_effects import Finding
 from vision.run_views import CameraViews

@@ -19,7 +19,7 @@ from vision.rolling import rolling_bias
 from vision.watch import Watch
 
 if TYPE_CHECKING:
-    from vision.fuse import Poses
+    from vision.poses import Poses
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
