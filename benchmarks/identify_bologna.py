@@ -18,6 +18,7 @@ import numpy as np
 
 from freeswing.session import read_session
 from freeswing.swings import load_robot, load_swings, load_target
+from ident.geometry import GeometryPriors
 from ident.identify import IdentifySettings, identify
 from ident.signals import SignalSettings
 
@@ -45,6 +46,8 @@ def main() -> None:
     }
     if not options.fidim_only:
         variants["both methods, x and y"] = (robot, IdentifySettings())
+        two_mm = GeometryPriors(entry_std_m=0.002, attachment_std_m=0.002)
+        variants["both, cable ends to 2 mm"] = (robot, IdentifySettings(geometry=two_mm))
     summary = {}
     print("times in s: wall / processor; com in mm; inertia in 1e-3 m2; +- one std")
     for title, (one, settings) in variants.items():
@@ -56,7 +59,11 @@ def main() -> None:
             numbers = zip(1e3 * entry.values, 1e3 * entry.std, strict=True)
             cost = "" if entry.cost_C is None else f"C {entry.cost_C:.2f}"
             print(f"  {name:10} {cost:8}", *(f"{v:.2f}+-{s:.2f}" for v, s in numbers))
+        for method, rows in found.comparison.items():
+            told = (f"{r.name} {r.difference_percent:.2f} % z {r.z:.1f}" for r in rows)
+            print(f"  {method}, full against free:", ", ".join(told))
         sigma = [run.sigma_perp for run in found.validation]
+        print("  sigma_perp:", *(f"{r.run} {r.sigma_perp:.3g}" for r in found.validation))
         print(f"  sigma_perp of {found.best}: median {np.median(sigma):.3f}, max {max(sigma):.3f}")
         rmse = [1e3 * run.prediction_rmse_m for run in found.validation if run.prediction_rmse_m]
         if rmse:
