@@ -121,13 +121,13 @@ def caliscope(data):
     columns += ["obj_loc_x", "obj_loc_y", "obj_loc_z"]
     points = ImagePoints(pd.DataFrame(rows, columns=columns))
     size = tuple(int(v) for v in data["size"])
-    start = time.perf_counter()
+    start = time.process_time()
     cameras = {
         k: CameraData(cam_id=k, size=size, matrix=K, distortions=np.pad(d, (0, 5 - len(d))))
         for k, (K, d) in enumerate(lenses(data))
     }
     volume = CaptureVolume.bootstrap(points, CameraArray(cameras)).optimize(refine_intrinsics=True)
-    caliscope.seconds = time.perf_counter() - start
+    caliscope.seconds = time.process_time() - start
     found = volume.camera_array.cameras
     return [
         (
@@ -148,9 +148,9 @@ def main():
     peer = {"opencv": opencv, "aniposelib": aniposelib, "caliscope": caliscope}[name]
     seconds = np.inf
     for _ in range(1 if name == "aniposelib" else 3):
-        start = time.perf_counter()
+        start = time.process_time()
         cameras = peer(data)
-        seconds = min(seconds, getattr(peer, "seconds", time.perf_counter() - start))
+        seconds = min(seconds, getattr(peer, "seconds", time.process_time() - start))
     document = {
         "seconds": seconds,
         "cameras": [[np.asarray(part, float).ravel().tolist() for part in c] for c in cameras],

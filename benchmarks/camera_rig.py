@@ -3,8 +3,9 @@
 All get the crossings that OpenCV's ChArUco detector finds; this project runs once on those and
 once on its own corners from the same images. Point error: rms over 500 points in the volume, their
 true pixels triangulated with the calibrated cameras, after the best rigid fit (peers have frames of
-their own). Seconds are from corners to cameras, one thread, the best of three
-(aniposelib: one).
+their own). Seconds of the processor from corners to cameras, lenses included, one thread, the best
+of three (aniposelib: one). OpenCV's calibrateMultiview takes whole boards only; the last column
+says how many of the corners found each one used.
 
 Usage: python benchmarks/camera_rig.py [--aniposelib PYTHON] [--caliscope PYTHON] [--views 30]
 """
@@ -34,6 +35,7 @@ from calib.boards import Board  # noqa: E402
 from calib.camera import Camera  # noqa: E402
 from calib.exchange.lens import lens  # noqa: E402
 from calib.rig import solve_rig, start_cameras  # noqa: E402
+from calib.tag_bend import straightened  # noqa: E402
 from calib.tag_patterns import tag_dictionary  # noqa: E402
 from calib.triangulation import triangulate  # noqa: E402
 from calib.truth_checks import rigidly_fitted  # noqa: E402
@@ -56,8 +58,8 @@ def film(cameras, boards):
     crossing = cv2.aruco.CharucoDetector(theirs)
     ours = BoardDetector(Board("charuco", COLUMNS, ROWS, SQUARE_M, MARKER_M, FAMILY))
     crossings = np.full((len(cameras), len(boards), (COLUMNS - 1) * (ROWS - 1), 2), np.nan)
-    tags = np.full((len(cameras), len(boards), len(ours.board.points_m), 3), np.nan)
-    tags[..., 2] = 1.0
+    blank = ours.nothing()
+    tags = [[blank for _ in boards] for _ in cameras]
     seconds = {"opencv": 0.0, "freeswing": 0.0}
     for c, camera in enumerate(cameras):
         for k, T in enumerate(boards):
@@ -72,11 +74,13 @@ def film(cameras, boards):
             found = ours.detect(image)
             seconds["freeswing"] += time.perf_counter() - start
             if found is not None:
-                tags[c, k] = found
-    return crossings, tags, seconds
+                tags[c][k] = found
+    pixels = np.array([[found.pixels for found in row] for row in tags])
+    covariance = np.array([[found.covariance_px2 for found in row] for row in tags])
+    return crossings, (pixels, covariance), seconds
 
 
-def ours(pixels, points, size, std=None):
+def ours(pixels, points, size, covariance=None, board=None):
     """Cameras and seconds of this project."""
     rows = [
         (c, k)
@@ -85,15 +89,19 @@ def ours(pixels, points, size, std=None):
     ]
     camera, moment = (list(column) for column in zip(*rows, strict=True))
     stack = pixels[camera, moment]
-    noise = None if std is None else std[camera, moment]
+    noise = None if covariance is None else covariance[camera, moment]
     names = tuple(f"cam{k}" for k in range(len(pixels)))
     count, best = len(names), np.inf
+
+    def straighten(scene, views):
+        return straightened(scene, views, board, [1] * count)
+
     for _ in range(REPEATS):
-        start = time.perf_counter()
-        views = make_views(camera, moment, stack, std_px=noise)
+        start = time.process_time()
+        views = make_views(camera, moment, stack, covariance_px2=noise)
         starts = start_cameras(names, (size,) * count, ("OPENCV",) * count, points, views)
-        rig = solve_rig(points, starts)
-        best = min(best, time.perf_counter() - start)
+        rig = solve_rig(points, starts, straighten=straighten if board else None)
+        best = min(best, time.process_time() - start)
     return rig.cameras, best
 
 
@@ -149,29 +157,37 @@ def main() -> None:
     size = cameras[0].size_px
     data = {"pixels": crossings, "points": grid, "size": np.array(size)}
     data["board"] = np.array([COLUMNS, ROWS, SQUARE_M, MARKER_M])
-    results = {}
     board = Board("charuco", COLUMNS, ROWS, SQUARE_M, MARKER_M, FAMILY)
-    for name, run in (
-        (
-            "freeswing, its own corners",
-            lambda: ours(tags[..., :2], board.points_m, size, tags[..., 2]),
-        ),
-        ("freeswing, OpenCV's corners", lambda: ours(crossings, grid, size)),
-        ("OpenCV calibrateMultiview", lambda: peer("opencv", sys.executable, data, size)),
-        ("aniposelib", lambda: peer("aniposelib", options.aniposelib, data, size)),
-        ("Caliscope", lambda: peer("caliscope", options.caliscope, data, size)),
-    ):
-        if name in ("aniposelib", "Caliscope") and getattr(options, name.lower()) is None:
+    whole = np.isfinite(crossings).all(axis=(2, 3))
+    full = np.where(whole[..., None, None], crossings, np.nan)
+    runs = (
+        ("freeswing, its own corners", tags[0], None),
+        ("freeswing", crossings, None),
+        ("freeswing, whole boards", full, None),
+        ("OpenCV calibrateMultiview", full, sys.executable),
+        ("aniposelib", crossings, options.aniposelib),
+        ("Caliscope", crossings, options.caliscope),
+    )
+    results = {}
+    for name, pixels, python in runs:
+        if name == "freeswing, its own corners":
+            found, seconds = ours(pixels, board.points_m, size, tags[1], board)
+        elif name.startswith("freeswing"):
+            found, seconds = ours(pixels, grid, size)
+        elif python is None:
             print(f"{name}: skipped, no --{name.lower()} PYTHON")
             continue
-        found, seconds = run()
+        else:
+            found, seconds = peer(name.split()[0].lower(), python, data, size)
         if found is None:
             print(f"{name}: failed: {seconds}")
             continue
-        results[name] = {"point_error_mm": point_error_mm(found, cameras), "seconds": seconds}
-    print(f"{'':30s} {'points mm':>10s} {'seconds':>8s}")
+        corners = int(np.isfinite(pixels[..., 0]).sum())
+        error = point_error_mm(found, cameras)
+        results[name] = {"point_error_mm": error, "seconds": seconds, "corners": corners}
+    print(f"{'':30s} {'points mm':>10s} {'cpu s':>8s} {'corners':>8s}")
     for name, row in results.items():
-        print(f"{name:30s} {row['point_error_mm']:10.4f} {row['seconds']:8.2f}")
+        print(f"{name:30s} {row['point_error_mm']:10.4f} {row['seconds']:8.3f} {row['corners']:8d}")
     print(json.dumps({"results": results, "detection_seconds": detection, "views": options.views}))
 
 

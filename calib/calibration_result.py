@@ -82,7 +82,9 @@ def read_camera_covariance(path: Path | str) -> CameraCovariance:
             raise InputError(f'{path}: format is {document.get("format")!r}, expected "{FORMAT}"')
         names = tuple(str(name) for name in document["covariance"]["names"])
         matrix = np.array(document["covariance"]["matrix"], dtype=np.float64)
-    except (json.JSONDecodeError, AttributeError, KeyError, TypeError) as error:
+    except InputError:
+        raise
+    except (ValueError, AttributeError, KeyError, TypeError, RecursionError) as error:
         raise InputError(f"{path}: not a calibration result ({error})") from error
     if matrix.shape != (len(names), len(names)):
         raise InputError(f"{path}: covariance is {matrix.shape} for {len(names)} names")

@@ -18,8 +18,10 @@ _SMALL_SINE = 1e-9
 
 
 @numba.njit(cache=True, nogil=True)
-def perspective(full: Array, point: Array, pixel: Array, d_point: Array, d_full: Array) -> None:
-    """Rational model: fills pixel (2,), d_point (2, 3), d_full (2, 12); NaN behind the camera."""
+def perspective(
+    full: Array, point: Array, slopes: bool, pixel: Array, d_point: Array, d_full: Array
+) -> None:
+    """Rational model: fills pixel (2,), NaN behind the camera; d_point (2, 3), d_full (2, 12)."""
     inverse_z = 1.0 / point[2] if point[2] > 0.0 else math.nan
     x, y = point[0] * inverse_z, point[1] * inverse_z
     fx, fy, p1, p2 = full[0], full[1], full[6], full[7]
@@ -31,6 +33,8 @@ def perspective(full: Array, point: Array, pixel: Array, d_point: Array, d_full:
     xd = x * gain + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x)
     yd = y * gain + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y
     pixel[0], pixel[1] = fx * xd + full[2], fy * yd + full[3]
+    if not slopes:
+        return
     slope = k1 + r2 * (2.0 * k2 + 3.0 * k3 * r2) - gain * (k4 + r2 * (2.0 * k5 + 3.0 * k6 * r2))
     slope *= below  # d gain / d r2
     cross = 2.0 * x * y * slope + 2.0 * (p1 * x + p2 * y)
@@ -55,7 +59,9 @@ def perspective(full: Array, point: Array, pixel: Array, d_point: Array, d_full:
 
 
 @numba.njit(cache=True, nogil=True)
-def fisheye(full: Array, point: Array, pixel: Array, d_point: Array, d_full: Array) -> None:
+def fisheye(
+    full: Array, point: Array, slopes: bool, pixel: Array, d_point: Array, d_full: Array
+) -> None:
     """Kannala and Brandt's model: fills as `perspective` does; NaN at and behind the centre."""
     fx, fy = full[0], full[1]
     x, y, z = point[0], point[1], point[2]
@@ -74,6 +80,8 @@ def fisheye(full: Array, point: Array, pixel: Array, d_point: Array, d_full: Arr
         safe2 = rho2
         power = theta / rho if rho > 0.0 else math.nan
     pixel[0], pixel[1] = fx * scale * x + full[2], fy * scale * y + full[3]
+    if not slopes:
+        return
     slope = 1.0 + t2 * (
         3.0 * full[4] + t2 * (5.0 * full[5] + t2 * (7.0 * full[6] + t2 * 9.0 * full[7]))
     )
@@ -94,13 +102,19 @@ def fisheye(full: Array, point: Array, pixel: Array, d_point: Array, d_full: Arr
 
 @numba.njit(cache=True, nogil=True)
 def lens_point(
-    is_fisheye: bool, full: Array, point: Array, pixel: Array, d_point: Array, d_full: Array
+    is_fisheye: bool,
+    full: Array,
+    point: Array,
+    slopes: bool,
+    pixel: Array,
+    d_point: Array,
+    d_full: Array,
 ) -> None:
-    """Either model."""
+    """Either model; derivatives only with `slopes`."""
     if is_fisheye:
-        fisheye(full, point, pixel, d_point, d_full)
+        fisheye(full, point, slopes, pixel, d_point, d_full)
     else:
-        perspective(full, point, pixel, d_point, d_full)
+        perspective(full, point, slopes, pixel, d_point, d_full)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -109,7 +123,7 @@ def lens_pixels(is_fisheye: bool, full: Array, points: Array) -> Array:
     pixels = np.empty((len(points), 2))
     d_point, d_full = np.empty((2, 3)), np.empty((2, 12))
     for k in range(len(points)):
-        lens_point(is_fisheye, full, points[k], pixels[k], d_point, d_full)
+        lens_point(is_fisheye, full, points[k], False, pixels[k], d_point, d_full)
     return pixels
 
 
@@ -120,5 +134,5 @@ def lens_jacobians(is_fisheye: bool, full: Array, points: Array) -> tuple[Array,
     pixels, d_point = np.empty((count, 2)), np.empty((count, 2, 3))
     d_full = np.empty((count, 2, 12))
     for k in range(count):
-        lens_point(is_fisheye, full, points[k], pixels[k], d_point[k], d_full[k])
+        lens_point(is_fisheye, full, points[k], True, pixels[k], d_point[k], d_full[k])
     return pixels, d_point, d_full

@@ -42,7 +42,7 @@ def _linearise(
                 pose[i, 0] * points[p, 0] + pose[i, 1] * points[p, 1] + pose[i, 2] * points[p, 2]
             )
             place[i] = arm[i] + pose[i, 3]
-        lens_point(is_fisheye, full, place, pixel, d_point, d_full)
+        lens_point(is_fisheye, full, place, True, pixel, d_point, d_full)
         for axis in range(2):
             d = d_point[axis]
             error = pixels[p, axis] - pixel[axis]

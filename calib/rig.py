@@ -12,8 +12,14 @@ from calib.board_motion import Timeline, in_pieces
 from calib.camera import Camera
 from calib.camera_models import Array
 from calib.intrinsics import CameraStart, DroppedView, start_camera
-from calib.normal_equations import Problem, length_with_share
-from calib.reprojection import Scene, camera_slices, shape_modes
+from calib.normal_equations import (
+    Problem,
+    covariances,
+    damped_step,
+    length_with_share,
+    normal_equations,
+)
+from calib.reprojection import Scene, camera_slices, moved, shape_modes
 from calib.rig_start import place_in_base, start_rig
 from calib.view_kernels import CLOCK, POSE, WARP
 from calib.views import FixedPoints, Views
@@ -108,7 +114,7 @@ def solve_rig(
     free = free_unknowns(cameras, held_pose=start.reference, clocks=clocks)
     dropped = tuple(drop for camera in starts for drop in camera.dropped)
     problem = Problem(board_points_m, views, None, free)
-    rig = refine(scene, problem, start.reference, dropped)
+    rig = refine(scene, problem, start.reference, dropped, roughly=straighten is not None)
     if clocks:
         rig = _without_idle_lines(rig)
     if straighten is not None:
@@ -124,15 +130,17 @@ def _with_board_shape(rig: Rig) -> Rig:
     free = rig.problem.free.copy()
     free[end : end + WARP] = np.abs(shape_modes(rig.problem.board_points_m)).max(axis=(0, 1)) > 0
     problem = replace(rig.problem, free=free)
-    sigma = rig.adjustment.sigma_px
-    trial = adjust(rig.adjustment.scene, problem, sigma, rounds=1, converged=ROUGHLY_CONVERGED)
-    shape = trial.scene.warp_m
-    std = np.sqrt(np.diag(trial.covariance)[end : end + WARP])
+    # the rest has converged: one linear step tells what the shape would become
+    normal = normal_equations(rig.adjustment.scene, problem, rig.adjustment.sigma_px)
+    shared, boards = damped_step(normal, free, 0.0)
+    shape = shared[end : end + WARP]
+    std = np.sqrt(np.diag(covariances(normal, free)[0])[end : end + WARP])
     shown = (np.abs(shape) > SHAPE_SIGMAS * std) & (np.abs(shape) > LEAST_SHAPE_M)
     if not shown.any():
         return rig
     free[end : end + WARP] &= shown
-    scene = replace(trial.scene, warp_m=np.where(shown, shape, 0.0))
+    scene = moved(rig.adjustment.scene, shared, boards)
+    scene = replace(scene, warp_m=np.where(shown, shape, 0.0))
     problem = replace(rig.problem, free=free)
     return refine(scene, problem, rig.reference, rig.dropped, rig.n_trimmed)
 
@@ -186,8 +194,13 @@ def refine(
     reference: int,
     dropped: tuple[DroppedView, ...] = (),
     n_trimmed: int = 0,
+    *,
+    roughly: bool = False,
 ) -> Rig:
-    """Adjust, drop outlying views and corners, and adjust again until none is left."""
+    """Adjust, drop outlying views and corners, and adjust again until none is left.
+
+    `roughly` leaves out the last steps, for a result that is to be refined again.
+    """
     result = adjust(scene, problem, rounds=1, converged=ROUGHLY_CONVERGED)
     for _ in range(_MOST_SWEEPS):
         keep, limits, errors = _views_kept(result, problem)
@@ -211,7 +224,8 @@ def refine(
             rounds=1,
             converged=ROUGHLY_CONVERGED,
         )
-    result = adjust(result.scene, problem, result.sigma_px, rounds=1)
+    if not roughly:
+        result = adjust(result.scene, problem, result.sigma_px, rounds=1)
     return Rig(result, problem, reference, dropped, n_trimmed)
 
 

@@ -16,7 +16,7 @@ from cdpr.documents import DataError
 from cdpr.rotation import invert
 
 LEAST_SHARED = 1
-_MOST_CANDIDATES = 40
+_MOST_CANDIDATES = 12
 _CAP_PX = 20.0
 
 

@@ -127,7 +127,7 @@ def view_rows(
                 + R_camera[i, 2] * (arm[2] + t[2])
             )
             seen[i] = arm_camera[i] + t_camera[i]
-        lens_point(is_fisheye, full, seen, pixel, d_point, d_full)
+        lens_point(is_fisheye, full, seen, with_rows, pixel, d_point, d_full)
         residuals[2 * p] = pixels[p, 0] - pixel[0]
         residuals[2 * p + 1] = pixels[p, 1] - pixel[1]
         if not with_rows:

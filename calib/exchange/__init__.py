@@ -6,12 +6,15 @@ import importlib
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from calib.camera import Camera
 from calib.cameras_file import read_cameras, write_cameras
 from cdpr.documents import InputError
 
 FORMATS = ("freeswing", "opencv", "kalibr", "ros", "anipose", "colmap", "qualisys")
 _LOOKED_AT_BYTES = 20_000
+_RIGID = 1e-3
 _MODULES = {
     "opencv": "opencv_yaml",
     "kalibr": "kalibr",
@@ -36,7 +39,9 @@ def read(path: Path | str, kind: str | None = None) -> tuple[Camera, ...]:
     kind = kind or guess(path)
     if kind == "freeswing":
         return read_cameras(path)
-    return _module(kind).read(path)
+    cameras = _module(kind).read(path)
+    _refuse_impossible(path, cameras)
+    return cameras
 
 
 def write(path: Path | str, cameras: Sequence[Camera], kind: str) -> None:
@@ -77,6 +82,21 @@ def guess(path: Path) -> str:
     if path.name == "cameras.txt":
         return "colmap"
     raise InputError(f"{path}: not a camera file known here; name the format: {', '.join(FORMATS)}")
+
+
+def _refuse_impossible(path: Path, cameras: Sequence[Camera]) -> None:
+    """Names that stand twice, images without pixels, poses that are no motion of a rigid body."""
+    names = [camera.name for camera in cameras]
+    for camera in cameras:
+        rotation = camera.T_camera_base[:3, :3]
+        with np.errstate(over="ignore", invalid="ignore"):
+            off = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
+        if not off < _RIGID or np.linalg.det(rotation) < 0.0:
+            raise InputError(f"{path}: camera {camera.name}: its rotation is none ({off:.3g} off)")
+        if min(camera.size_px) < 1:
+            raise InputError(f"{path}: camera {camera.name}: an image of {camera.size_px} pixels")
+        if names.count(camera.name) > 1:
+            raise InputError(f"{path}: two cameras are named {camera.name!r}")
 
 
 def _module(kind: str):

@@ -11,7 +11,7 @@ import numpy as np
 
 from calib.camera import Camera
 from calib.camera_models import FISHEYE
-from calib.exchange.lens import distortion, lens, matrix, shortest
+from calib.exchange.lens import distortion, lens, matrix, shortest, usable
 from cdpr.documents import InputError, dump_toml, read_text
 from cdpr.rotation import exp_rotation, log_rotation, transform
 
@@ -22,7 +22,7 @@ def read(path: Path) -> tuple[Camera, ...]:
     """Cameras of `[cam_0]` tables (Anipose) or `[cameras.0]` tables (Caliscope)."""
     try:
         document = tomllib.loads(read_text(path, _MOST_BYTES))
-    except tomllib.TOMLDecodeError as error:
+    except (tomllib.TOMLDecodeError, ValueError, RecursionError) as error:
         raise InputError(f"{path}: not toml: {error}") from error
     tables = document.get("cameras", document)
     entries = [(k, v) for k, v in tables.items() if isinstance(v, dict) and "matrix" in v]
@@ -42,9 +42,9 @@ def _camera(key: str, entry: dict[str, Any]) -> Camera:
     fisheye = bool(entry.get("fisheye", False))
     coefficients = np.array(entry["distortions"], dtype=np.float64)
     model, params = lens(K[[0, 1], [0, 1]], K[:2, 2], coefficients, fisheye=fisheye)
-    turn = np.array(entry.get("rotation", np.zeros(3)), dtype=np.float64)
+    turn = usable(entry.get("rotation", np.zeros(3)), "rotation")
     R = turn.reshape(3, 3) if turn.size == 9 else exp_rotation(turn.reshape(3))
-    shift = np.array(entry.get("translation", np.zeros(3)), dtype=np.float64).reshape(3)
+    shift = usable(entry.get("translation", np.zeros(3)), "translation").reshape(3)
     width, height = (int(size) for size in entry["size"])
     name = str(entry.get("name", entry.get("cam_id", key)))
     return Camera(name, (width, height), model, params, transform(R, shift))

@@ -13,16 +13,25 @@ import numpy as np
 
 from calib.camera import Camera
 from calib.camera_models import PARAMETER_NAMES
+from calib.exchange.lens import usable
 from cdpr.documents import InputError, read_text, replace_file
 from cdpr.rotation import matrix_from_quaternion, quaternion_from_matrix, transform
 
 HALF_PIXEL = 0.5
 _MOST_BYTES = 1 << 28
+_LEAST_QUATERNION = 1e-6
 
 
 def read(path: Path) -> tuple[Camera, ...]:
     """One camera an image, named as the image without suffix; `path` is the folder."""
     folder = path if path.is_dir() else path.parent
+    try:
+        return _cameras(folder)
+    except (ValueError, OverflowError, IndexError) as error:
+        raise InputError(f"{folder}: not COLMAP's text model: {str(error)[:200]}") from error
+
+
+def _cameras(folder: Path) -> tuple[Camera, ...]:
     lenses: dict[str, tuple[str, tuple[int, int], np.ndarray]] = {}
     for row in _rows(folder / "cameras.txt"):
         number, model, width, height, *params = row
@@ -35,7 +44,9 @@ def read(path: Path) -> tuple[Camera, ...]:
     for row in _rows(folder / "images.txt"):
         if len(row) < 10 or not row[0].isdigit() or row[8] not in lenses:
             continue  # the line of image points that follows each image
-        q, t = np.array(row[1:5], dtype=np.float64), np.array(row[5:8], dtype=np.float64)
+        q, t = usable(row[1:5], "quaternion"), usable(row[5:8], "translation")
+        if not np.linalg.norm(q) > _LEAST_QUATERNION:
+            raise InputError(f"quaternion {row[1:5]} has no length")
         model, size, params = lenses[row[8]]
         pose = transform(matrix_from_quaternion(q), t)
         cameras.append(Camera(Path(" ".join(row[9:])).stem, size, model, params, pose))

@@ -15,23 +15,15 @@ import numpy as np
 
 from calib.camera import Camera
 from calib.camera_models import FISHEYE
-from calib.exchange.lens import distortion, lens, shortest
-from cdpr.documents import InputError, read_text, replace_file
+from calib.exchange.lens import distortion, lens, shortest, usable
+from calib.exchange.plain_yaml import load_yaml
+from cdpr.documents import InputError, replace_file
 from cdpr.rotation import invert
-
-_MOST_BYTES = 1 << 24
 
 
 def read(path: Path) -> tuple[Camera, ...]:
     """Cameras cam0, cam1, ... of the chain."""
-    import yaml
-
-    try:
-        document = yaml.safe_load(read_text(path, _MOST_BYTES))
-    except yaml.YAMLError as error:
-        raise InputError(f"{path}: not yaml: {error}") from error
-    if not isinstance(document, dict):
-        raise InputError(f"{path}: holds no cameras")
+    document = load_yaml(path)
     entries = [(k, v) for k, v in document.items() if isinstance(v, dict) and "intrinsics" in v]
     if not entries:
         raise InputError(f"{path}: holds no camera with intrinsics")
@@ -54,9 +46,9 @@ def _camera(key: str, entry: dict[str, Any], before: Sequence[Camera]) -> Camera
     coefficients = np.array(entry.get("distortion_coeffs", []), dtype=np.float64)
     model, params = lens(values[:2], values[2:4], coefficients, fisheye=kind == "equidistant")
     if "T_cam_imu" in entry:
-        T = np.array(entry["T_cam_imu"], dtype=np.float64)
+        T = usable(entry["T_cam_imu"], "T_cam_imu")
     elif "T_cn_cnm1" in entry and before:
-        T = np.array(entry["T_cn_cnm1"], dtype=np.float64) @ before[-1].T_camera_base
+        T = usable(entry["T_cn_cnm1"], "T_cn_cnm1") @ before[-1].T_camera_base
     else:
         T = np.eye(4)
     topic = str(entry.get("rostopic", "")).strip("/").split("/")

@@ -10,6 +10,19 @@ from cdpr.documents import InputError
 
 # places of FULL_OPENCV's k1 k2 p1 p2 k3 k4 k5 k6 in both lists are the same
 _MOST_COEFFICIENTS = 8
+_MOST = 1e9
+
+
+def usable(values: object, what: str) -> Array:
+    """An array of numbers that one can calculate with.
+
+    Raises:
+        InputError: when one of them is not finite or beyond any sense.
+    """
+    numbers = np.array(values, dtype=np.float64)
+    if not (np.abs(numbers) < _MOST).all():
+        raise InputError(f"{what} {str(values)[:80]} holds a number that cannot be used")
+    return numbers
 
 
 def matrix(camera: Camera) -> Array:

@@ -8,48 +8,52 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from calib.camera import Camera
 from calib.camera_models import FISHEYE
-from calib.exchange.lens import distortion, lens, matrix, shortest
-from cdpr.documents import InputError, read_text, replace_file
-
-_MOST_BYTES = 1 << 24
+from calib.exchange.lens import distortion, lens, matrix, shortest, usable
+from calib.exchange.plain_yaml import load_yaml
+from cdpr.documents import InputError, replace_file
 
 
 def read(path: Path) -> tuple[Camera, ...]:
-    """The cameras of the file."""
-    import cv2
+    """The cameras of the file.
 
-    text = read_text(path, _MOST_BYTES)
-    try:
-        storage = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
-        listed = storage.getNode("cameras")
-        if listed.empty():
-            return (_camera(path, storage.root(), path.stem),)
-        nodes = [listed.at(index) for index in range(listed.size())]
-        return tuple(_camera(path, node, f"cam{i}") for i, node in enumerate(nodes))
-    except (cv2.error, SystemError) as error:
-        raise InputError(f"{path}: not a file of OpenCV's ({str(error)[:200]})") from error
+    OpenCV's own reader ends the process on some damaged files, so this one does not use it.
+    """
+    document = load_yaml(path)
+    listed = document.get("cameras", [document])
+    if not isinstance(listed, list) or not listed:
+        raise InputError(f"{path}: cameras is not a list")
+    cameras = []
+    for index, entry in enumerate(listed):
+        name = path.stem if "cameras" not in document else f"cam{index}"
+        try:
+            cameras.append(_camera(entry, name))
+        except (KeyError, TypeError, ValueError, OverflowError) as error:
+            raise InputError(
+                f"{path}: {name}: not a camera of OpenCV's, with camera_matrix, "
+                f"distortion_coefficients, image_width and image_height ({error})"
+            ) from error
+    return tuple(cameras)
 
 
-def _camera(path: Path, node, name: str) -> Camera:
-    K = node.getNode("camera_matrix").mat()
-    k = node.getNode("distortion_coefficients").mat()
-    width = int(node.getNode("image_width").real())
-    height = int(node.getNode("image_height").real())
-    if K is None or k is None or width < 1 or height < 1:
-        raise InputError(
-            f"{path}: needs camera_matrix, distortion_coefficients, image_width and image_height"
-        )
-    fisheye = node.getNode("model").string() in (FISHEYE, "fisheye")
+def _camera(entry: dict[str, Any], name: str) -> Camera:
+    K = _matrix(entry["camera_matrix"]).reshape(3, 3)
+    k = _matrix(entry["distortion_coefficients"])
+    size = (int(entry["image_width"]), int(entry["image_height"]))
+    fisheye = entry.get("model") in (FISHEYE, "fisheye")
     model, params = lens(K[[0, 1], [0, 1]], K[:2, 2], k, fisheye=fisheye)
-    T = node.getNode("T_camera_base").mat()
-    given = node.getNode("name").string()
-    pose = np.eye(4) if T is None else T
-    return Camera(given or name, (width, height), model, params, pose)
+    pose = _matrix(entry["T_camera_base"]) if "T_camera_base" in entry else np.eye(4)
+    return Camera(str(entry.get("name", name)), size, model, params, pose)
+
+
+def _matrix(node: dict[str, Any]) -> np.ndarray:
+    rows, columns = int(node["rows"]), int(node["cols"])
+    return usable(node["data"], "a matrix").reshape(rows, columns)
 
 
 def write(path: Path, cameras: Sequence[Camera]) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 
 from calib.camera import Camera
 from calib.camera_models import FISHEYE
-from calib.exchange.lens import distortion, lens, shortest
+from calib.exchange.lens import distortion, lens, shortest, usable
 from cdpr.documents import InputError, read_text, replace_file
 from cdpr.rotation import invert, transform
 
@@ -30,7 +30,7 @@ def read(path: Path) -> tuple[Camera, ...]:
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
         raise InputError(f"{path}: xml with a document type of its own is not read")
     try:
-        root = ElementTree.fromstring(text.encode())
+        root = ElementTree.fromstring(text)  # a declared encoding is void: it is text by now
     except ElementTree.ParseError as error:
         raise InputError(f"{path}: not xml: {error}") from error
     cameras = []
@@ -40,7 +40,7 @@ def read(path: Path) -> tuple[Camera, ...]:
         name = entry.get("serial", f"camera{len(cameras) + 1}")
         try:
             cameras.append(_camera(name, entry))
-        except (TypeError, ValueError, AttributeError) as error:
+        except (TypeError, ValueError, AttributeError, OverflowError) as error:
             raise InputError(f"{path}: camera {name}: {error}") from error
     if not cameras:
         raise InputError(f"{path}: holds no active camera")
@@ -70,7 +70,7 @@ def _camera(name: str, entry: ElementTree.Element) -> Camera:
 
 
 def _number(entry: ElementTree.Element, key: str) -> float:
-    return float(entry.get(key, "nan"))
+    return float(usable(entry.get(key, "nan"), key))
 
 
 def write(path: Path, cameras: Sequence[Camera]) -> None:

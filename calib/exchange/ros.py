@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from calib.camera import Camera
 from calib.camera_models import FISHEYE
 from calib.exchange.lens import distortion, lens, matrix, shortest
-from cdpr.documents import InputError, read_text, replace_file
-
-_MOST_BYTES = 1 << 20
+from calib.exchange.plain_yaml import load_yaml
+from cdpr.documents import InputError, replace_file
 
 
 def read(path: Path) -> tuple[Camera, ...]:
@@ -25,10 +23,8 @@ def read(path: Path) -> tuple[Camera, ...]:
 
 
 def _read_one(path: Path) -> Camera:
-    import yaml
-
+    entry = load_yaml(path)
     try:
-        entry: dict[str, Any] = yaml.safe_load(read_text(path, _MOST_BYTES))
         K = np.array(entry["camera_matrix"]["data"], dtype=np.float64).reshape(3, 3)
         coefficients = np.array(entry["distortion_coefficients"]["data"], dtype=np.float64)
         kind = str(entry["distortion_model"])
@@ -36,7 +32,7 @@ def _read_one(path: Path) -> Camera:
         fisheye = kind in ("equidistant", "fisheye")
         model, params = lens(K[[0, 1], [0, 1]], K[:2, 2], coefficients, fisheye=fisheye)
         return Camera(str(entry.get("camera_name", path.stem)), size, model, params, np.eye(4))
-    except (yaml.YAMLError, KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise InputError(f"{path}: not a ROS camera_info file ({error})") from error
 
 
@@ -46,6 +42,8 @@ def write(path: Path, cameras: Sequence[Camera]) -> None:
         replace_file(path, _text(cameras[0]).encode())
         return
     for camera in cameras:
+        if Path(camera.name).name != camera.name:
+            raise InputError(f"camera {camera.name!r} becomes a file name: rename it")
         replace_file(path / f"{camera.name}.yaml", _text(camera).encode())
 
 
