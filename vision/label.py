@@ -1,7 +1,8 @@
 """Gives unlabelled bright spots their markers' names, by geometry alone.
 
 Where tags give a pose, a spot is the marker that projects next to it. Without tags, the first
-pose comes from spots triangulated over pairs of cameras whose distances match the target's; from
+pose comes from spots triangulated over pairs of cameras whose distances match the target's, or
+from four or more spots of a single camera; from
 then on the motion predicts where each marker must be, through occlusions and crossings: a spot
 that two markers could be is left out.
 """
@@ -16,6 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdpr.rigid_fit import fit_rigid
+from cdpr.rotation import invert
+from vision.marker_pose import pose_from_one_view, refined
 from vision.markers import ball_shrink
 from vision.poses import Poses
 from vision.run_views import Block, CameraViews, blocks
@@ -31,6 +34,7 @@ _MATCH_M = 0.008
 _RAYS_MEET_M = 0.006
 _MOST_SPOTS = 14
 _FORGET = 10
+_START_EVERY = 10
 
 
 @dataclass(slots=True)
@@ -40,6 +44,12 @@ class _Tracker:
     watch: Watch
     past: list[tuple[float, Pose]] = field(default_factory=list)
     misses: int = 0
+    starts: int = 0
+
+    def may_start(self) -> bool:
+        """Whether the costly search from nothing is due: at first, then now and then."""
+        self.starts += 1
+        return self.starts % _START_EVERY == 1
 
     def predict(self, time_s: float) -> Pose | None:
         return extrapolate(self.past, time_s)
@@ -84,6 +94,8 @@ def label_markers(
             origins = centres[block.camera_of[spots]]
             rays = directions[spots]
             pose = _pose_here(block, k, tracker, time, origins, rays, block.camera_of[spots])
+            if pose is None and tracker.may_start():
+                pose = _start_by_one(watch, views, block, spots)
             names = np.full(len(spots), -1)
             if pose is not None:
                 names = _nearest(watch, pose, origins, rays, block.camera_of[spots])
@@ -179,7 +191,26 @@ def _improved(watch: Watch, pose: Pose, names: Ints, origins: Array, rays: Array
         turn, shift = fit_rigid(np.array(layout), np.array(points)[None])
         if np.isfinite(shift).all():
             return turn[0], shift[0]
-    return pose if (names >= 0).sum() >= 3 else None
+    named = names >= 0
+    if len(np.unique(names[named])) < 3:
+        return None
+    places = watch.marker_positions_m[names[named]]
+    return refined(pose, places, origins[named], rays[named])
+
+
+def _start_by_one(
+    watch: Watch, views: Sequence[CameraViews], block: Block, spots: Ints
+) -> Pose | None:
+    """A first pose in the base frame by the camera that sees most spots."""
+    cameras, counts = np.unique(block.camera_of[spots], return_counts=True)
+    camera = int(cameras[np.argmax(counts)])
+    mine = spots[block.camera_of[spots] == camera]
+    pose = pose_from_one_view(watch.marker_positions_m, block.rays[mine, :2])
+    if pose is None:
+        return None
+    T_base_camera = invert(views[camera].camera.T_camera_base)
+    turn = T_base_camera[:3, :3]
+    return turn @ pose[0], turn @ pose[1] + T_base_camera[:3, 3]
 
 
 def _meeting(origins: Array, rays: Array) -> Array:

@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cdpr.rotation import log_rotation
+from cdpr.rotation import exp_rotation, log_rotation
 from cdpr.target import Marker, Target
 from cdpr.trajectory_files import read_trajectory
 from tests.vision.scenes import OPENCV_PARAMS, arc_of_cameras, camera, swing
+from vision.marker_pose import pose_from_one_view
 from vision.markers import ball_shrink, find_blobs
 from vision.patterns import Sphere
 from vision.record import record
@@ -36,9 +37,9 @@ class FilmedRun:
     video: Path
 
 
-def track(tmp_path, markers, count=40):
+def track(tmp_path, markers, count=40, chosen=slice(None)):
     half = [v / 2 for v in OPENCV_PARAMS[:4]] + OPENCV_PARAMS[4:]
-    cameras = arc_of_cameras(3, 1.9, size_px=(360, 288), params=half)
+    cameras = arc_of_cameras(3, 1.9, size_px=(360, 288), params=half)[chosen]
     balls = tuple(Sphere(m.position_m, m.diameter_m) for m in markers)
     scene = Scene((), swing, balls)
     record(tmp_path / "run", cameras, scene, np.arange(count) / 50.0, Look(background=50.0))
@@ -80,6 +81,47 @@ def test_markers_without_names_give_the_pose(tmp_path) -> None:
     assert known.mean() > 0.95, f"{known.mean():.2f} of the samples known"
     assert 1e3 * np.abs(error).max() < 0.6, f"{1e3 * np.abs(error).max():.3f} mm"
     assert 1e3 * np.abs(turn).max() < 4.0, f"{1e3 * np.abs(turn).max():.2f} mrad"
+
+
+def test_one_camera_starts_from_markers_alone(tmp_path) -> None:
+    markers = [Marker(n, p, 0.03) for n, p in zip(NAMES, PLACES, strict=True)]
+    _, trajectory = track(tmp_path, markers, chosen=slice(1, 2))
+    positions, rotations = swing(trajectory.times_s)
+    known = trajectory.is_known
+    turn = log_rotation(trajectory.rotations() @ np.swapaxes(rotations, 1, 2))
+    error = np.concatenate([trajectory.positions() - positions, turn], axis=1)[known]
+    claimed = trajectory.standard_deviations()[known]
+    ratio = np.sqrt(np.median((error / claimed) ** 2) / 0.455)
+    assert known.mean() > 0.95, f"{known.mean():.2f} of the samples known"
+    assert 1e3 * np.abs(error[:, :3]).max() < 8.0, f"{1e3 * np.abs(error[:, :3]).max():.3f} mm"
+    assert 0.4 < ratio < 2.0, f"errors are {ratio:.2f} times what is claimed"
+
+
+def seen_by_one(layout: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A pose 1.8 m before a camera, and the spots in random order with 0.05 px of noise."""
+    random = np.random.default_rng(seed)
+    turn = exp_rotation(random.normal(0.0, 0.4, 3)) @ np.diag([1.0, -1.0, -1.0])
+    shift = np.array([0.1, -0.05, 1.8]) + random.normal(0.0, 0.05, 3)
+    places = layout @ turn.T + shift
+    spots = places[:, :2] / places[:, 2:] + random.normal(0.0, 0.05 / 900, (len(layout), 2))
+    return turn, shift, random.permutation(spots)
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("count", [4, 5])
+def test_names_and_pose_come_from_one_view(seed, count) -> None:
+    turn, shift, spots = seen_by_one(PLACES[:count], seed)
+    pose = pose_from_one_view(PLACES[:count], spots)
+    assert pose is not None, "not found"
+    off = np.linalg.norm(log_rotation(pose[0] @ turn.T)), np.linalg.norm(pose[1] - shift)
+    assert off[0] < 0.01, f"{1e3 * off[0]:.2f} mrad"
+    assert off[1] < 0.01, f"{1e3 * off[1]:.2f} mm"
+
+
+def test_a_layout_that_looks_the_same_twice_is_not_guessed_at() -> None:
+    square = 0.1 * np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+    *_, spots = seen_by_one(square, 3)
+    assert pose_from_one_view(square, spots) is None
 
 
 def test_one_marker_gives_the_reference_point(tmp_path) -> None:
