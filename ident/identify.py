@@ -26,6 +26,7 @@ from ident.prepare import (
     motion_of,
     prepare_runs,
     usable,
+    without,
 )
 from ident.runs import SwingRun
 from ident.signals import SignalSettings
@@ -132,13 +133,16 @@ def identify(
         prepared = prepare_runs(runs, model, settings.signals, progress)
     except ValueError as error:
         raise DataError(str(error)) from error
-    prepared, by_fidim, failures = fidim_estimates(
-        model, prepared, settings.weighting, progress, settings.consistent
-    )
+    how = settings.weighting, progress, settings.consistent
+    prepared, by_fidim, failures = fidim_estimates(model, prepared, *how)
     fitted: dict[str, Fitted] = {}
     lawless = False
     if settings.maximum_likelihood:
         fitted, more, lawless = _likelihood_estimates(prepared, by_fidim, settings, robot, progress)
+        left = [drop for one in fitted.values() for drop in one.estimate.dropped if drop.lawless]
+        if left:  # what maximum likelihood cannot explain has no place in FIDIM either
+            prepared = without(prepared, {drop.run: drop.why for drop in left})
+            prepared, by_fidim, failures = fidim_estimates(model, prepared, *how)
         failures.update(more)
     meaningless = _meaningless(model, prepared, by_fidim, fitted, lawless)
     failures.update(meaningless)

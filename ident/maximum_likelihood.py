@@ -113,7 +113,7 @@ def best_ml_estimate(
         found.samples[run].name: lawless_sentence(float(shares[run]))
         for run in np.flatnonzero(lawless & (shares > _AS_BAD * shares.max()))
     }
-    dropped += tuple(DroppedRun(name, why) for name, why in worst.items())
+    dropped += tuple(DroppedRun(name, why, lawless=True) for name, why in worst.items())
     kept = [run for run in runs if run.name not in worst]
     return best_ml_estimate(model, kept, free, [entry.values, *starts], dropped, progress, asked)
 

@@ -73,7 +73,14 @@ class SwingRun:
 
 @dataclass(frozen=True, slots=True)
 class DroppedRun:
-    """A run that was left out, and why, with its number."""
+    """A run that was left out.
+
+    Attributes:
+        run: its name.
+        why: with the number that says so.
+        lawless: whether it is because no free swing explains it.
+    """
 
     run: str
     why: str
+    lawless: bool = False

@@ -98,6 +98,8 @@ def test_one_made_up_run_leaves_by_name():
     estimate = found.estimates["ml_free"]
     why = {drop.run: drop.why for drop in estimate.dropped}
     assert set(why) == {"made-6"}, f"{why}"
+    published = {drop.run for drop in found.estimates["fidim_free"].dropped}
+    assert published == {"made-6"}, f"FIDIM left out {published}"
     z = (estimate.values - TRUE_INERTIA) / estimate.std
     assert np.abs(z).max() < 4.0, f"z-scores {np.round(z, 1)}"
 
