@@ -84,7 +84,14 @@ def read_camera_covariance(path: Path | str) -> CameraCovariance:
         matrix = np.array(document["covariance"]["matrix"], dtype=np.float64)
     except InputError:
         raise
-    except (ValueError, AttributeError, KeyError, TypeError, RecursionError) as error:
+    except (
+        ValueError,
+        AttributeError,
+        KeyError,
+        TypeError,
+        OverflowError,
+        RecursionError,
+    ) as error:
         raise InputError(f"{path}: not a calibration result ({error})") from error
     if matrix.shape != (len(names), len(names)):
         raise InputError(f"{path}: covariance is {matrix.shape} for {len(names)} names")

@@ -58,7 +58,7 @@ def calibration_errors(session: Session) -> dict[str, PoseErrors]:
     try:
         runs = json.loads(path.read_text(encoding="utf-8"))["runs"]
         told = {run["run"]: run.get("calibration_errors") for run in runs}
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise InputError(f"{path}: not a tracking result ({error}); track again") from error
     return {
         name: read_pose_errors(entry)

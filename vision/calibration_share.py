@@ -70,7 +70,7 @@ def read_calibration_noise(path: Path) -> CalibrationNoise | None:
         share = table["covariance"]
         names = tuple(str(name) for name in share["names"])
         matrix = np.array(share["matrix"], dtype=np.float64)
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+    except (OSError, ValueError, KeyError, TypeError, OverflowError, RecursionError):
         return None
     if matrix.shape != (len(names), len(names)) or not np.isfinite(matrix).all():
         return None

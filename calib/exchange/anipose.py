@@ -11,7 +11,7 @@ import numpy as np
 
 from calib.camera import Camera
 from calib.camera_models import FISHEYE
-from calib.exchange.lens import distortion, lens, matrix, shortest, usable
+from calib.exchange.lens import ODD_ENTRY, distortion, lens, matrix, shortest, usable
 from cdpr.documents import InputError, dump_toml, read_text
 from cdpr.rotation import exp_rotation, log_rotation, transform
 
@@ -32,7 +32,7 @@ def read(path: Path) -> tuple[Camera, ...]:
     for key, entry in entries:
         try:
             cameras.append(_camera(key, entry))
-        except (KeyError, TypeError, ValueError) as error:
+        except ODD_ENTRY as error:
             raise InputError(f"{path}: {key}: {error}") from error
     return tuple(cameras)
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from calib.camera import Camera
 from calib.camera_models import PARAMETER_NAMES
-from calib.exchange.lens import usable
+from calib.exchange.lens import ODD_ENTRY, usable
 from cdpr.documents import InputError, read_text, replace_file
 from cdpr.rotation import matrix_from_quaternion, quaternion_from_matrix, transform
 
@@ -27,7 +27,7 @@ def read(path: Path) -> tuple[Camera, ...]:
     folder = path if path.is_dir() else path.parent
     try:
         return _cameras(folder)
-    except (ValueError, OverflowError, IndexError) as error:
+    except ODD_ENTRY as error:
         raise InputError(f"{folder}: not COLMAP's text model: {str(error)[:200]}") from error
 
 

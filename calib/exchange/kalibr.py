@@ -15,7 +15,7 @@ import numpy as np
 
 from calib.camera import Camera
 from calib.camera_models import FISHEYE
-from calib.exchange.lens import distortion, lens, shortest, usable
+from calib.exchange.lens import ODD_ENTRY, distortion, lens, shortest, usable
 from calib.exchange.plain_yaml import load_yaml
 from cdpr.documents import InputError, replace_file
 from cdpr.rotation import invert
@@ -31,7 +31,7 @@ def read(path: Path) -> tuple[Camera, ...]:
     for name, entry in entries:
         try:
             cameras.append(_camera(str(name), entry, cameras))
-        except (KeyError, TypeError, ValueError) as error:
+        except ODD_ENTRY as error:
             raise InputError(f"{path}: {name}: {error}") from error
     return tuple(cameras)
 

@@ -10,6 +10,8 @@ from cdpr.documents import InputError
 
 # places of FULL_OPENCV's k1 k2 p1 p2 k3 k4 k5 k6 in both lists are the same
 _MOST_COEFFICIENTS = 8
+# What numbers, lists and texts in each other's place lead to.
+ODD_ENTRY = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError)
 _MOST = 1e9
 
 

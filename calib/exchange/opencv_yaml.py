@@ -14,7 +14,7 @@ import numpy as np
 
 from calib.camera import Camera
 from calib.camera_models import FISHEYE
-from calib.exchange.lens import distortion, lens, matrix, shortest, usable
+from calib.exchange.lens import ODD_ENTRY, distortion, lens, matrix, shortest, usable
 from calib.exchange.plain_yaml import load_yaml
 from cdpr.documents import InputError, replace_file
 
@@ -33,7 +33,7 @@ def read(path: Path) -> tuple[Camera, ...]:
         name = path.stem if "cameras" not in document else f"cam{index}"
         try:
             cameras.append(_camera(entry, name))
-        except (KeyError, TypeError, ValueError, OverflowError) as error:
+        except ODD_ENTRY as error:
             raise InputError(
                 f"{path}: {name}: not a camera of OpenCV's, with camera_matrix, "
                 f"distortion_coefficients, image_width and image_height ({error})"

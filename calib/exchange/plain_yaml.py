@@ -9,6 +9,7 @@ from cdpr.documents import InputError, read_text
 
 MOST_BYTES = 1 << 24
 MOST_DEEP = 20
+OPENCV_MATRIX = "tag:yaml.org,2002:opencv-matrix"
 
 
 def load_yaml(path: Path) -> dict[str, Any]:
@@ -23,10 +24,12 @@ def load_yaml(path: Path) -> dict[str, Any]:
     class Loader(yaml.SafeLoader):
         """Takes `!!opencv-matrix` for the table that it is."""
 
-    Loader.add_constructor(
-        "tag:yaml.org,2002:opencv-matrix",
-        lambda loader, node: Loader.construct_mapping(loader, node, deep=True),
-    )
+        def matrix(self, node: yaml.Node) -> dict[Any, Any]:
+            if not isinstance(node, yaml.MappingNode):
+                raise yaml.YAMLError("a matrix that is no table")
+            return self.construct_mapping(node, deep=True)
+
+    Loader.add_constructor(OPENCV_MATRIX, Loader.matrix)
     text = read_text(path, MOST_BYTES).replace("%YAML:1.0", "%YAML 1.1", 1)
     try:
         depth = 0

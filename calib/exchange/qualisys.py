@@ -15,7 +15,7 @@ import numpy as np
 
 from calib.camera import Camera
 from calib.camera_models import FISHEYE
-from calib.exchange.lens import distortion, lens, shortest, usable
+from calib.exchange.lens import ODD_ENTRY, distortion, lens, shortest, usable
 from cdpr.documents import InputError, read_text, replace_file
 from cdpr.rotation import invert, transform
 
@@ -40,7 +40,7 @@ def read(path: Path) -> tuple[Camera, ...]:
         name = entry.get("serial", f"camera{len(cameras) + 1}")
         try:
             cameras.append(_camera(name, entry))
-        except (TypeError, ValueError, AttributeError, OverflowError) as error:
+        except ODD_ENTRY as error:
             raise InputError(f"{path}: camera {name}: {error}") from error
     if not cameras:
         raise InputError(f"{path}: holds no active camera")

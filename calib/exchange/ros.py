@@ -9,7 +9,7 @@ import numpy as np
 
 from calib.camera import Camera
 from calib.camera_models import FISHEYE
-from calib.exchange.lens import distortion, lens, matrix, shortest
+from calib.exchange.lens import ODD_ENTRY, distortion, lens, matrix, shortest
 from calib.exchange.plain_yaml import load_yaml
 from cdpr.documents import InputError, replace_file
 
@@ -32,7 +32,7 @@ def _read_one(path: Path) -> Camera:
         fisheye = kind in ("equidistant", "fisheye")
         model, params = lens(K[[0, 1], [0, 1]], K[:2, 2], coefficients, fisheye=fisheye)
         return Camera(str(entry.get("camera_name", path.stem)), size, model, params, np.eye(4))
-    except (KeyError, TypeError, ValueError, OverflowError) as error:
+    except ODD_ENTRY as error:
         raise InputError(f"{path}: not a ROS camera_info file ({error})") from error
 
 

@@ -6,10 +6,10 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any, Protocol
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import Environment, PackageLoader, StrictUndefined, UndefinedError
 from markupsafe import Markup
 
-from cdpr.documents import replace_file
+from cdpr.documents import InputError, replace_file
 from freeswing.report.answer import Answer
 from freeswing.report.cameras import Cameras
 from freeswing.report.dropped import Dropped
@@ -20,6 +20,9 @@ from freeswing.report.motion import Motion
 from freeswing.report.provenance import Provenance
 from freeswing.report.sigma import SigmaByRun
 from freeswing.report.swings import Swings
+
+# What numbers, tables and texts in each other's place lead to.
+ODD_VALUES = (TypeError, ValueError, LookupError, AttributeError, ArithmeticError)
 
 
 class Panel(Protocol):
@@ -47,7 +50,11 @@ PANELS: tuple[Panel, ...] = (
 
 
 def render_page(material: Material) -> str:
-    """The report as one HTML document; every value is escaped."""
+    """The report as one HTML document; every value is escaped.
+
+    Raises:
+        InputError: where the results are not as this version writes them.
+    """
     environment = Environment(
         loader=PackageLoader("freeswing.report"),
         autoescape=True,
@@ -67,8 +74,16 @@ def write_page(path: Path, material: Material) -> None:
 
 
 def _section(environment: Environment, panel: Panel, material: Material) -> dict[str, Any]:
-    values = panel.values(material)
-    body = None
-    if values is not None:
-        body = Markup(environment.get_template(f"{panel.name}.html").render(values))
+    """One section; its body is None where there is nothing to show."""
+    try:
+        values = panel.values(material)
+        body = None
+        if values is not None:
+            body = Markup(environment.get_template(f"{panel.name}.html").render(values))
+    except (*ODD_VALUES, UndefinedError) as failure:
+        kind = type(failure).__name__
+        raise InputError(
+            f"the report's section {panel.title!r}: a result is not as this version writes it "
+            f"({kind}: {str(failure)[:200]}); delete the results' .json files and run again"
+        ) from failure
     return {"name": panel.name, "title": panel.title, "body": body}

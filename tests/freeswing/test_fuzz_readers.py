@@ -1,0 +1,295 @@
+"""Every reader of files on damaged ones: a result or a sentence, never another exception."""
+
+from __future__ import annotations
+
+import copy
+import json
+import re
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from calib import exchange
+from calib.boards import read_board
+from calib.calibration_result import read_camera_covariance
+from calib.camera import Camera
+from calib.cameras_file import read_cameras, write_cameras
+from calib.recordings import Recording, read_stamps
+from calib.start_pose_files import read_homing
+from cdpr.documents import DataError, InputError
+from cdpr.marker_recording import MarkerRecording
+from cdpr.robot_file import read_robot
+from cdpr.rotation import exp_rotation, transform
+from cdpr.target import read_target
+from cdpr.trajectory_files import read_recording, read_trajectory, write_c3d, write_trc
+from freeswing.report.material import read_material
+from freeswing.report.page import render_page
+from tests.freeswing.hostile_files import broken
+from tests.freeswing.report_material import whole_material
+from vision.calibration_share import read_calibration_noise
+from vision.stamps import run_stamps
+
+SAMPLES = Path(__file__).parents[2] / "samples"
+EXAMPLES = settings(
+    max_examples=60,
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
+)
+CAMERA_FILES = {
+    "opencv": "rig.yml",
+    "kalibr": "chain.yaml",
+    "ros": "info.yaml",
+    "anipose": "anipose.toml",
+    "qualisys": "rig.qca.txt",
+}
+APRILGRID = b"""target_type: 'aprilgrid'
+tagCols: 6
+tagRows: 5
+tagSize: 0.055
+tagSpacing: 0.3
+"""
+
+
+@dataclass(frozen=True)
+class Case:
+    """A file that is right, where it stands, and how it is read."""
+
+    name: str
+    data: bytes
+    read: Callable[[Path], Any]
+    beside: tuple[Path, ...] = ()
+
+
+def cameras(count: int = 2) -> tuple[Camera, ...]:
+    lens = np.array([1100.0, 1101.0, 640.25, 511.125, -0.1, 0.05, 1e-3, -2e-3])
+    pose = transform(exp_rotation(np.array([0.1, 0.2, 0.3])), np.array([1.0, 2.0, 3.5]))
+    return tuple(
+        Camera(f"cam{k}", (1280, 1024), "OPENCV", lens, pose, 1e-3 * k) for k in range(count)
+    )
+
+
+def stamps_of(path: Path) -> None:
+    """Both readers of a recording's stamps."""
+    recording = Recording("cam0", path.parent / "cam0.mkv")
+    read_stamps(recording)
+    run_stamps(recording, 40.0)
+
+
+def covariance_of(path: Path) -> None:
+    """Both readers of a calibration's covariance."""
+    noise = read_calibration_noise(path)
+    if noise is not None:
+        noise.roots()
+    read_camera_covariance(path)
+
+
+def colmap_of(path: Path) -> None:
+    exchange.read(path.parent, "colmap")
+
+
+def text_cases(folder: Path) -> dict[str, Case]:
+    """One case for each kind of text file."""
+    found = {
+        "robot": Case("robot.toml", (SAMPLES / "mocap-trc/robot.toml").read_bytes(), read_robot),
+        "target": Case("target.toml", (SAMPLES / "filmed/target.toml").read_bytes(), read_target),
+        "homing": Case(
+            "homing.toml",
+            (SAMPLES / "homing/homing.toml").read_bytes(),
+            read_homing,
+            (SAMPLES / "homing/robot.toml", SAMPLES / "homing/readings.csv"),
+        ),
+        "readings": Case(
+            "readings.csv",
+            head("homing/readings.csv"),
+            lambda path: read_homing(path.parent / "homing.toml"),
+            (SAMPLES / "homing/robot.toml", SAMPLES / "homing/homing.toml"),
+        ),
+        "stamps": Case(
+            "cam0.csv",
+            b"frame,t_s\n" + b"".join(b"%d,%.3f\n" % (k, k / 40) for k in range(30)),
+            stamps_of,
+        ),
+        "board": Case("april.yaml", APRILGRID, read_board),
+        "covariance": Case("calibration.json", covariance_json(), covariance_of),
+        "csv": Case("a.csv", head("two-cables/runs/swing-01.csv"), read_trajectory),
+        "trc": Case("a.trc", trc_file(folder), read_recording),
+    }
+    write_cameras(folder / "cameras.toml", cameras())
+    found["cameras"] = Case("cameras.toml", (folder / "cameras.toml").read_bytes(), read_cameras)
+    for kind, name in CAMERA_FILES.items():
+        exchange.write(folder / name, cameras(1 if kind == "ros" else 2), kind)
+        data = (folder / name).read_bytes()
+        found[kind] = Case(name, data, exchange.read)
+        found[f"{kind}, told"] = Case(name, data, lambda path, k=kind: exchange.read(path, k))
+    exchange.write(folder / "model", cameras(), "colmap")
+    for part, other in (("cameras.txt", "images.txt"), ("images.txt", "cameras.txt")):
+        data = (folder / "model" / part).read_bytes()
+        found[f"colmap {part}"] = Case(part, data, colmap_of, (folder / "model" / other,))
+    return found
+
+
+def head(name: str) -> bytes:
+    return b"".join((SAMPLES / name).read_bytes().splitlines(keepends=True)[:25])
+
+
+def trc_file(folder: Path) -> bytes:
+    whole = read_recording(SAMPLES / "mocap-trc" / "runs" / "swing-01.trc")
+    few = MarkerRecording(whole.times_s[:20], whole.names, whole.positions_m[:20])
+    write_trc(folder / "few.trc", few)
+    return (folder / "few.trc").read_bytes()
+
+
+def covariance_json() -> bytes:
+    names = [f"cam{k}.{entry}" for k in range(2) for entry in ("fx", "fy", "tx_m", "rx_rad")]
+    share = {"names": names, "matrix": (1e-6 * np.eye(len(names))).tolist()}
+    return json.dumps({"format": "freeswing-calibration/1", "covariance": share}).encode()
+
+
+KINDS = (
+    *("robot", "target", "homing", "readings", "stamps", "board", "covariance", "csv", "trc"),
+    "cameras",
+    *CAMERA_FILES,
+    *(f"{kind}, told" for kind in CAMERA_FILES),
+    "colmap cameras.txt",
+    "colmap images.txt",
+)
+
+
+@pytest.fixture(scope="module")
+def cases(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Case]:
+    return text_cases(tmp_path_factory.mktemp("whole"))
+
+
+def read_or_refuse(path: Path, case: Case) -> None:
+    """Reads; an error must be one of the two that a user can cause, and say something."""
+    said = "nothing was wrong"
+    try:
+        case.read(path)
+    except (InputError, DataError) as error:
+        said = str(error)
+    assert 10 < len(said) < 20_000, f"{len(said)} letters: {said[:100]}"
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_text_files(kind: str, cases: dict[str, Case], tmp_path: Path) -> None:
+    case = cases[kind]
+    for other in case.beside:
+        shutil.copy(other, tmp_path / other.name)
+    path = tmp_path / case.name
+    path.write_bytes(case.data)
+    case.read(path)  # the file is right before anything is done to it
+
+    @EXAMPLES
+    @given(broken(case.data))
+    def vandalised(data: bytes) -> None:
+        path.write_bytes(data)
+        read_or_refuse(path, case)
+
+    vandalised()
+
+
+DEEP = 100_000
+BOMBS = {
+    "kalibr": b"cam0:\n  resolution: [1, 1]\n  intrinsics: " + b"[" * DEEP,
+    "ros": b"camera_matrix: " + b"{a: " * DEEP,
+    "anipose": b"distortions = " + b"[" * DEEP,
+    "qualisys": b"<calibration>" + b"<a>" * DEEP,
+    "covariance": b'{"format": "freeswing-calibration/1", "covariance": ' + b"[" * DEEP,
+    "board": b"target_type: " + b"[" * DEEP,
+}
+LAUGHS = b"".join(b"a%d: &a%d [*a%d, *a%d]\n" % (k, k, k - 1, k - 1) for k in range(1, 40))
+
+
+@pytest.mark.parametrize("kind", BOMBS)
+def test_what_is_nested_without_end(kind: str, cases: dict[str, Case], tmp_path: Path) -> None:
+    path = tmp_path / cases[kind].name
+    path.write_bytes(BOMBS[kind])
+    read_or_refuse(path, cases[kind])
+
+
+@pytest.mark.parametrize("kind", ["kalibr", "ros"])
+def test_yaml_that_explodes(kind: str, cases: dict[str, Case], tmp_path: Path) -> None:
+    path = tmp_path / cases[kind].name
+    keys = {"kalibr": b"intrinsics", "ros": b"camera_matrix"}
+    inside = b"cam0:\n  resolution: [1, 1]\n  " if kind == "kalibr" else b""
+    path.write_bytes(b"a0: &a0 [1, 1]\n" + LAUGHS + inside + keys[kind] + b": *a39\n")
+    with pytest.raises(InputError, match="alias"):
+        cases[kind].read(path)
+
+
+def test_xml_that_explodes(cases: dict[str, Case], tmp_path: Path) -> None:
+    path = tmp_path / "rig.qca.txt"
+    path.write_bytes(b'<!DOCTYPE x [<!ENTITY a "aaaa">]><calibration>&a;</calibration>')
+    with pytest.raises(InputError, match="document type"):
+        cases["qualisys"].read(path)
+
+
+def c3d_file(folder: Path) -> bytes:
+    recording = read_recording(SAMPLES / "mocap-trc" / "runs" / "swing-01.trc")
+    write_c3d(folder / "whole.c3d", recording)
+    return (folder / "whole.c3d").read_bytes()
+
+
+def test_c3d_files(tmp_path: Path) -> None:
+    whole = c3d_file(tmp_path)
+    case = Case("a.c3d", whole, read_recording)
+    path = tmp_path / "a.c3d"
+
+    @EXAMPLES
+    @given(st.integers(0, 4000), st.binary(min_size=1, max_size=6), st.integers(0, len(whole)))
+    def vandalised(place: int, piece: bytes, kept: int) -> None:
+        path.write_bytes((whole[:place] + piece + whole[place + len(piece) :])[: max(kept, 600)])
+        read_or_refuse(path, case)
+
+    vandalised()
+
+
+JUNK = st.sampled_from([None, True, -1, 1e308, "", "x", [], {}, [None], {"a": 1}, [[1, "b"]]])
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning", "ignore::UserWarning")
+@settings(EXAMPLES, max_examples=5)
+@given(st.data())
+def test_results_that_the_report_reads(tmp_path: Path, data: st.DataObject) -> None:
+    """Values anywhere in a result file replaced by others: a page, or which file is wrong."""
+    material = whole_material()
+    results = tmp_path / "results"
+    shutil.rmtree(results, ignore_errors=True)
+    results.mkdir()
+    for kind in ("calibration", "tracking", "identification", "diagnosis"):
+        document = json.loads(json.dumps(getattr(material, kind)))
+        for _ in range(data.draw(st.integers(0, 2))):
+            _replace_somewhere(document, data)
+        (results / f"{kind}.json").write_text(json.dumps(document), encoding="utf-8")
+    try:
+        told = render_page(read_material("fuzzed", results))
+    except InputError as error:
+        told = str(error)
+    assert re.search(r"</html>\s*$|\.json", told), told[-200:]
+
+
+def _replace_somewhere(document: Any, data: st.DataObject) -> None:
+    """Goes down at random and puts something else there, or leaves the key out."""
+    while True:
+        keys = list(document) if isinstance(document, dict) else list(range(len(document)))
+        if isinstance(document, dict):
+            keys = [key for key in keys if key != "format"]
+        if not keys:
+            return
+        key = data.draw(st.sampled_from(keys))
+        child = document[key]
+        if isinstance(child, dict | list) and child and data.draw(st.booleans()):
+            document = child
+            continue
+        if isinstance(document, dict) and data.draw(st.booleans()):
+            del document[key]
+        else:
+            document[key] = copy.deepcopy(data.draw(JUNK))
+        return
