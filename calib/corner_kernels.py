@@ -27,6 +27,9 @@ Array = NDArray[np.float64]
 
 UNKNOWNS = 11
 BLACK, CONTRAST, BLUR = 8, 9, 10
+LEAST_BLUR = 0.289  # of the pixel's own square, in px
+MOST_BLUR = 6.0
+MOST_FREE_PASSES = 25  # sharp small tags settle slowly, others in four to six
 _FLAT = 4.4  # blur widths from an edge at which nothing of it is left, with a margin
 
 
@@ -63,7 +66,8 @@ def accumulate(
         bell: table of its density.
         normal: out, (11, 11) upper triangle.
         right: out, (11,).
-        histogram: out, counts of |residual| in 256 bins of one grey level / 4.
+        histogram: out, counts of |residual| in 256 bins of one grey level / 4, of the pixels on
+            edges: judged by flat ones, all edges of a clean image would be outliers.
 
     Returns:
         Sum of weighted squared residuals, of weights, of pixels, and of squares about the mean.
@@ -108,7 +112,6 @@ def accumulate(
                 residual = grey - black - contrast * value
                 size = abs(residual)
                 weight = 1.0 if size <= limit else (limit / size) ** 2
-                histogram[min(int(size * 4.0), 255)] += 1
                 squares += weight * residual * residual
                 weights += weight
                 count += 1.0
@@ -175,7 +178,6 @@ def accumulate(
             weight = 1.0
             if size > limit:
                 weight = (limit / size) ** 2
-            histogram[min(int(size * 4.0), 255)] += 1
             squares += weight * residual * residual
             weights += weight
             count += 1.0
@@ -188,6 +190,7 @@ def accumulate(
                 right[8] += weight * residual
                 right[9] += weight * residual * value
                 continue
+            histogram[min(int(size * 4.0), 255)] += 1
             x, y = (c - half) / half, (r - half) / half
             gc, gr = -contrast * grad_c, -contrast * grad_r
             lean = -(gc * x + gr * y)
@@ -212,8 +215,9 @@ def accumulate(
 
 
 @numba.njit(cache=True, nogil=True)
-def _noise_from(histogram: NDArray[np.int64], count: float) -> float:
+def _noise_from(histogram: NDArray[np.int64]) -> float:
     """Noise level from the median of |residual|, grey levels."""
+    count = float(histogram.sum())
     seen = 0
     for k in range(256):
         seen += histogram[k]
@@ -270,7 +274,7 @@ def fit_pattern(
         scale = 2.0 * guess[2] + 2.0
     held = len(blurs) - 1
     last = 1e9
-    for iteration in range(held + 10):
+    for iteration in range(held + MOST_FREE_PASSES):
         free = iteration >= held
         if iteration <= held:
             state[2] = blurs[iteration]
@@ -317,7 +321,7 @@ def fit_pattern(
         for i in range(UNKNOWNS):
             for j in range(i):
                 normal[i, j] = normal[j, i]
-        if not free:
+        if not free or (state[2] <= LEAST_BLUR and right[BLUR] < 0.0):
             normal[BLUR, :] = 0.0
             normal[:, BLUR] = 0.0
             normal[BLUR, BLUR] = 1.0
@@ -327,9 +331,10 @@ def fit_pattern(
             normal[i, i] += 1e-9
         change[:] = np.linalg.solve(normal, right)
         blur_change = min(max(change[BLUR], -0.3 * state[2]), 0.5 * state[2])
+        blur_change = min(max(state[2] + blur_change, LEAST_BLUR), MOST_BLUR) - state[2]
         state[0] += change[BLACK]
         state[1] += change[CONTRAST]
-        state[2] = min(max(state[2] + blur_change, 0.25), 6.0)
+        state[2] += blur_change
         largest = 0.0
         for i in range(8):
             largest = max(largest, abs(change[i]))
@@ -337,7 +342,7 @@ def fit_pattern(
             change[:8] *= 2.0 / largest
         h = compose(h, change, half)
         last = max(largest, 0.5 * abs(blur_change) / state[2] if free else 0.0)
-        scale = max(_noise_from(histogram, count), 0.5 * noise)
+        scale = max(_noise_from(histogram), 0.5 * noise)
         after = max(squares - change @ right, 0.0)  # what the step leaves, to first order
         variance = after / max(weights - UNKNOWNS, 1.0)
         figures[0] = math.sqrt(variance)
