@@ -262,11 +262,16 @@ def correlation_factor(
     motions: Sequence[Motion], samples: Sequence[Samples], scales: Array
 ) -> float:
     """Power of the residuals below 5 Hz over what white noise of their variance would have."""
+    pairs = zip(motions, samples, strict=True)
+    return low_band_factor([(residuals(motion, run, scales), run.times_s) for motion, run in pairs])
+
+
+def low_band_factor(series: Sequence[tuple[Array, Array]]) -> float:
+    """Power of series (n, c), each with its times (n,), below 5 Hz over that of white noise."""
     low, whole = 0.0, 0.0
-    for motion, run in zip(motions, samples, strict=True):
-        white = residuals(motion, run, scales)
+    for white, times_s in series:
         power = np.abs(np.fft.rfft(white, axis=0)) ** 2
-        frequencies = np.fft.rfftfreq(len(white), float(np.median(np.diff(run.times_s))))
+        frequencies = np.fft.rfftfreq(len(white), float(np.median(np.diff(times_s))))
         inside = (frequencies > 0.0) & (frequencies <= LOW_BAND_HZ)
         low += float(power[inside].mean(axis=0).sum())
         whole += float(power[1:].mean(axis=0).sum())

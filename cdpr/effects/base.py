@@ -29,6 +29,7 @@ class Parameter:
         amplitude: True when the effect vanishes where all its amplitude parameters are zero;
             False for shape parameters (a frequency, a point of application).
         per_run: True when each run has its own value (a phase that no clock ties to the runs).
+        part: the cable that it belongs to, where an effect may touch one cable alone.
     """
 
     name: str
@@ -38,6 +39,7 @@ class Parameter:
     start: float = 0.0
     amplitude: bool = True
     per_run: bool = False
+    part: str = ""
 
     @property
     def prior_std(self) -> float:
@@ -140,14 +142,15 @@ class Effect:
 def each(robot: Robot, stem: str, unit: str, low: float, high: float, scale: float):
     """One parameter a cable, named stem_<cable>_unit."""
     return tuple(
-        Parameter(f"{stem}_{cable.name}_{unit}", low, high, scale) for cable in robot.cables
+        Parameter(f"{stem}_{cable.name}_{unit}", low, high, scale, part=cable.name)
+        for cable in robot.cables
     )
 
 
 def each_axis(robot: Robot, stem: str, axes: str, unit: str, bound: float, scale: float):
     """One parameter a cable and axis, named stem_<cable>_<axis>_unit, within +- bound."""
     return tuple(
-        Parameter(f"{stem}_{cable.name}_{axis}_{unit}", -bound, bound, scale)
+        Parameter(f"{stem}_{cable.name}_{axis}_{unit}", -bound, bound, scale, part=cable.name)
         for cable in robot.cables
         for axis in axes
     )

@@ -20,7 +20,13 @@ class PulleyRadius(Effect):
     def parameters(self, robot: Robot) -> tuple[Parameter, ...]:
         """One difference a pulley that has a radius."""
         return tuple(
-            Parameter(f"difference_{c.name}_m", -0.5 * c.pulley_radius_m, c.pulley_radius_m, 0.002)
+            Parameter(
+                f"difference_{c.name}_m",
+                -0.5 * c.pulley_radius_m,
+                c.pulley_radius_m,
+                0.002,
+                part=c.name,
+            )
             for c in robot.cables
             if c.pulley_radius_m > 0.0
         )

@@ -11,6 +11,7 @@ from cdpr.effects import effect_named
 from cdpr.robot import Array
 from ident.diagnose.refit import Refit, colour_of, plausible
 from ident.diagnose.rows import Score
+from ident.diagnose.variants import effect_of, inside
 
 REFITTED = 4
 NEARLY_AS_GOOD = 0.5
@@ -26,6 +27,8 @@ LEAST_GAIN_LATER = 0.25
 LEAST_EXCESS_LATER = 0.04
 CONFOUNDED_DIFFERENCE = 12.0
 LEAST_EXCESS = 0.005
+SCATTERED = 1.0 / 3.0
+SCANNED_FREQUENCIES = 400
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,11 +54,19 @@ class Candidate:
 
 @dataclass(frozen=True, slots=True)
 class Decision:
-    """What became of the candidates of a round, who won, and who cannot be told from it."""
+    """What became of the candidates of a round, who won, and who cannot be told from it.
+
+    Attributes:
+        candidates: one an effect.
+        winner: the fit with the one that won, or None.
+        key: the winner's, or "".
+        group: effects that held-out runs cannot tell from it, its own among them.
+    """
 
     candidates: tuple[Candidate, ...]
-    winner: Refit | None
-    group: tuple[str, ...]
+    winner: Refit | None = None
+    key: str = ""
+    group: tuple[str, ...] = ()
 
 
 def promising(current: Refit, linear: dict[str, Score], colour: float) -> list[str]:
@@ -64,18 +75,25 @@ def promising(current: Refit, linear: dict[str, Score], colour: float) -> list[s
     Left-out runs rank well what is well determined; a tether or an offset has more unknowns than
     a linear step settles beside a large residual, and shows in the likelihood first.
     """
-    count = float(np.log(current.evidence.counts.sum()))
     held_out = {n: current.held_out - float(one.held_out.sum()) for n, one in linear.items()}
     likelihood = {
-        n: (current.score.cost - one.cost) / colour - parameter_count(current, n) * count
+        n: (current.score.cost - one.cost) / colour - penalty(current, n)
         for n, one in linear.items()
     }
     chosen: list[str] = []
     for gains in (held_out, likelihood):
-        ranked = sorted(gains, key=lambda n: -gains[n])
+        ranked = _best_of_each(sorted(gains, key=lambda n: -gains[n]))
         least = max(NEARLY_AS_GOOD * gains[ranked[0]], LEAST_GAIN)
         chosen += [n for n in ranked[:REFITTED] if gains[n] > least and n not in chosen]
     return chosen
+
+
+def _best_of_each(ranked: list[str]) -> list[str]:
+    """The first key of each effect."""
+    first: dict[str, str] = {}
+    for key in ranked:
+        first.setdefault(effect_of(key), key)
+    return list(first.values())
 
 
 def decided(
@@ -107,23 +125,39 @@ def decided(
             complaints[name] = complaint
         else:
             passed[name] = one
-    winner, group = _winner(passed, current, noise_scales)
+    key, group = _winner(passed, current, noise_scales)
+    told = _best_of_each([key, *sorted(tried, key=lambda n: tried[n].held_out), *ranked])
     candidates = []
-    for name in ranked:
-        known = tried.get(name)
-        held_out = known.held_out if known else float(linear[name].held_out.sum())
-        n_new = parameter_count(current, name)
-        bic = delta_bic(current, known.score if known else linear[name], n_new, colour)
+    for one in filter(None, told):
+        known = tried.get(one)
+        held_out = known.held_out if known else float(linear[one].held_out.sum())
+        bic = delta_bic(current, known.score if known else linear[one], one, colour)
         gain = float((current.held_out - held_out) / excess)
-        verdict, reason, others = _verdict(name, winner, group, complaints, known, passed, gain)
-        candidates.append(Candidate(name, verdict, float(bic), gain, others, reason))
-    return Decision(tuple(candidates), winner, group)
+        verdict, reason, others = _verdict(one, key, group, complaints, known, passed, gain)
+        candidates.append(Candidate(effect_of(one), verdict, float(bic), gain, others, reason))
+    return Decision(tuple(candidates), passed.get(key), key, group)
 
 
-def delta_bic(current: Refit, one: Score, n_new: int, colour: float) -> float:
-    """BIC with an effect of so many unknowns less BIC without it, the residual's colour allowed."""
-    count = float(current.evidence.counts.sum())
-    return (one.cost - current.score.cost) / colour + n_new * float(np.log(count))
+def delta_bic(current: Refit, one: Score, key: str, colour: float) -> float:
+    """BIC with a candidate less BIC without it, the residual's colour allowed for."""
+    return (one.cost - current.score.cost) / colour + penalty(current, key)
+
+
+def penalty(current: Refit, key: str) -> float:
+    """What a candidate's unknowns cost: log n each, and 2 (AIC) for those that each run has.
+
+    A fan's phase is predicted in no other run: it is no claim about the robot.
+    """
+    shared, own = unknowns(current, key)
+    return shared * float(np.log(current.evidence.counts.sum())) + 2.0 * own
+
+
+def unknowns(current: Refit, key: str) -> tuple[int, int]:
+    """How many values a candidate brings for all runs, and how many that each run has."""
+    robot = current.fit.model.robot
+    parameters = effect_named(effect_of(key)).parameters(robot)
+    own = sum(p.per_run for p in parameters)
+    return int(inside(robot, key).sum()) - own, own * len(current.fit.samples)
 
 
 def _complaint(
@@ -133,10 +167,11 @@ def _complaint(
     outside = plausible(one, name)
     if outside:
         return "; ".join(outside)
-    n_new = parameter_count(current, name)
+    shared, own = unknowns(current, name)
     drop = (current.score.cost - one.score.cost) / colour
-    chance = min(1.0, float(chi2.sf(max(drop, 0.0), n_new)) * n_tried)
-    if chance > SIGNIFICANCE or delta_bic(current, one.score, n_new, colour) > LARGEST_DELTA_BIC:
+    tries = n_tried * (SCANNED_FREQUENCIES if own else 1)
+    chance = min(1.0, float(chi2.sf(max(drop, 0.0), shared + own)) * tries)
+    if chance > SIGNIFICANCE or delta_bic(current, one.score, name, colour) > LARGEST_DELTA_BIC:
         return f"not significant: p = {chance:.2g} with {n_tried} candidates tried"
     gains = current.score.held_out - one.score.held_out
     worse = int((gains < -NO_WORSE * current.score.held_out).sum())
@@ -152,13 +187,6 @@ def _complaint(
     return ""
 
 
-def parameter_count(current: Refit, name: str) -> int:
-    """Unknowns that an effect brings, those of each run counted."""
-    parameters = effect_named(name).parameters(current.fit.model.robot)
-    own = sum(parameter.per_run for parameter in parameters)
-    return len(parameters) + own * (len(current.fit.samples) - 1)
-
-
 def excess_of(current: Refit) -> float:
     """How much more than the noise predicts the left-out runs' squares are, as a share."""
     return current.held_out / float(current.evidence.counts.sum()) - 1.0
@@ -166,40 +194,50 @@ def excess_of(current: Refit) -> float:
 
 def _winner(
     passed: dict[str, Refit], current: Refit, noise_scales: Array
-) -> tuple[Refit | None, tuple[str, ...]]:
-    """The best of those that passed, and all that held-out runs cannot tell from it."""
+) -> tuple[str, tuple[str, ...]]:
+    """The best of those that passed, and all effects that held-out runs cannot tell from it."""
     if not passed:
-        return None, ()
+        return "", ()
     best = min(passed.values(), key=lambda one: one.held_out)
     colour = colour_of(best.fit, noise_scales)
-    group = [
-        name
-        for name, one in passed.items()
-        if (one.held_out - best.held_out) / colour < CONFOUNDED_DIFFERENCE
-    ]
-    robot = current.fit.model.robot
-    group.sort(key=lambda n: (len(effect_named(n).parameters(robot)), passed[n].held_out))
-    return passed[group[0]], tuple(group)
+    group = [name for name, one in passed.items() if _as_good(one, best, current, colour)]
+    group.sort(key=lambda n: (sum(unknowns(current, n)), passed[n].held_out))
+    return group[0], tuple(dict.fromkeys(map(effect_of, group)))
+
+
+def _as_good(one: Refit, best: Refit, current: Refit, colour: float) -> bool:
+    """Whether the best's lead is within the noise, or within its own scatter from run to run.
+
+    A lead that a third of the runs contradict, and that is less than two of its standard errors,
+    could be another one's on the next recordings.
+    """
+    if (one.held_out - best.held_out) / colour < CONFOUNDED_DIFFERENCE:
+        return True
+    leads = one.score.held_out - best.score.held_out
+    against = leads < -NO_WORSE * current.score.held_out
+    error = float(np.std(leads, ddof=1)) * np.sqrt(len(leads))
+    return bool(against.mean() >= SCATTERED and leads.sum() < 2.0 * error)
 
 
 def _verdict(
-    name: str,
-    winner: Refit | None,
+    key: str,
+    winner: str,
     group: tuple[str, ...],
     complaints: dict[str, str],
     known: Refit | None,
     passed: dict[str, Refit],
     gain: float,
 ) -> tuple[str, str, tuple[str, ...]]:
-    if winner is not None and name in group:
+    name = effect_of(key)
+    if name in group:
         others = tuple(n for n in group if n != name)
         if others:
             return "confounded", f"held-out runs cannot tell it from {', '.join(others)}", others
         return "accepted", f"removes {100 * gain:.1f} % of the held-out excess over the noise", ()
-    if name in complaints:
-        return "rejected", complaints[name], ()
-    if known is not None and name in passed and winner is not None:
-        return "rejected", f"{winner.effects[-1]} predicts left-out runs better", ()
+    if key in complaints:
+        return "rejected", complaints[key], ()
+    if known is not None and key in passed and winner:
+        return "rejected", f"{effect_of(winner)} predicts left-out runs better", ()
     if known is not None:
         return "rejected", "its fit could not be completed", ()
     return "rejected", f"removes at most {100 * gain:.1f} % of the excess to first order", ()

@@ -21,6 +21,7 @@ from ident.diagnose.heldout import HeldOut, held_out
 from ident.diagnose.refit import Refit
 from ident.diagnose.search import Round, Search
 from ident.diagnose.unexplained import Unexplained, unexplained
+from ident.diagnose.variants import effect_of
 from ident.fidim_stage import fidim_estimates
 from ident.identify import session_notes
 from ident.likelihood import LikelihoodFit, fit
@@ -155,7 +156,7 @@ def diagnose(
     ladder = _ladder(search, accepted, checked, free, _part(progress, 0.85, 0.95))
     final = _with_own_noise(last.fit, fitted)
     first = final if not accepted else _with_own_noise(search.rounds[0].before.fit, fitted)
-    groups = {one.after.effects[-1]: one.decision.group for one in accepted}
+    groups = {effect_of(one.decision.key): one.decision.group for one in accepted}
     if progress:
         progress("diagnosis", 1.0)
     return Diagnosis(
@@ -254,7 +255,7 @@ def _last_words(
             if candidate.effect not in words or candidate.verdict != "rejected":
                 words[candidate.effect] = candidate
         for name in one.removed:
-            why = f"superfluous since {one.after.effects[-1]} is in the model: removed again"
+            why = f"superfluous since {effect_of(one.decision.key)} is in the model: removed again"
             words[name] = replace(words[name], verdict="rejected", confounded_with=(), reason=why)
     for name, why in barred.items():
         if name in names:
@@ -288,6 +289,7 @@ def _accepted(final: LikelihoodFit, groups: dict[str, tuple[str, ...]]) -> list[
                 "std": float(final.std[9 + used + k]),
             }
             for k, parameter in enumerate(parameters)
+            if parameter.per_run or final.free[9 + used + k]
         ]
         used += len(parameters)
         group = [other for other in groups.get(name, ()) if other != name]

@@ -7,10 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cdpr.effects import effect_named
-from cdpr.model import Model, build_model
+from cdpr.model import Model
 from cdpr.robot import Array
 from ident.diagnose.rows import Evidence, Score, score
 from ident.diagnose.screen import BASE, screen
+from ident.diagnose.variants import effect_of, extended, inside, place_of, reduced
 from ident.joint import State
 from ident.likelihood import LikelihoodFit, correlation_factor, fit
 from ident.likelihood_run import residuals
@@ -44,13 +45,7 @@ class Refit:
 
     def values_of(self, name: str) -> slice:
         """Where an effect's values stand among the fit's."""
-        used = 0
-        for other in self.effects:
-            count = len(effect_named(other).parameters(self.fit.model.robot))
-            if other == name:
-                return slice(used, used + count)
-            used += count
-        raise ValueError(f"{name} is not among {self.effects}")
+        return place_of(self.fit.model, name)
 
 
 def colour_of(fit: LikelihoodFit, noise_scales: Array) -> float:
@@ -77,7 +72,7 @@ def refit(
 
     Args:
         current: the fit without it.
-        candidate: its name.
+        candidate: its key.
         values: of the candidate, (k,), at which it does nothing: the fit goes on from where the
             current one stands, so its first step is the screening's linear answer.
         noise_scales: of metres and radians, (2,).
@@ -86,47 +81,89 @@ def refit(
     Raises:
         ValueError: when the start cannot be simulated.
     """
-    model = build_model(current.model.robot, (*current.model.effects, candidate))
-    start = current.state
+    model, free, start = current.model, current.free.copy(), current.state
+    own_values = start.own_values
+    name = effect_of(candidate)
+    if name in model.effects:
+        free[BASE:][place_of(model, name)] |= inside(model.robot, candidate)
+        all_values = start.values
+    else:
+        model = extended(model, (name,))
+        free = np.concatenate([free, inside(model.robot, candidate)])
+        all_values = np.concatenate([start.values, values])
+        own_values = _with_new(own_values, len(model.own_values))
     state = State(
         start.inertia,
-        np.concatenate([start.values, values]),
+        all_values,
         start.starts,
         noise_scales * np.sqrt(colour),
-        own_values=_with_new(start.own_values, len(model.own_values)),
+        own_values=own_values,
     )
-    return rescored(_fitted(model, current, state), noise_scales, colour)
+    return rescored(_fitted(model, current, state, free), noise_scales, colour)
+
+
+def displaced(current: Refit, key: str, centre: Array, stds: Array, noise_scales: Array) -> Refit:
+    """A fit with a geometry in it that is known with standard deviations.
+
+    Args:
+        current: the fit without it.
+        key: of the geometry effect.
+        centre: its values, (k,).
+        stds: of these, (k,): weights of a prior about them.
+        noise_scales: of metres and radians, (2,).
+    """
+    found, name = current.fit, effect_of(key)
+    model, free, start = found.model, found.free.copy(), found.state
+    values = start.values
+    if name not in model.effects:
+        model = extended(model, (name,))
+        values = np.concatenate([values, model.start_values[len(values) :]])
+        free = np.pad(free, (0, len(values) - len(start.values)))
+    chosen = np.arange(len(values))[place_of(model, name)][inside(model.robot, key)]
+    parameters = list(model.parameters)
+    for k, value, std in zip(chosen, centre, stds, strict=True):
+        low, high = float(value - 3.0 * std), float(value + 3.0 * std)
+        parameters[k] = replace(parameters[k], start=float(value), low=low, high=high)
+    values, free = values.copy(), free.copy()
+    values[chosen], free[BASE + chosen] = centre, True
+    colour = colour_of(found, noise_scales)
+    scales = noise_scales * np.sqrt(colour)
+    state = State(start.inertia, values, start.starts, scales, own_values=start.own_values)
+    known = replace(model, parameters=tuple(parameters))
+    return polished(
+        fit(known, found.samples, state, free, estimate_scales=False, grow=False), noise_scales
+    )
 
 
 def polished(found: LikelihoodFit, noise_scales: Array) -> Refit:
     """A fit that goes on to convergence."""
     colour = colour_of(found, noise_scales)
     state = replace(found.state, scales=noise_scales * np.sqrt(colour))
-    exact = fit(found.model, found.samples, state, estimate_scales=False, grow=False)
+    exact = fit(found.model, found.samples, state, found.free, estimate_scales=False, grow=False)
     return rescored(exact, noise_scales, colour)
 
 
 def without(found: LikelihoodFit, name: str, noise_scales: Array) -> Refit:
     """A fit without one of its effects, from where it stands, converged."""
-    model = found.model
-    place = [k for k, other in enumerate(model.names) if other.split(".")[0] == name]
-    fewer = build_model(model.robot, tuple(other for other in model.effects if other != name))
-    start = found.state
+    model, start = found.model, found.state
+    place = np.arange(len(start.values))[place_of(model, name)]
+    fewer = reduced(model, name)
     own = start.own_values
     if own is not None:
         own = own[:, ~np.isin(model.own_values, place)]
-    values = np.delete(start.values, place)
+    values, free = np.delete(start.values, place), np.delete(found.free, BASE + place)
     state = State(start.inertia, values, start.starts, start.scales, own_values=own)
-    exact = fit(fewer, found.samples, state, estimate_scales=False, grow=False)
+    exact = fit(fewer, found.samples, state, free, estimate_scales=False, grow=False)
     return rescored(exact, noise_scales, colour_of(exact, noise_scales))
 
 
-def _fitted(model: Model, current: LikelihoodFit, state: State) -> LikelihoodFit:
+def _fitted(model: Model, current: LikelihoodFit, state: State, free: np.ndarray) -> LikelihoodFit:
     """Converged to a ten-thousandth of the cost: enough to rank candidates."""
     return fit(
         model,
         current.samples,
         state,
+        free,
         estimate_scales=False,
         grow=False,
         steps=RANKING_STEPS,
@@ -142,13 +179,16 @@ def _with_new(own_values: Array | None, count: int) -> Array | None:
     return np.pad(own_values, ((0, 0), (0, count - own_values.shape[1])))
 
 
-def plausible(refitted: Refit, name: str) -> list[str]:
-    """What is not plausible about an effect's values: a sentence each."""
+def plausible(refitted: Refit, key: str) -> list[str]:
+    """What is not plausible about a candidate's values: a sentence each."""
+    name = effect_of(key)
     where = refitted.values_of(name)
-    parameters = refitted.fit.model.parameters[where]
-    stds = refitted.fit.std[BASE:][where]
+    chosen = np.flatnonzero(inside(refitted.fit.model.robot, key))
+    parameters = [refitted.fit.model.parameters[where][k] for k in chosen]
+    stds = refitted.fit.std[BASE:][where][chosen]
+    values = refitted.fit.values[where][chosen]
     complaints = []
-    for parameter, value, std in zip(parameters, refitted.fit.values[where], stds, strict=True):
+    for parameter, value, std in zip(parameters, values, stds, strict=True):
         slack = min(3.0 * std, 0.1 * (parameter.high - parameter.low))
         if parameter.amplitude and not parameter.low - slack <= value <= parameter.high + slack:
             complaints.append(
@@ -156,7 +196,7 @@ def plausible(refitted: Refit, name: str) -> list[str]:
                 f"{parameter.low:g} to {parameter.high:g}"
             )
     sizes = np.array([p.scale for p in parameters])
-    shares = np.abs(refitted.fit.values[where] - [p.start for p in parameters]) / sizes
+    shares = np.abs(values - [p.start for p in parameters]) / sizes
     if effect_named(name).stage == "kinematics" and shares.max(initial=0.0) < NEGLIGIBLE:
         complaints.append(
             f"all its values are below {NEGLIGIBLE:g} of a typical size ({sizes.max():g}): "

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from cdpr.effects import effect_named
 from ident.diagnose.decision import (
     CONFOUNDED_DIFFERENCE,
     LARGEST_DELTA_BIC,
     delta_bic,
-    parameter_count,
 )
 from ident.diagnose.refit import Refit, colour_of
 from ident.diagnose.screen import BASE
@@ -34,12 +34,14 @@ def superfluous(current: Refit, kept: Sequence[str], noise_scales: np.ndarray) -
         parameters = current.fit.model.parameters[where]
         if any(parameter.per_run for parameter in parameters):
             continue
-        tested = [k for k, parameter in enumerate(parameters) if parameter.amplitude]
-        away = current.fit.values[where] - [parameter.start for parameter in parameters]
+        estimated = current.fit.free[BASE:][where]
+        tested = [k for k, p in enumerate(parameters) if p.amplitude and estimated[k]]
+        declared = effect_named(name).parameters(current.fit.model.robot)
+        away = current.fit.values[where] - [parameter.start for parameter in declared]
         columns = BASE + where.start + np.array(tested)
         covariance = current.fit.covariance[np.ix_(columns, columns)]
         rise = float(away[tested] @ np.linalg.solve(covariance, away[tested])) / colour
-        rises[name] = rise - len(parameters) * np.log(count)
+        rises[name] = rise - estimated.sum() * np.log(count)
     if not rises:
         return ""
     least = min(rises, key=lambda name: rises[name])
@@ -49,6 +51,6 @@ def superfluous(current: Refit, kept: Sequence[str], noise_scales: np.ndarray) -
 def is_no_worse(fewer: Refit, more: Refit, name: str, noise_scales: np.ndarray) -> bool:
     """Whether a fit without an effect is as good as the one with it, its unknowns counted."""
     colour = colour_of(more.fit, noise_scales)
-    by_likelihood = delta_bic(fewer, more.score, parameter_count(fewer, name), colour)
+    by_likelihood = delta_bic(fewer, more.score, name, colour)
     by_held_out = (fewer.held_out - more.held_out) / colour
     return by_likelihood > LARGEST_DELTA_BIC and by_held_out < CONFOUNDED_DIFFERENCE

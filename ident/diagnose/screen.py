@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cdpr.effects import effect_named
-from cdpr.model import Model, build_model
+from cdpr.model import Model
 from cdpr.robot import Array
 from cdpr.sensitivity import linearise
 from ident.diagnose.rows import Evidence
+from ident.diagnose.variants import effect_of, extended, inside, place_of
 from ident.likelihood import LikelihoodFit
 from ident.likelihood_run import Samples, reduce_run
 
@@ -26,7 +26,7 @@ class Screen:
         model: with the accepted effects first and the candidates after them.
         values: at which it was linearised: fitted ones, and candidates that do nothing.
         evidence: over [9 inertia values; effect values].
-        base: columns of inertia and accepted effects.
+        base: columns of inertia and of what is estimated of the accepted effects.
         columns: of each candidate's amplitudes, but those that each run has for itself: these
             are eliminated with its state.
     """
@@ -37,14 +37,14 @@ class Screen:
     base: np.ndarray
     columns: dict[str, np.ndarray]
 
-    def with_candidate(self, *names: str) -> Evidence:
+    def with_candidate(self, *keys: str) -> Evidence:
         """Evidence over the base and the named candidates' amplitudes."""
-        return self.evidence.subset(np.concatenate([self.base, *(self.columns[n] for n in names)]))
+        return self.evidence.subset(np.concatenate([self.base, *(self.columns[n] for n in keys)]))
 
 
 def screen(
     fit: LikelihoodFit,
-    candidates: Sequence[str],
+    keys: Sequence[str],
     noise_scales: Array,
     shapes: dict[str, dict[str, float]] | None = None,
     colour: float = 1.0,
@@ -53,16 +53,21 @@ def screen(
 
     Args:
         fit: the current model's.
-        candidates: names of effects that are not in it.
+        keys: candidates: effects that are not in it, or parts that it holds.
         noise_scales: of metres and radians: those of the noise, not of the residual, (2,).
         shapes: values for shape parameters (a frequency) by effect and parameter name.
         colour: power of the residual in the band of the motion over the noise's, >= 1: samples
             that a model does not reach count that much less beside the priors.
     """
-    accepted = fit.model.effects
-    model = build_model(fit.model.robot, (*accepted, *candidates))
-    values, columns = _start(model, fit, candidates, shapes or {})
-    base = np.arange(BASE + len(fit.values))
+    fresh = [n for n in dict.fromkeys(map(effect_of, keys)) if n not in fit.model.effects]
+    model = extended(fit.model, fresh) if fresh else fit.model
+    values = model.start_values.copy()
+    values[: len(fit.values)] = fit.values
+    for name in fresh:
+        where = place_of(model, name)
+        for k in range(where.start, where.stop):
+            parameter = model.parameters[k]
+            values[k] = (shapes or {}).get(name, {}).get(parameter.name, parameter.start)
     triangles, counts = [], []
     for motion, samples in zip(fit.motions, fit.samples, strict=True):
         mine = values.copy()
@@ -78,7 +83,8 @@ def screen(
         np.array(counts, dtype=np.float64),
         np.sqrt(colour) * _priors(model, values),
     )
-    return Screen(model, values, evidence, base, columns)
+    columns = {key: _amplitudes(model, key) for key in keys}
+    return Screen(model, values, evidence, np.flatnonzero(fit.free), columns)
 
 
 def _count(samples: Samples, model: Model) -> int:
@@ -87,23 +93,12 @@ def _count(samples: Samples, model: Model) -> int:
     return samples.values.size - own + (0 if samples.lengths_m is None else n)
 
 
-def _start(
-    model: Model,
-    fit: LikelihoodFit,
-    candidates: Sequence[str],
-    shapes: dict[str, dict[str, float]],
-) -> tuple[Array, dict[str, np.ndarray]]:
-    values = model.start_values.copy()
-    values[: len(fit.values)] = fit.values
-    columns, used = {}, len(fit.values)
-    for name in candidates:
-        parameters = effect_named(name).parameters(model.robot)
-        for offset, parameter in enumerate(parameters):
-            values[used + offset] = shapes.get(name, {}).get(parameter.name, parameter.start)
-        amplitudes = [k for k, p in enumerate(parameters) if p.amplitude and not p.per_run]
-        columns[name] = BASE + used + np.array(amplitudes, dtype=np.int64)
-        used += len(parameters)
-    return values, columns
+def _amplitudes(model: Model, key: str) -> np.ndarray:
+    where = place_of(model, effect_of(key))
+    chosen = inside(model.robot, key)
+    parameters = model.parameters[where]
+    offsets = [k for k, p in enumerate(parameters) if chosen[k] and p.amplitude and not p.per_run]
+    return BASE + where.start + np.array(offsets, dtype=np.int64)
 
 
 def _priors(model: Model, values: Array) -> Array:

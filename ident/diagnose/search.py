@@ -16,12 +16,21 @@ from multiprocessing import get_context
 
 from cdpr.effects import effect_named
 from cdpr.robot import Array, Robot
-from ident.diagnose.decision import LEAST_EXCESS_LATER, Decision, decided, excess_of, promising
-from ident.diagnose.refit import Refit, colour_of, polished, refit, rescored, without
+from ident.diagnose.decision import (
+    LEAST_EXCESS_LATER,
+    Candidate,
+    Decision,
+    decided,
+    excess_of,
+    promising,
+)
+from ident.diagnose.kinematics import displacements
+from ident.diagnose.refit import Refit, colour_of, displaced, polished, refit, rescored, without
 from ident.diagnose.removal import is_no_worse, superfluous
 from ident.diagnose.rows import score
-from ident.diagnose.screen import Screen, screen
+from ident.diagnose.screen import BASE, Screen, screen
 from ident.diagnose.spectrum import common_frequency, too_small
+from ident.diagnose.variants import effect_of, inside, place_of, variants
 from ident.likelihood import LikelihoodFit
 
 Progress = Callable[[str, float], None]
@@ -66,6 +75,7 @@ class Search:
         """Add effects to a base fit until none passes; the last fit."""
         self._tell("base dynamics", 0.0)
         current = rescored(base, self.noise_scales, colour_of(base, self.noise_scales))
+        current = self._geometry(current)
         for index in range(MOST_ROUNDS):
             if index and (excess_of(current) < LEAST_EXCESS_LATER or too_small(current.fit)):
                 break
@@ -76,6 +86,25 @@ class Search:
             current = done.after
         return current
 
+    def _geometry(self, current: Refit) -> Refit:
+        """Kinematics first: what constant cable lengths settle, no force has to explain."""
+        robot = current.fit.model.robot
+        keys = [
+            key
+            for name in self.candidates
+            if effect_named(name).stage in ("kinematics", "measurement")
+            for key in variants(robot, name)
+        ]
+        self._tell("kinematics: lengths along the runs", 0.0)
+        for one in displacements(current.fit, keys, self.noise_scales):
+            self._tell(f"kinematics: {effect_of(one.key)}", 0.0)
+            after = displaced(current, one.key, one.values, one.stds, self.noise_scales)
+            word = Candidate(effect_of(one.key), "accepted", one.delta_bic, one.share, (), str(one))
+            decision = Decision((word,), after, one.key, (effect_of(one.key),))
+            self.rounds.append(Round(current, decision))
+            current = after
+        return current
+
     def _tell(self, label: str, fraction: float) -> None:
         if self.progress:
             self.progress(label, fraction)
@@ -83,9 +112,9 @@ class Search:
     def _round(self, current: Refit, index: int) -> Round:
         share = 1.0 / MOST_ROUNDS
         self._tell(f"round {index + 1}: screening", index * share)
-        left = [n for n in self.candidates if n not in current.effects]
+        left = self._left(current)
         if not left:
-            return Round(current, Decision((), None, ()))
+            return Round(current, Decision(()))
         colour = colour_of(current.fit, self.noise_scales)
         screens = self._screens(current.fit, left, colour)
         linear = {name: score(screens[name].with_candidate(name)) for name in left}
@@ -105,8 +134,19 @@ class Search:
             removed.append(name)
         return Round(current, replace(decision, winner=found), tuple(removed))
 
+    def _left(self, current: Refit) -> list[str]:
+        """Keys of what is not in the model yet: whole effects, and parts of any."""
+        model, left = current.fit.model, []
+        for name in self.candidates:
+            keys = variants(model.robot, name)
+            if name in current.effects:
+                estimated = current.fit.free[BASE:][current.values_of(name)]
+                keys = [k for k in keys[1:] if not estimated[inside(model.robot, k)].any()]
+            left += keys
+        return left
+
     def _screens(
-        self, found: LikelihoodFit, names: Sequence[str], colour: float
+        self, found: LikelihoodFit, keys: Sequence[str], colour: float
     ) -> dict[str, Screen]:
         """Linear evidence by candidate.
 
@@ -114,13 +154,13 @@ class Search:
         run because they are eliminated with the runs' states.
         """
         shapes = {}
-        frequency = common_frequency(found, self.noise_scales)
-        if "harmonic_force" in names:
+        if "harmonic_force" in keys:
+            frequency = common_frequency(found, self.noise_scales)
             shapes["harmonic_force"] = {"frequency_hz": frequency}
         screens: dict[str, Screen] = {}
         robot = found.model.robot
         for kind in ((False, False), (True, False), (False, True)):
-            group = [n for n in names if _kind(n, robot) == kind]
+            group = [n for n in keys if _kind(effect_of(n), robot) == kind]
             if group:
                 together = screen(found, group, self.noise_scales, shapes, colour)
                 screens |= dict.fromkeys(group, together)
@@ -180,8 +220,6 @@ def _job(
         return None
 
 
-def _start_of(one: Screen, name: str) -> Array:
-    """Values of a candidate at which it does nothing, its shape as it was screened, (k,)."""
-    parameters = effect_named(name).parameters(one.model.robot)
-    first = one.model.names.index(f"{name}.{parameters[0].name}")
-    return one.values[first : first + len(parameters)].copy()
+def _start_of(one: Screen, key: str) -> Array:
+    """Values of a candidate's effect as it was screened, doing nothing, (k,)."""
+    return one.values[place_of(one.model, effect_of(key))].copy()

@@ -92,7 +92,13 @@ TRANSLATED = {
         lambda w, v: {"oscillators": _harmonic(v)},
     ),
 }
-ELSEWHERE = {"cable_elasticity", "winch_creep", "cable_length_bias", "marker_offset"}
+ELSEWHERE = {
+    "cable_elasticity",
+    "winch_creep",
+    "cable_length_bias",
+    "marker_offset",
+    "clock_offset",
+}
 
 
 def independent(world, zeta, rates, model):
@@ -221,3 +227,13 @@ def test_torsion_spring_turns_on_through_a_full_turn():
     forces = evaluate(model.lagrangian, turns, np.zeros(4), inertia, values)[1][:, 5]
     jump = np.abs(np.diff(forces)).max()
     assert jump < 0.02, f"the spring jumps by {jump:.2f} m2/s2 in 0.01 rad past half a turn"
+
+
+def test_orientations_lag_by_the_clocks_offset():
+    model = build_model(robot_named("bologna-4"), ("clock_offset",))
+    zetas, rates = random_states(model.robot, 5)
+    delay = 1e-5
+    seen = evaluate(model.measured, 0.0, zetas, rates, true_inertia(model.robot), np.array([delay]))
+    error = np.abs(seen[0][:, 3:] - (zetas - delay * rates)[:, 3:]).max()
+    assert error < 1e-9, f"{error:.3g} rad"
+    assert np.array_equal(seen[0][:, :3], zetas[:, :3])

@@ -1,0 +1,60 @@
+"""Candidates of a search: an effect, or one cable's part of an effect ("attachment_offset:2").
+
+What one cable alone has wrong needs a fraction of the unknowns; an effect that is given all cables
+spends the others on whatever else the model lacks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from cdpr.effects import effect_named
+from cdpr.model import Model, build_model
+from cdpr.robot import Robot
+
+
+def effect_of(key: str) -> str:
+    """The effect's name."""
+    return key.partition(":")[0]
+
+
+def variants(robot: Robot, name: str) -> list[str]:
+    """The keys of an effect: the whole of it, then each cable's part where it has several."""
+    parts = dict.fromkeys(p.part for p in effect_named(name).parameters(robot) if p.part)
+    return [name, *(f"{name}:{part}" for part in parts)] if len(parts) > 1 else [name]
+
+
+def inside(robot: Robot, key: str) -> np.ndarray:
+    """Which of its effect's parameters a key estimates, (k,) booleans."""
+    name, _, part = key.partition(":")
+    return np.array([part in ("", p.part) for p in effect_named(name).parameters(robot)])
+
+
+def place_of(model: Model, name: str) -> slice:
+    """Where an effect's values stand among a model's.
+
+    Raises:
+        ValueError: when it is not in the model.
+    """
+    where = [k for k, full in enumerate(model.names) if full.partition(".")[0] == name]
+    if not where:
+        raise ValueError(f"{name} is not among {model.effects}")
+    return slice(where[0], where[-1] + 1)
+
+
+def extended(model: Model, names: Sequence[str]) -> Model:
+    """A model with further effects; what is known of those that it has stays known."""
+    more = build_model(model.robot, (*model.effects, *names))
+    known = model.parameters
+    return replace(more, parameters=(*known, *more.parameters[len(known) :]))
+
+
+def reduced(model: Model, name: str) -> Model:
+    """A model without one of its effects."""
+    where = place_of(model, name)
+    fewer = build_model(model.robot, tuple(other for other in model.effects if other != name))
+    kept = (*model.parameters[: where.start], *model.parameters[where.stop :])
+    return replace(fewer, parameters=kept)
