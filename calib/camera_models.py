@@ -14,6 +14,8 @@ theta_d = theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4 theta^8).
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -99,6 +101,12 @@ def radius_limit(model: str, params: Array) -> float:
     The radial curve must rise; past its first maximum two rays share a pixel. Infinite when it
     rises for ever (the fisheye: pi, the whole sphere).
     """
+    return _radius_limit(model, tuple(float(value) for value in params))
+
+
+@lru_cache(maxsize=256)
+def _radius_limit(model: str, numbers: tuple[float, ...]) -> float:
+    params = np.array(numbers)
     if model == FISHEYE:
         slope = np.array([9 * params[7], 7 * params[6], 5 * params[5], 3 * params[4], 1.0])
         return min(float(np.pi), _first_positive_root(slope))

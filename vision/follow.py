@@ -100,8 +100,8 @@ class Follower:
         found: dict[int, TagFit] = {}
         if self.past and time_s <= self.past[-1][0]:
             self.past.clear()  # a clock that went back predicts nothing
+        predicted = extrapolate(self.past, time_s)
         if self.watch.tags:
-            predicted = extrapolate(self.past, time_s)
             if predicted is not None:
                 found = self._look_near(image, predicted)
             if not found and self._may_search():
@@ -111,11 +111,11 @@ class Follower:
         self.count += 1
         bright = {k for k, fit in found.items() if fit.black + fit.contrast > _SATURATED}
         kept = {k: fit for k, fit in found.items() if k not in bright}
-        pose = self._settle(kept, time_s)
+        pose = self._settle(kept, time_s, predicted)
         if pose is not None:
             covered = self._plates.hidden(*pose)
             kept = {k: fit for k, fit in kept.items() if k >= len(covered) or not covered[k]}
-        sightings = [self._sighting(k, fit) for k, fit in sorted(kept.items())]
+        sightings = self._sightings(kept)
         sightings += self._look_for_markers(image, pose)
         return FrameView(self._status(image, sightings, bright), tuple(sightings), pose)
 
@@ -187,7 +187,9 @@ class Follower:
             self.base_rays[thing] = fit.rays
         return found
 
-    def _settle(self, found: dict[int, TagFit], time_s: float) -> Pose | None:
+    def _settle(
+        self, found: dict[int, TagFit], time_s: float, predicted: Pose | None
+    ) -> Pose | None:
         """The pose of this frame, which also feeds the next prediction."""
         mine = [k for k in sorted(found) if k < self.watch.first_base]
         if not mine:
@@ -198,7 +200,7 @@ class Follower:
         self.misses = 0
         points = self.watch.tag_corners_m[mine]
         rays = np.array([found[k].rays.ravel() for k in mine])
-        start = extrapolate(self.past, time_s) or start_pose(points, rays)
+        start = predicted or start_pose(points, rays)
         covariances = np.array([found[k].rays_covariance for k in mine])
         pose = None if start is None else refine_pose(start, points, rays, covariances)
         if pose is None:
@@ -207,9 +209,17 @@ class Follower:
         self.past = [*self.past, (time_s, pose)][-_KEPT_POSES:]
         return pose
 
-    def _sighting(self, thing: int, fit: TagFit) -> Sighting:
-        rows = self.camera.project(np.column_stack([fit.rays, np.ones(4)]))[:, 1]
-        return Sighting(thing, fit.rays.ravel(), fit.rays_covariance, rows, fit.blur_px, fit.noise)
+    def _sightings(self, found: dict[int, TagFit]) -> list[Sighting]:
+        if not found:
+            return []
+        things = sorted(found)
+        rays = np.ones((len(things), 4, 3))
+        rays[:, :, :2] = [found[k].rays for k in things]
+        rows = self.camera.project(rays)[:, :, 1]
+        return [
+            Sighting(k, fit.rays.ravel(), fit.rays_covariance, own, fit.blur_px, fit.noise)
+            for k, fit, own in zip(things, (found[k] for k in things), rows, strict=True)
+        ]
 
     def _look_for_markers(self, image: Image, pose: Pose | None) -> list[Sighting]:
         if not self.watch.markers:

@@ -58,6 +58,8 @@ def fuse(
     floor_px: Array | None = None,
     start: Poses | None = None,
     passes: int = _MOTION_PASSES,
+    *,
+    rough: bool = False,
 ) -> tuple[Poses, Fit]:
     """Poses at the instants from all cameras.
 
@@ -68,14 +70,17 @@ def fuse(
         floor_px: noise beyond the pixels' own, (n_c,); found from the residuals when None.
         start: poses of an earlier call at the same instants.
         passes: solves; each improves the motion and the floor for the next.
+        rough: leaves the covariances out (0, 6, 6), more than half of what poses take.
     """
     n, n_c = len(instants_s), len(views)
     floors = np.full(n_c, START_FLOOR_PX) if floor_px is None else floor_px
     poses = unknown_poses(instants_s) if start is None else start
     fit = Fit(floors, np.zeros(n_c), np.zeros(n_c), np.zeros(n_c, np.int64), {}, (0.0, 0))
-    for _ in range(passes):
+    for turn in range(passes):
         positions, rotations = poses.positions_m.copy(), poses.rotations.copy()
-        covariances, known = np.full((n, 6, 6), np.nan), np.zeros(n, dtype=bool)
+        known = np.zeros(n, dtype=bool)
+        kept = 0 if rough or turn + 1 < passes else n
+        covariances = np.full((kept, 6, 6), np.nan)
         account = _Account(n_c)
         for block in blocks(views, watch, instants_s, poses):
             span = slice(block.first, block.first + len(block.starts) - 1)
@@ -83,14 +88,17 @@ def fuse(
                 block, positions[span], rotations[span], poses.motions[span]
             )
             noise = floors / np.array([v.camera.focal_px.mean() for v in views])
+            own = np.full((len(can), 6, 6), np.nan)
             _solve(
                 block, views, instants_s[span], poses.motions[span], noise, start_position,
-                start_rotation, can, covariances[span], account, free_of(watch),
+                start_rotation, can, own, account, free_of(watch),
             )  # fmt: skip
+            if kept:
+                own[~can] = np.nan
+                covariances[span] = own
             positions[span] = np.where(can[:, None], start_position, np.nan)
             rotations[span] = np.where(can[:, None, None], start_rotation, np.nan)
             known[span] = can
-        covariances[~known] = np.nan
         poses = Poses(
             instants_s,
             positions,

@@ -117,9 +117,8 @@ def label_markers(
         copy.labels, copy.shrinks = own, factors
         named.append(copy)
     known = np.isfinite(positions[:, 0])
-    covariances = np.full((n, 6, 6), np.nan)
     return tuple(named), Poses(
-        instants_s, positions, rotations, covariances, known, np.zeros((n, 12))
+        instants_s, positions, rotations, np.zeros((0, 6, 6)), known, np.zeros((n, 12))
     )
 
 

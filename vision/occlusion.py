@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -56,15 +57,7 @@ class Plates:
             rotation: R_camera_platform, (3, 3).
             position: of the platform's origin in the camera frame, (3,).
         """
-        found = np.zeros(len(self.read_m), dtype=bool)
-        if not len(self.pairs):
-            return found
-        behind, before = self.pairs.T
-        read = (self.read_m @ rotation.T + position)[behind]
-        plate = (self.whole_m @ rotation.T + position)[before]
-        covered = _covers(plate, _edge_points(read)).any(axis=1)
-        np.logical_or.at(found, behind, covered)
-        return found
+        return _hidden(self.read_m, self.whole_m, self.pairs, rotation, position)
 
 
 def _widened(corners_m: Array, factors: Array) -> Array:
@@ -72,23 +65,51 @@ def _widened(corners_m: Array, factors: Array) -> Array:
     return centres + (corners_m - centres) * factors[:, None, None]
 
 
-def _edge_points(corners: Array) -> Array:
-    """Points along the edges of squares (m, 4, 3), (m, 4 k, 3)."""
-    share = (np.arange(_EDGE_POINTS) / _EDGE_POINTS)[:, None]
-    ways = np.roll(corners, -1, axis=1) - corners
-    points = corners[:, :, None] + share * ways[:, :, None]
-    return points.reshape(len(corners), -1, 3)
+@numba.njit(cache=True, nogil=True)
+def _hidden(
+    read: Array, whole: Array, pairs: NDArray[np.int64], rotation: Array, position: Array
+) -> NDArray[np.bool_]:
+    """Walks along the edges of what is read; see `Plates.hidden`."""
+    found = np.zeros(len(read), dtype=np.bool_)
+    plate, corners, point = np.empty((4, 3)), np.empty((4, 3)), np.empty(3)
+    for m in range(len(pairs)):
+        i, j = pairs[m]
+        if found[i]:
+            continue
+        for k in range(4):
+            for a in range(3):
+                plate[k, a] = corners[k, a] = position[a]
+                for b in range(3):
+                    plate[k, a] += rotation[a, b] * whole[j, k, b]
+                    corners[k, a] += rotation[a, b] * read[i, k, b]
+        for k in range(4):
+            for step in range(_EDGE_POINTS):
+                share = step / _EDGE_POINTS
+                for a in range(3):
+                    point[a] = corners[k, a] + share * (corners[(k + 1) % 4, a] - corners[k, a])
+                if _covers(plate, point):
+                    found[i] = True
+    return found
 
 
-def _covers(plates: Array, points: Array) -> NDArray[np.bool_]:
-    """Whether plates (m, 4, 3) stand before points (m, k, 3) as seen from the origin, (m, k)."""
-    corner = plates[:, 3]
-    right, up = plates[:, 2] - corner, plates[:, 0] - corner
-    normals = np.cross(right, up)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        height = np.einsum("ma,ma->m", normals, corner)[:, None]
-        scale = height / np.einsum("ma,mka->mk", normals, points)
-        place = points * scale[..., None] - corner[:, None]
-        u = np.einsum("mka,ma->mk", place, right) / np.sum(right**2, axis=1)[:, None]
-        v = np.einsum("mka,ma->mk", place, up) / np.sum(up**2, axis=1)[:, None]
-        return (scale > 0.0) & (scale < 1.0) & (u > 0) & (u < 1) & (v > 0) & (v < 1)
+@numba.njit(cache=True, nogil=True)
+def _covers(plate: Array, point: Array) -> bool:
+    """Whether a plate (4, 3) stands before a point (3,), as seen from the origin."""
+    corner = plate[3]
+    r0, r1, r2 = plate[2, 0] - corner[0], plate[2, 1] - corner[1], plate[2, 2] - corner[2]
+    u0, u1, u2 = plate[0, 0] - corner[0], plate[0, 1] - corner[1], plate[0, 2] - corner[2]
+    n0, n1, n2 = r1 * u2 - r2 * u1, r2 * u0 - r0 * u2, r0 * u1 - r1 * u0
+    along = n0 * point[0] + n1 * point[1] + n2 * point[2]
+    if along == 0.0:
+        return False
+    scale = (n0 * corner[0] + n1 * corner[1] + n2 * corner[2]) / along
+    if not 0.0 < scale < 1.0:
+        return False
+    d0, d1, d2 = (
+        point[0] * scale - corner[0],
+        point[1] * scale - corner[1],
+        point[2] * scale - corner[2],
+    )
+    right = (d0 * r0 + d1 * r1 + d2 * r2) / (r0 * r0 + r1 * r1 + r2 * r2)
+    up = (d0 * u0 + d1 * u1 + d2 * u2) / (u0 * u0 + u1 * u1 + u2 * u2)
+    return 0.0 < right < 1.0 and 0.0 < up < 1.0

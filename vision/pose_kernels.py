@@ -40,6 +40,32 @@ def small_rotation(r: Array, out: Array) -> None:
 
 
 @numba.njit(cache=True, nogil=True)
+def carried_on(
+    times_s: Array, rotations: Array, positions: Array, time_s: float
+) -> tuple[Array, Array]:
+    """Rotation (3, 3) and position (3,) at a time, by the polynomial through poses (n, ...)."""
+    n = len(times_s)
+    ahead, turn = np.zeros(6), np.empty((3, 3))
+    for k in range(n - 1):
+        weight = 1.0
+        for j in range(n):
+            if j != k:
+                weight *= (time_s - times_s[j]) / (times_s[k] - times_s[j])
+        turn[:] = rotations[k] @ rotations[n - 1].T
+        x, y, z = turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]
+        sine = 0.5 * math.sqrt(x * x + y * y + z * z)
+        cosine = 0.5 * (turn[0, 0] + turn[1, 1] + turn[2, 2] - 1.0)
+        factor = 0.5 if sine < 1e-9 else 0.5 * math.atan2(sine, cosine) / sine
+        for a in range(3):
+            ahead[a] += weight * (positions[k, a] - positions[n - 1, a])
+        ahead[3] += weight * factor * x
+        ahead[4] += weight * factor * y
+        ahead[5] += weight * factor * z
+    small_rotation(ahead[3:], turn)
+    return turn @ rotations[n - 1], positions[n - 1] + ahead[:3]
+
+
+@numba.njit(cache=True, nogil=True)
 def observe(
     rotation: Array,
     position: Array,

@@ -24,7 +24,7 @@ class Poses:
         times_s: base time, (n,).
         positions_m: NaN where unknown, (n, 3).
         rotations: R_base_platform, (n, 3, 3).
-        covariances: of position and small rotation in the base frame, (n, 6, 6).
+        covariances: of position and small rotation in the base frame, (n, 6, 6), or none (0, 6, 6).
         known: (n,).
         motions: velocity, angular velocity, and their rates in the base frame, (n, 12).
     """
@@ -44,7 +44,7 @@ def unknown_poses(instants_s: Array) -> Poses:
         instants_s,
         np.full((n, 3), np.nan),
         np.full((n, 3, 3), np.nan),
-        np.full((n, 6, 6), np.nan),
+        np.zeros((0, 6, 6)),
         np.zeros(n, dtype=bool),
         np.zeros((n, 12)),
     )

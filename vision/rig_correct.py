@@ -108,11 +108,11 @@ def _estimate(
     free[list(moved), POSE:] = True
     free[:, CLOCK] = clock_free
     total = np.zeros((n_c, PER_CAMERA))
-    poses, fit = fuse(current, watch, instants, start=poses if not moved else None)
+    poses, fit = fuse(current, watch, instants, start=poses if not moved else None, rough=True)
     step = _iterate(current, watch, poses, fit, free, total, survey_std_m)
     with_lines = free.copy()
     with_lines[:, LINE] = True
-    poses, fit = fuse(current, watch, instants, start=poses, passes=2)
+    poses, fit = fuse(current, watch, instants, start=poses, passes=2, rough=True)
     trial = rig_step(current, watch, poses, fit, with_lines, survey_std_m)
     lines = trial.changes[:, LINE]
     real = np.abs(lines) > np.maximum(LEAST_LINE_S, _SIGMAS * trial.deviations[:, LINE])
@@ -143,7 +143,7 @@ def _iterate(
         total += step.changes
         if k + 1 == _STEPS:
             break
-        poses, fit = fuse(current, watch, poses.times_s, start=poses, passes=2)
+        poses, fit = fuse(current, watch, poses.times_s, start=poses, passes=2, rough=True)
         step = rig_step(current, watch, poses, fit, free, survey_std_m)
     return step
 

@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cdpr.rotation import exp_rotation, log_rotation
-from vision.pose_kernels import solve_instant
+from cdpr.rotation import exp_rotation
+from vision.pose_kernels import carried_on, solve_instant
 
 Array = NDArray[np.float64]
 Pose = tuple[Array, Array]
@@ -79,17 +79,12 @@ def extrapolate(past: Sequence[tuple[float, Pose]], time_s: float) -> Pose | Non
     """The pose at `time_s` by constant acceleration through the last three, or what there is."""
     if not past:
         return None
-    times = np.array([t for t, _ in past])
-    rotation, position = past[-1][1]
-    if len(past) == 1:
-        return rotation, position
-    steps = np.array([np.zeros(6)] * len(past))
-    for k, (_, (r, p)) in enumerate(past[:-1]):
-        steps[k, :3] = p - position
-        steps[k, 3:] = log_rotation(r @ rotation.T)
-    weights = lagrange(times, time_s)
-    ahead = weights @ steps
-    return exp_rotation(ahead[3:]) @ rotation, position + ahead[:3]
+    return carried_on(
+        np.array([t for t, _ in past]),
+        np.array([rotation for _, (rotation, _) in past]),
+        np.array([position for _, (_, position) in past]),
+        time_s,
+    )
 
 
 def lagrange(times: Array, time_s: float) -> Array:
