@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +19,7 @@ Image = NDArray[np.uint8]
 VIDEO_SUFFIXES = (".mkv", ".avi", ".mp4", ".mov")
 IMAGE_SUFFIXES = (".png", ".bmp", ".tif", ".tiff", ".pgm", ".jpg", ".jpeg")
 _MOST_STAMP_BYTES = 1 << 28
+MOST_PIXELS = 150_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,6 +110,7 @@ def _images(recording: Recording) -> Iterator[tuple[int, str, Image]]:
     import cv2
 
     for number, path in zip(recording.numbers, recording.images, strict=True):
+        _refuse_bomb(path)
         try:
             image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
         except cv2.error as error:
@@ -118,6 +121,29 @@ def _images(recording: Recording) -> Iterator[tuple[int, str, Image]]:
         yield number, f"{recording.name}/{path.name}", np.asarray(image, dtype=np.uint8)
 
 
+def _refuse_bomb(path: Path) -> None:
+    """Looks at an image's size before its pixels take memory: a small file may unfold to any."""
+    from PIL import Image as Header
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", Header.DecompressionBombWarning)
+            with Header.open(path) as header:
+                width, height = header.size
+    except Header.DecompressionBombError as error:
+        raise InputError(f"{path}: {error}") from error
+    except (OSError, ValueError, SyntaxError):
+        return  # whether it can be read at all is for the decoder to say
+    _refuse_pixels(path, width, height)
+
+
+def _refuse_pixels(path: Path, width: int, height: int) -> None:
+    if width * height > MOST_PIXELS:
+        raise InputError(
+            f"{path}: {width} x {height} pixels, more than the {MOST_PIXELS:.0e} read here"
+        )
+
+
 def _video(recording: Recording) -> Iterator[tuple[int, str, Image]]:
     import av
     from av.error import FFmpegError
@@ -126,7 +152,9 @@ def _video(recording: Recording) -> Iterator[tuple[int, str, Image]]:
         with av.open(str(recording.path)) as container:
             if not container.streams.video:
                 raise InputError(f"{recording.path}: holds no video")
-            container.streams.video[0].thread_type = "AUTO"
+            stream = container.streams.video[0]
+            _refuse_pixels(recording.path, stream.width, stream.height)
+            stream.thread_type = "AUTO"
             for index, frame in enumerate(container.decode(video=0)):
                 label = f"{recording.path.name} frame {index}"
                 yield index, label, np.asarray(frame.to_ndarray(format="gray"), np.uint8)

@@ -25,6 +25,7 @@ BOARD_KEYS = {
 }
 OPTIONAL_BOARD_KEYS = {"charuco": ("legacy",), "chessboard": (), "aprilgrid": ("family",)}
 MOST_RUNS = 10_000
+WRITTEN_FOLDERS = ("tracks", "tracks/.sightings", "print")  # in the results
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,10 +172,22 @@ def read_session(path: Path | str, results: Path | str | None = None) -> Session
     reader.finish()
     problems.raise_if_any(path)
     folder = path.parent / "results" if results is None else Path(results)
+    _refuse_ways_out(path.parent if results is None else folder, folder)
     beside = folder / "cameras.toml"
     if results is not None and (beside.is_file() or not cameras.is_file()):
         cameras = beside
     return Session(path, name, robot, folder, cameras, target, rate, calibration, runs)
+
+
+def _refuse_ways_out(home: Path, results: Path) -> None:
+    """Links that would lead what is written out of the session, or out of `--results`."""
+    places = (results, *(results / part for part in WRITTEN_FOLDERS))
+    for place in places:
+        if place.exists() and not place.resolve().is_relative_to(home.resolve()):
+            raise InputError(
+                f"{place}: a link that leads out of {home}, where nothing is written; "
+                "name another place with --results DIR"
+            )
 
 
 class _Paths:

@@ -78,6 +78,55 @@ def test_a_truncated_video(filmed: Path, capsys: pytest.CaptureFixture[str], sha
     said_plainly(capsys, filmed, "track")
 
 
+def test_an_image_is_refused_by_its_size(filmed: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """13,000 x 13,000 pixels could be decoded, and would take 169 MB from a file of 1 kB."""
+    folder = filmed / "runs" / "swing-01" / "cam0"
+    folder.mkdir()
+    (folder / "000000.png").write_bytes(png(13_000, 13_000))
+    said = said_plainly(capsys, filmed, "track")
+    assert "13000 x 13000 pixels, more than" in said
+
+
+@pytest.mark.parametrize("place", ["results", "results/tracks", "results/print"])
+def test_nothing_is_written_through_links(
+    session: Path, place: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    outside = tmp_path / "outside"
+    outside.mkdir()
+    (session / place).parent.mkdir(exist_ok=True)
+    (session / place).symlink_to(outside)
+    for command in ("check", "report", "identify", "board"):
+        assert main([command, str(session), "--quiet"]) == 2, command
+        assert "a link that leads out of" in capsys.readouterr().err
+    assert list(outside.iterdir()) == []
+
+
+@pytest.mark.parametrize("command", ["check", "identify", "diagnose", "report", "run", "export"])
+def test_only_the_session_is_written_to(
+    session: Path, command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    monkeypatch.chdir(elsewhere)
+    more = ["--urdf"] if command == "export" else []
+    assert main([command, str(session), "--quiet", *more]) in (0, 1)
+    assert list(elsewhere.iterdir()) == []
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["elsewhere", "session"]
+
+
+def test_a_camera_cannot_name_a_file_elsewhere(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lens = np.array([300.0, 300.0, 159.5, 119.5])
+    names = ("../evil", "right")
+    cameras = tuple(Camera(name, (320, 240), "PINHOLE", lens, np.eye(4)) for name in names)
+    write_cameras(tmp_path / "cameras.toml", cameras)
+    words = ["convert", str(tmp_path / "cameras.toml"), str(tmp_path / "infos"), "--to", "ros"]
+    assert main(words) == 2
+    assert "becomes a file name" in capsys.readouterr().err
+    assert not (tmp_path / "evil.yaml").exists()
+
+
 @pytest.mark.parametrize("size", [(60_000, 60_000), (320, 240), (2**31 - 1, 2**31 - 1)])
 def test_images_that_explode_or_lie(
     filmed: Path, capsys: pytest.CaptureFixture[str], size: tuple[int, int]
