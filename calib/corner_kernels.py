@@ -29,6 +29,7 @@ UNKNOWNS = 11
 BLACK, CONTRAST, BLUR = 8, 9, 10
 LEAST_BLUR = 0.289  # of the pixel's own square, in px
 MOST_BLUR = 6.0
+LEAST_ERROR = 0.02  # of the contrast: in a clean image every edge pixel would be an outlier
 MOST_FREE_PASSES = 25  # sharp small tags settle slowly, others in four to six
 _FLAT = 4.4  # blur widths from an edge at which nothing of it is left, with a margin
 
@@ -66,8 +67,7 @@ def accumulate(
         bell: table of its density.
         normal: out, (11, 11) upper triangle.
         right: out, (11,).
-        histogram: out, counts of |residual| in 256 bins of one grey level / 4, of the pixels on
-            edges: judged by flat ones, all edges of a clean image would be outliers.
+        histogram: out, counts of |residual| in 256 bins of one grey level / 4.
 
     Returns:
         Sum of weighted squared residuals, of weights, of pixels, and of squares about the mean.
@@ -112,6 +112,7 @@ def accumulate(
                 residual = grey - black - contrast * value
                 size = abs(residual)
                 weight = 1.0 if size <= limit else (limit / size) ** 2
+                histogram[min(int(size * 4.0), 255)] += 1
                 squares += weight * residual * residual
                 weights += weight
                 count += 1.0
@@ -178,6 +179,7 @@ def accumulate(
             weight = 1.0
             if size > limit:
                 weight = (limit / size) ** 2
+            histogram[min(int(size * 4.0), 255)] += 1
             squares += weight * residual * residual
             weights += weight
             count += 1.0
@@ -190,7 +192,6 @@ def accumulate(
                 right[8] += weight * residual
                 right[9] += weight * residual * value
                 continue
-            histogram[min(int(size * 4.0), 255)] += 1
             x, y = (c - half) / half, (r - half) / half
             gc, gr = -contrast * grad_c, -contrast * grad_r
             lean = -(gc * x + gr * y)
@@ -215,9 +216,8 @@ def accumulate(
 
 
 @numba.njit(cache=True, nogil=True)
-def _noise_from(histogram: NDArray[np.int64]) -> float:
+def _noise_from(histogram: NDArray[np.int64], count: float) -> float:
     """Noise level from the median of |residual|, grey levels."""
-    count = float(histogram.sum())
     seen = 0
     for k in range(256):
         seen += histogram[k]
@@ -342,7 +342,7 @@ def fit_pattern(
             change[:8] *= 2.0 / largest
         h = compose(h, change, half)
         last = max(largest, 0.5 * abs(blur_change) / state[2] if free else 0.0)
-        scale = max(_noise_from(histogram), 0.5 * noise)
+        scale = max(_noise_from(histogram, count), 0.5 * noise, LEAST_ERROR * state[1])
         after = max(squares - change @ right, 0.0)  # what the step leaves, to first order
         variance = after / max(weights - UNKNOWNS, 1.0)
         figures[0] = math.sqrt(variance)
