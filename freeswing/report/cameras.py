@@ -150,6 +150,7 @@ def _rig(cameras: list[Document], swings: list[Document], entries: list[list[flo
         axes.set_xlabel("x (m)")
         axes.set_ylabel("y (m)")
         axes.set_zlabel("z (m)")
+        axes.locator_params(axis="z", nbins=4)
         axes.set_aspect("equal")
         if entries or places:
             axes.legend(fontsize=8)

@@ -10,6 +10,7 @@ from freeswing.report.figures import AFTER, BEFORE, figure
 from freeswing.report.material import Document, Material
 from freeswing.report.words import millimetres, number
 
+FEW_RUNS = 5
 UNEVEN = 20.0  # times the middle value from which on a logarithmic axis shows more
 
 
@@ -56,11 +57,13 @@ def _chart(before: list[Document], after: dict[str, Document]) -> object:
             axes.bar(places, values, width=width, color=colour, label=label)
         axes.set_xticks(range(len(runs)), runs, rotation=60 if len(runs) > 6 else 0)
         axes.set_ylabel("σ⊥")
+        beyond = 0.5 * max(FEW_RUNS - len(runs), 0)  # one bar shall not fill the page
+        axes.set_xlim(-0.6 - beyond, len(runs) - 0.4 + beyond)
         shown = [value for _, _, values in series for value in values if value > 0.0]
         if shown and max(shown) > UNEVEN * sorted(shown)[len(shown) // 2]:
             axes.set_yscale("log")
         if after:
-            axes.legend()
+            sheet.legend(loc="outside upper right", ncols=2)
 
     caption = "σ⊥ of each held-out run: the scatter of what the model leaves over."
     return figure(draw, 7.0, 2.8, caption)

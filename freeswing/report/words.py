@@ -50,10 +50,15 @@ def parameter_row(parameter: Mapping[str, Any]) -> dict[str, str]:
         "value": _with_decimals(value, std),
         "half_width": _with_decimals(None if std is None else HALF_WIDTH_95 * std, std),
         "unit": unit,
-        "std_percent": number(parameter.get("std_percent"), 2),
+        "std_percent": number(parameter.get("std_percent", _percent(value, std)), 2),
         "raw": "" if parameter.get("value") is None else repr(parameter["value"]),
         "weak": "" if parameter.get("essential", True) else "not essential",
     }
+
+
+def _percent(value: float | None, std: float | None) -> float | None:
+    """A standard deviation as a share of its value."""
+    return None if not value or std is None else 100.0 * std / abs(value)
 
 
 def _scaled(value: object, scale: float) -> float | None:
