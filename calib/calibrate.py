@@ -17,6 +17,7 @@ from calib.camera_models import Array
 from calib.cameras_file import write_cameras
 from calib.clocks import board_moves, coarse_offsets_s
 from calib.intrinsics import CameraStart
+from calib.lens_choice import lens_warnings, weigh_lenses
 from calib.recordings import find_recordings
 from calib.rig import Rig, solve_rig, start_cameras, tie_to_base
 from calib.sightings import Sightings, gather, see_boards
@@ -115,8 +116,12 @@ def calibrate_session(
         warnings.append(_no_base_warning(rig.cameras[rig.reference].name))
     told("checking against truth", 0.9)
     verdict = judge(rig, check_truth(rig, board.edges), survey, alone_px)
+    lenses = weigh_lenses(rig)
+    warnings += [*clock_warnings(rig), *lens_warnings(rig.cameras, lenses)]
     verdict = replace(verdict, warnings=(*warnings, *verdict.warnings))
     document = _document(rig, board, sightings, verdict)
+    for entry, choice in zip(document["cameras"], lenses, strict=True):
+        entry["lens_models_held_out_px"] = choice.held_out_px
     if results_folder is not None:
         write_json(Path(results_folder) / "calibration.json", document)
     if not verdict.usable:
@@ -181,6 +186,16 @@ def _moved_warnings(moved: tuple[tuple[str, float], ...]) -> list[str]:
         f"camera {name}: its base tags moved by {drift:.1f} px during the recording; fasten it and "
         "record again"
         for name, drift in moved
+    ]
+
+
+def clock_warnings(rig: Rig) -> list[str]:
+    """Says when several cameras' clocks were not measured."""
+    if len(rig.cameras) < 2 or rig.adjustment.scene.motion.any():
+        return []
+    return [
+        "the board moved too little for the cameras' clocks: they are taken to agree here, and "
+        "`track` measures them from the swing; wave the board about to have them calibrated"
     ]
 
 

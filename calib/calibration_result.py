@@ -112,6 +112,7 @@ def camera_entries(rig: Rig) -> list[dict[str, Any]]:
     """One table a camera: values, standard deviations and residuals."""
     result, views = rig.adjustment, rig.problem.views
     deviations = np.sqrt(np.diag(result.covariance))
+    timed = bool(result.scene.motion.any())  # a board at rest tells nothing of clocks
     entries = []
     for index, (camera, own) in enumerate(
         zip(rig.cameras, camera_slices(rig.cameras), strict=True)
@@ -135,7 +136,7 @@ def camera_entries(rig: Rig) -> list[dict[str, Any]]:
                 "params_std": std[:k].tolist(),
                 "position_std_m": std[k : k + 3].tolist(),
                 "rotation_std_rad": std[k + 3 : k + 6].tolist(),
-                "clock_offset_std_s": float(std[k + 6]),
+                "clock_offset_std_s": float(std[k + 6]) if timed else None,
                 "line_time_std_s": float(std[k + 7]),
             }
         )

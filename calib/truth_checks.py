@@ -114,7 +114,7 @@ def _lengths(scene: Scene, problem: Problem, edges: np.ndarray) -> tuple[Array, 
     views, cameras = problem.views, scene.cameras
     moments = int(views.moment.max()) + 1
     pixels = np.full((len(cameras), moments, len(problem.board_points_m), 2), np.nan)
-    pixels[views.camera, views.moment] = _at_moment(scene, problem)
+    pixels[views.camera, views.moment] = at_moment(scene, problem)
     points = triangulate(cameras, pixels)
     board = warped(problem.board_points_m, scene.warp_m)
     known = np.linalg.norm(board[edges[:, 0]] - board[edges[:, 1]], axis=-1)
@@ -123,7 +123,7 @@ def _lengths(scene: Scene, problem: Problem, edges: np.ndarray) -> tuple[Array, 
     return measured[seen], np.broadcast_to(known, measured.shape)[seen]
 
 
-def _at_moment(scene: Scene, problem: Problem) -> Array:
+def at_moment(scene: Scene, problem: Problem) -> Array:
     """Corner pixels carried to an instant common to the moment's views by the board's motion."""
     views = problem.views
     if not scene.motion.any():
