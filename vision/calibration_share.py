@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from calib.camera_models import PARAMETER_NAMES
 from cdpr.pose_errors import PoseErrors, error_terms, fitted_terms
-from vision.fuse import Fit, camera_matrices, free_of, whitened
-from vision.pose_kernels import linearise_block
+from vision.fuse import Fit, free_of, whitened
+from vision.linear import linearised
 from vision.poses import Poses
 from vision.run_views import Block, CameraViews, blocks
 from vision.watch import Watch
@@ -141,19 +141,8 @@ def _pose_slopes(
     free: int,
 ) -> Array:
     """Change of the pose by the calibration at the chosen instants, (n, 6, n_names)."""
-    count = len(block.starts) - 1
-    span = slice(block.first, block.first + count)
-    n_o = len(block.things)
-    instant = np.repeat(np.arange(count), np.diff(block.starts))
-    lags = np.ascontiguousarray(block.times_s - poses.times_s[span][instant][:, None])
-    residuals, rates = np.zeros((n_o, 8)), np.zeros((n_o, 8))
-    jacobians, places = np.zeros((n_o, 8, 6)), np.ones((n_o, 4, 3))
-    linearise_block(
-        block.starts, np.ascontiguousarray(poses.rotations[span]),
-        np.ascontiguousarray(poses.positions_m[span]), poses.known[span],
-        np.ascontiguousarray(poses.motions[span]), camera_matrices(views), block.camera_of,
-        block.points, block.rays, lags, block.counts, residuals, jacobians, rates, places,
-    )  # fmt: skip
+    linear = linearised(block, views, poses)
+    residuals, rates, places = linear.residuals, linear.rates, linear.places
     white = whitened(block, floors)
     slopes = np.zeros((len(chosen), 6, len(names)))
     for row, k in enumerate(chosen - block.first):
@@ -163,7 +152,7 @@ def _pose_slopes(
             m = 2 * points
             if not np.isfinite(places[o]).all() or (residuals[o, :m] == 0.0).all():
                 continue
-            jacobian = white[o, :m, :m] @ jacobians[o, :m, :free]
+            jacobian = white[o, :m, :m] @ linear.jacobians[o, :m, :free]
             normal += jacobian.T @ jacobian
             view = views[block.camera_of[o]]
             by_time = rates[o, :m].reshape(points, 2)

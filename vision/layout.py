@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from vision.fuse import Fit, camera_matrices, whitened
-from vision.pose_kernels import linearise_block
+from vision.fuse import Fit, whitened
+from vision.linear import linearised
 from vision.poses import Poses
 from vision.run_views import Block, CameraViews, blocks
 from vision.watch import Watch
@@ -91,17 +91,8 @@ def _add_block(
 ) -> None:
     count = len(block.starts) - 1
     span = slice(block.first, block.first + count)
-    n_o = len(block.things)
-    instant = np.repeat(np.arange(count), np.diff(block.starts))
-    lags = np.ascontiguousarray(block.times_s - poses.times_s[span][instant][:, None])
-    residuals, rates = np.zeros((n_o, 8)), np.zeros((n_o, 8))
-    jacobians, places = np.zeros((n_o, 8, 6)), np.ones((n_o, 4, 3))
-    linearise_block(
-        block.starts, np.ascontiguousarray(poses.rotations[span]),
-        np.ascontiguousarray(poses.positions_m[span]), poses.known[span],
-        np.ascontiguousarray(poses.motions[span]), camera_matrices(views), block.camera_of,
-        block.points, block.rays, lags, block.counts, residuals, jacobians, rates, places,
-    )  # fmt: skip
+    linear = linearised(block, views, poses)
+    residuals, jacobians = linear.residuals, linear.jacobians
     white = whitened(block, noise)
     chosen = np.flatnonzero(poses.known[span])
     arms = watch.tag_corners_m - watch.tag_corners_m.mean(axis=1, keepdims=True)

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from calib.camera import Camera
 from cdpr.rotation import exp_rotation
-from vision.fuse import Fit, camera_matrices, whitened
-from vision.pose_kernels import linearise_block
+from vision.fuse import Fit, whitened
+from vision.linear import linearised
 from vision.poses import Poses
 from vision.rig_kernels import CLOCK, LINE, PER_CAMERA, POSE, add_rig_equations
 from vision.run_views import CameraViews, blocks
@@ -146,27 +146,20 @@ def rig_step(
     size = PER_CAMERA * n_c
     normal, right = np.zeros((size, size)), np.zeros(size)
     focal = np.array([v.camera.focal_px.mean() for v in views])
-    cameras = camera_matrices(views)
+    offsets = np.array([v.camera.T_camera_base[:3, 3] for v in views])
     for block in blocks(views, watch, poses.times_s, poses):
         span = slice(block.first, block.first + len(block.starts) - 1)
         known = poses.known[span] & (np.abs(poses.motions[span]).sum(axis=1) > 0.0)
-        n_o = len(block.things)
         instant = np.repeat(np.arange(len(known)), np.diff(block.starts))
-        lags = np.ascontiguousarray(block.times_s - poses.times_s[span][instant][:, None])
+        linear = linearised(block, views, poses)
         white = whitened(block, fit.floor_px / focal)
-        residuals, rates = np.zeros((n_o, 8)), np.zeros((n_o, 8))
-        jacobians, places = np.zeros((n_o, 8, 6)), np.ones((n_o, 4, 3))
-        linearise_block(
-            block.starts, np.ascontiguousarray(poses.rotations[span]),
-            np.ascontiguousarray(poses.positions_m[span]), known,
-            np.ascontiguousarray(poses.motions[span]), cameras, block.camera_of, block.points,
-            block.rays, lags, block.counts, residuals, jacobians, rates, places,
-        )  # fmt: skip
-        scores = (np.einsum("oij,oj->oi", white, residuals) ** 2).sum(axis=1) / (2 * block.counts)
+        scores = (np.einsum("oij,oj->oi", white, linear.residuals) ** 2).sum(axis=1) / (
+            2 * block.counts
+        )
         weights = np.where(known[instant], 1.0 / np.maximum(1.0, scores / _KEEP_SCORE) ** 2, 0.0)
         add_rig_equations(
-            block.starts, known, block.camera_of, block.counts, residuals, jacobians, rates,
-            places, np.ascontiguousarray(cameras[:, :3, 3]), block.rows_px, white, weights,
+            block.starts, known, block.camera_of, block.counts, linear.residuals,
+            linear.jacobians, linear.rates, linear.places, offsets, block.rows_px, white, weights,
             normal, right,
         )  # fmt: skip
     for index, view in enumerate(views):

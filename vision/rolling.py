@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from vision.pose_kernels import linearise_block
+from vision.linear import linearised
 
 if TYPE_CHECKING:
     from vision.poses import Poses
@@ -30,25 +30,13 @@ _CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 
 def rolling_bias(block: Block, views: Sequence[CameraViews], poses: Poses) -> Array:
     """What it adds to the rays of a block's sightings, by poses and their motion, (n_o, 8)."""
-    count, n_o = len(block.starts) - 1, len(block.things)
-    span = slice(block.first, block.first + count)
-    instant = np.repeat(np.arange(count), np.diff(block.starts))
-    lags = np.ascontiguousarray(block.times_s - poses.times_s[span][instant][:, None])
-    residuals, rates = np.zeros((n_o, 8)), np.zeros((n_o, 8))
-    jacobians, places = np.zeros((n_o, 8, 6)), np.ones((n_o, 4, 3))
-    linearise_block(
-        block.starts, np.ascontiguousarray(poses.rotations[span]),
-        np.ascontiguousarray(poses.positions_m[span]), poses.known[span],
-        np.ascontiguousarray(poses.motions[span]),
-        np.array([view.camera.T_camera_base for view in views]), block.camera_of,
-        block.points, block.rays, lags, block.counts, residuals, jacobians, rates, places,
-    )  # fmt: skip
+    linear = linearised(block, views, poses)
     rolling = np.array([view.camera.line_time_s != 0.0 for view in views])
-    mine = (block.counts == 4) & rolling[block.camera_of] & np.any(rates != 0.0, axis=1)
-    bias = np.zeros((n_o, 8))
+    mine = (block.counts == 4) & rolling[block.camera_of] & np.any(linear.rates != 0.0, axis=1)
+    bias = np.zeros_like(block.rays)
     if mine.any():
-        corners = (block.rays - residuals)[mine].reshape(-1, 4, 2)
-        found = corner_bias(corners, rates[mine].reshape(-1, 4, 2), block.times_s[mine])
+        corners = (block.rays - linear.residuals)[mine].reshape(-1, 4, 2)
+        found = corner_bias(corners, linear.rates[mine].reshape(-1, 4, 2), block.times_s[mine])
         bias[mine] = found.reshape(-1, 8)
     return bias
 
