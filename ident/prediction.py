@@ -94,14 +94,16 @@ def predict(
 def _followed(model: Model, samples: Samples, state: State) -> LikelihoodFit:
     """The fit of the start over the whole run at once, or grown into it where that is astray.
 
-    A start too far off leaves the simulated swing out of phase, or cannot be simulated so long.
+    A start too far off leaves the simulated swing out of phase, lets no step lower the cost, or
+    cannot be simulated so long.
     """
     try:
         quick = _fitted(model, samples, state, grow=False)
     except (ValueError, np.linalg.LinAlgError):
         return _fitted(model, samples, state, grow=True)
     spread = np.sqrt(np.mean((samples.values - samples.values.mean(axis=0)) ** 2))
-    if np.sqrt(np.mean((_seen(quick) - samples.values) ** 2)) <= _ASTRAY * spread:
+    error = np.sqrt(np.mean((_seen(quick) - samples.values) ** 2))
+    if quick.reason.startswith("converged") and error <= _ASTRAY * spread:
         return quick
     careful = _fitted(model, samples, state, grow=True)
     return min(quick, careful, key=lambda one: one.deviance)
