@@ -19,7 +19,7 @@ from ident.diagnose.heldout import held_out
 from ident.identify import IdentifySettings, identify
 
 FEW_SWINGS = ("swing-01", "swing-02", "swing-03", "check-01")
-SHORT_S = 5.0
+SHORT_S = 4.0
 LEAST_SHARE_CLOSED = 0.9
 
 
