@@ -213,7 +213,7 @@ def _with_own_noise(found: LikelihoodFit, runs: list[PreparedRun]) -> Likelihood
 
     Its scales follow its residuals, and errors of the cameras' calibration are unknowns too.
     """
-    own = fit(found.model, found.samples, found.state, grow=False)
+    own = fit(found.model, found.samples, found.state, found.free, grow=False)
     return with_calibration(own, [run.run.pose_errors for run in runs]).fit
 
 
