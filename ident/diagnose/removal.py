@@ -16,15 +16,14 @@ from ident.diagnose.refit import Refit, colour_of
 from ident.diagnose.screen import BASE
 
 
-def superfluous(current: Refit, kept: Sequence[str], noise_scales: np.ndarray) -> str:
+def superfluous(current: Refit, kept: Sequence[str]) -> str:
     """The effect whose values differ least from doing nothing, by its covariance; or "".
 
     Args:
         current: the fit with all effects.
-        kept: effects that may not leave: the one that came last and its group.
-        noise_scales: of metres and radians, (2,).
+        kept: effects that may not leave: the one that came last and its group. Nor may a geometry
+            that the lengths along the runs have settled.
     """
-    colour = colour_of(current.fit, noise_scales)
     count = float(current.evidence.counts.sum())
     rises = {}
     for name in current.effects:
@@ -32,15 +31,15 @@ def superfluous(current: Refit, kept: Sequence[str], noise_scales: np.ndarray) -
             continue
         where = current.values_of(name)
         parameters = current.fit.model.parameters[where]
-        if any(parameter.per_run for parameter in parameters):
+        settled = parameters != effect_named(name).parameters(current.fit.model.robot)
+        if settled or any(parameter.per_run for parameter in parameters):
             continue
         estimated = current.fit.free[BASE:][where]
         tested = [k for k, p in enumerate(parameters) if p.amplitude and estimated[k]]
-        declared = effect_named(name).parameters(current.fit.model.robot)
-        away = current.fit.values[where] - [parameter.start for parameter in declared]
+        away = current.fit.values[where] - [parameter.start for parameter in parameters]
         columns = BASE + where.start + np.array(tested)
         covariance = current.fit.covariance[np.ix_(columns, columns)]
-        rise = float(away[tested] @ np.linalg.solve(covariance, away[tested])) / colour
+        rise = float(away[tested] @ np.linalg.solve(covariance, away[tested]))
         rises[name] = rise - estimated.sum() * np.log(count)
     if not rises:
         return ""

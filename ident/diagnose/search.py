@@ -125,7 +125,7 @@ class Search:
             return Round(current, decision)
         # Ranking stopped early: the winner goes on to convergence.
         found, removed = polished(decision.winner.fit, self.noise_scales), []
-        while name := superfluous(found, decision.group, self.noise_scales):
+        while name := superfluous(found, decision.group):
             self._tell(f"round {index + 1}: without {name}", (index + 0.9) * share)
             fewer = without(found.fit, name, self.noise_scales)
             if not is_no_worse(fewer, found, name, self.noise_scales):

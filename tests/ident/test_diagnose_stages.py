@@ -64,7 +64,7 @@ def test_an_effect_that_a_later_one_makes_superfluous_leaves(tmp_path):
     first = refit(found.final, "translational_drag", np.array([0.0, 0.5]), WHITE, 100.0)
     both = refit(first.fit, "gravity_tilt", np.zeros(2), WHITE, 1.0)
     assert both.effects == ("translational_drag", "gravity_tilt")
-    assert superfluous(both, ("gravity_tilt",), WHITE) == "translational_drag"
+    assert superfluous(both, ("gravity_tilt",)) == "translational_drag"
     alone = without(both.fit, "translational_drag", WHITE)
     assert alone.effects == ("gravity_tilt",)
     assert is_no_worse(alone, both, "translational_drag", WHITE), (alone.held_out, both.held_out)
@@ -75,4 +75,4 @@ def test_a_cause_is_not_superfluous(tmp_path):
     model = found.final.model
     assert model.effects == ("gravity_tilt",)
     with_drag = refit(found.final, "translational_drag", np.array([0.0, 0.5]), WHITE, 1.0)
-    assert superfluous(with_drag, ("translational_drag",), WHITE) == ""
+    assert superfluous(with_drag, ("translational_drag",)) == ""
