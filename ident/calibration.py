@@ -4,7 +4,8 @@ A calibration that is a little wrong moves all poses of all runs together, by mo
 (`cdpr.pose_errors`). Left out, they end up in the inertia, and no residual says so. Here each mode
 has an amplitude, one for all runs, with a standard normal prior: samples = motion + modes a +
 noise. What the swings themselves tell of the amplitudes is used, and the rest widens the
-covariance.
+covariance. An inertia found so belongs to samples without the errors: `freed` gives those of runs
+that were not fitted.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from cdpr.simulation import Motion
 from ident.joint import Problem
 from ident.likelihood import LikelihoodFit, fit
 from ident.likelihood_run import Samples, reduce_run
+from ident.runs import SwingRun
 
 ROUNDS = 3
 CONVERGED = 0.02  # of a standard deviation of the amplitudes
@@ -108,6 +110,36 @@ def with_calibration(
     spread = np.sqrt(np.diag(covariance)[shared:])
     current = replace(current, covariance=covariance[:shared, :shared])
     return Calibrated(current, amplitudes, spread)
+
+
+def freed(run: SwingRun, amplitudes: Array) -> SwingRun:
+    """A run without the calibration's errors that a fit of others found.
+
+    The modes are taken at the measured poses and at the slopes between them: errors of a tenth of
+    a millimetre change little with either. A run that states no errors, or whose full poses were
+    not measured, stays as it is.
+
+    Args:
+        run: as recorded.
+        amplitudes: of its modes, `Calibrated.amplitudes`, (r,); (0,) where none were fitted.
+
+    Raises:
+        ValueError: when the run has another number of modes.
+    """
+    errors, trajectory = run.pose_errors, run.trajectory
+    known = trajectory.is_known
+    if errors is None or not len(amplitudes) or not trajectory.is_pose or known.sum() < 2:
+        return run
+    if len(errors.modes) != len(amplitudes):
+        raise ValueError(
+            f"run {run.name}: {len(errors.modes)} calibration errors, {len(amplitudes)} in the "
+            "fitted runs: all runs must come from one tracking; track again"
+        )
+    zetas = trajectory.values[known]
+    rates = np.gradient(zetas, trajectory.times_s[known], axis=0)
+    values = trajectory.values.copy()
+    values[known] -= mode_shifts(zetas, rates, errors) @ amplitudes
+    return replace(run, trajectory=replace(trajectory, values=values))
 
 
 def mode_shifts(zetas: Array, rates: Array, errors: PoseErrors) -> Array:

@@ -56,7 +56,7 @@ class Consistency:
         return f"least second moment of mass {self.least_moment_m2:.2g} +- {self.std_m2:.2g} m2"
 
     def sentence(self) -> str:
-        """For people."""
+        """For people; empty where a body can have the inertia as it was found."""
         if self.cost is not None:
             return (
                 "held to the inertia of a possible body, which raises the weighted squared error "
@@ -64,7 +64,7 @@ class Consistency:
                 "the nearest possible inertia is never farther from the truth than"
             )
         if self.is_possible:
-            return f"a body can have this inertia ({self.size()})"
+            return ""
         return (
             f"no body can have this inertia ({self.size()}): hold it to possible bodies "
             "(--consistent), or look for what the model misses (diagnose)"

@@ -34,6 +34,8 @@ class Estimate:
         mass: from payload runs.
         held_cost: see `Consistency.cost`; None where the inertia was free.
         reduced: essential parameters solved again alone: names, values, standard deviations.
+        calibration: amplitudes of the cameras' calibration errors that go with the values
+            (`ident.calibration`), (r,); empty where none were fitted.
         extra: more numbers for the result file, JSON-ready.
     """
 
@@ -48,10 +50,11 @@ class Estimate:
     mass: MassEstimate | None = None
     held_cost: float | None = None
     reduced: dict[str, Any] | None = None
+    calibration: Array = field(default_factory=lambda: np.zeros(0))
     extra: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        freeze(self, "values", "covariance", "essential")
+        freeze(self, "values", "covariance", "essential", "calibration")
 
     @property
     def std(self) -> Array:

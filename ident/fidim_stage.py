@@ -110,15 +110,14 @@ def _completed(
 
 
 def _consistent(entry: Estimate, enforced: bool) -> Estimate:
-    """The entry with a word on whether a body can have its inertia, or held to one that can."""
+    """The entry with a word where no body can have its inertia, or held to one that can."""
     if enforced and not entry.consistency.is_possible:
         values = nearest_possible(entry.values, entry.covariance)
         off = values - entry.values
         cost = float(off @ np.linalg.solve(entry.covariance, off))
         entry = replace(entry, values=values, held_cost=cost)
-    if entry.consistency.is_possible and entry.held_cost is None:
-        return entry
-    return replace(entry, notes=(*entry.notes, entry.consistency.sentence()))
+    said = entry.consistency.sentence()
+    return replace(entry, notes=(*entry.notes, said)) if said else entry
 
 
 def _mass(

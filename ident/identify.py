@@ -10,6 +10,7 @@ import numpy as np
 from cdpr.documents import DataError
 from cdpr.model import Model, build_model
 from cdpr.robot import Robot
+from ident.calibration import freed
 from ident.comparison import ParameterComparison, compare
 from ident.estimate import Estimate
 from ident.fidim_stage import Weighting, fidim_estimates
@@ -251,12 +252,17 @@ def _validated(
     settings: IdentifySettings,
     progress: Progress | None,
 ) -> tuple[ValidatedRun, ...]:
-    """The held-out runs confronted with an estimate and the robot that goes with it."""
+    """The held-out runs confronted with an estimate, and with the robot that goes with it.
+
+    Errors of the cameras' calibration that the estimate was freed of leave these runs too.
+    """
     full, model = name.endswith("full"), build_model(robot)
     held_out = [one for one in prepared.runs if one.run.role == "validate" and not one.run.payload]
-    if settings.geometry.stds and name.startswith("ml") and held_out:
+    found_geometry = settings.geometry.stds and name.startswith("ml")
+    if held_out and (found_geometry or len(estimate.calibration)):
         told = replace(robot, free_coordinates=prepared.free)
-        again = prepare_runs([one.run for one in held_out], build_model(told), settings.signals)
+        swings = [freed(one.run, estimate.calibration) for one in held_out]
+        again = prepare_runs(swings, build_model(told), settings.signals)
         held_out = list(again.runs)
     runs = [run for run in held_out if (run.full if full else run.free) is not None]
     found = []

@@ -77,7 +77,10 @@ def ml_estimate(
     told = with_calibration(found, errors, consistent=cost is not None)
     entry = _entry(told.fit, dropped + more, cost)
     return replace(
-        entry, notes=entry.notes + told.notes(), extra={**entry.extra, **told.document()}
+        entry,
+        notes=entry.notes + told.notes(),
+        calibration=told.amplitudes,
+        extra={**entry.extra, **told.document()},
     ), told.fit
 
 
@@ -232,9 +235,8 @@ def _entry(
             mass = mass_of(found.loads[0], float(found.std[place]))
         except ValueError as error:
             notes.append(str(error))
-    held = consistency(found.inertia, covariance, held_cost)
-    if not (held.is_possible and held_cost is None):
-        notes.append(held.sentence())
+    if said := consistency(found.inertia, covariance, held_cost).sentence():
+        notes.append(said)
     noise = {"noise_m": found.noise[0], "noise_rad": found.noise[1]}
     return Estimate(
         values=found.inertia,

@@ -83,8 +83,7 @@ def make(
     document["swings"] = swing_places(robot, found)
     document["entries_m"] = robot.entries_m.tolist()
     _summarise(document, found.best, console)
-    best = found.estimates[found.best]
-    for sentence in dict.fromkeys((*best.notes, best.consistency.sentence())):
+    for sentence in found.estimates[found.best].notes:
         console.say(f"  {sentence}")
     return [("identification.json", document), ("motion.json", predicted_motions(found))]
 

@@ -230,6 +230,11 @@ def _ladder(
     free: tuple[str, ...] | None,
     progress: Progress | None,
 ) -> tuple[Rung, ...]:
+    """Each model of the search on the validation runs, as recorded.
+
+    The search fits without the errors of the cameras' calibration: its inertias belong to samples
+    that still contain them.
+    """
     stages: list[Refit] = [search.rounds[0].before, *(one.after for one in accepted)]
     rungs = []
     for k, stage in enumerate(stages):

@@ -10,11 +10,13 @@ import pytest
 from cdpr.pose_errors import TERMS, PoseErrors
 from cdpr.robot import POSE_COORDINATES, Array
 from cdpr.rotation import matrix_from_angles
-from ident.calibration import mode_shifts, with_calibration
+from ident.calibration import freed, mode_shifts, with_calibration
 from ident.fidim import fidim
 from ident.fidim_calibration import calibration_share
+from ident.identify import identify
 from ident.maximum_likelihood import ml_estimate
 from ident.motion import regressor
+from ident.prediction import predict
 from ident.prepare import PreparedRun, prepare_runs
 from ident.runs import SwingRun
 from ident.signals import SignalSettings
@@ -109,6 +111,37 @@ def test_without_known_errors_nothing_changes(estimates) -> None:
     same = with_calibration(fitted, [None] * len(EQUILIBRIA))
     assert same.fit is fitted, "another fit"
     assert len(same.amplitudes) == 0, same.amplitudes
+
+
+def test_held_out_runs_are_predicted_without_the_errors_found() -> None:
+    """A tilted, wrongly scaled base frame: down to the noise (2.4 % by chance); not as recorded."""
+    amplitudes = np.array([0.0, 0.0, 0.0, 3.0, 3.0, 3.0, 3.0])
+    held = replace(runs(amplitudes, seed=9)[1], name="held", role="validate")
+    found = identify([*runs(amplitudes, seed=6), held], paper_model().robot)
+    inertia = found.estimates["ml_full"].values
+    recorded_m = predict(paper_model(), prepared([held])[0], None, inertia).rmse_m
+    freed_m = found.validation[0].prediction_rmse_m
+    assert found.best == "ml_full", found.best
+    assert recorded_m > 1.5 * NOISE_M, f"as recorded: {1e3 * recorded_m:.4f} mm"
+    assert freed_m < 1.08 * NOISE_M, f"freed: {1e3 * freed_m:.4f} mm"
+
+
+def test_a_run_freed_of_its_true_errors_is_the_one_before_them() -> None:
+    """Also where samples are missing, which stay so and harm no others."""
+    amplitudes = np.random.default_rng(3).standard_normal(7)
+    plain, off = (runs(a, seed=4, duration_s=1.0)[0] for a in (np.zeros(7), amplitudes))
+    values = off.trajectory.values.copy()
+    values[40:43] = np.nan
+    gapped = replace(off, trajectory=replace(off.trajectory, values=values))
+    left = freed(gapped, amplitudes).trajectory.values - plain.trajectory.values
+    assert (np.isnan(left).all(axis=1) == np.isin(np.arange(len(left)), (40, 41, 42))).all(), left
+    assert np.nanmax(np.abs(left)) < 1e-7, f"{np.nanmax(np.abs(left)):.2g} m or rad are left"
+
+
+def test_held_out_runs_of_another_tracking_are_refused() -> None:
+    run = runs(np.zeros(7), seed=4, duration_s=1.0)[0]
+    with pytest.raises(ValueError, match="7 calibration errors, 5 in the fitted runs"):
+        freed(run, np.zeros(5))
 
 
 @pytest.mark.parametrize("full", [True, False])
