@@ -122,6 +122,8 @@ def test_held_out_runs_are_predicted_without_the_errors_found() -> None:
     recorded_m = predict(paper_model(), prepared([held])[0], None, inertia).rmse_m
     freed_m = found.validation[0].prediction_rmse_m
     assert found.best == "ml_full", found.best
+    assert recorded_m is not None, "not predicted as recorded"
+    assert freed_m is not None, found.validation[0].note
     assert recorded_m > 1.5 * NOISE_M, f"as recorded: {1e3 * recorded_m:.4f} mm"
     assert freed_m < 1.08 * NOISE_M, f"freed: {1e3 * freed_m:.4f} mm"
 
