@@ -28,6 +28,7 @@ LEAST_EXCESS_LATER = 0.04
 CONFOUNDED_DIFFERENCE = 12.0
 LEAST_EXCESS = 0.005
 SCATTERED = 1.0 / 3.0
+CONTRADICTED = 0.15
 SCANNED_FREQUENCIES = 400
 
 
@@ -177,6 +178,11 @@ def _complaint(
     worse = int((gains < -NO_WORSE * current.score.held_out).sum())
     if gains.sum() <= 0.0 or worse > MOST_WORSE * len(gains):
         return f"{worse} of {len(gains)} left-out runs are predicted worse with it"
+    if worse >= CONTRADICTED * len(gains) and gains.sum() < 2.0 * _scatter(gains):
+        return (
+            f"{worse} of {len(gains)} left-out runs are predicted worse with it, and its gain is "
+            "within the scatter from run to run"
+        )
     excess = excess_of(current)
     gain = float(gains.sum()) / max(current.held_out - count, LEAST_EXCESS * count)
     if index and (excess < LEAST_EXCESS_LATER or gain < LEAST_GAIN_LATER):
@@ -215,8 +221,12 @@ def _as_good(one: Refit, best: Refit, current: Refit, colour: float) -> bool:
         return True
     leads = one.score.held_out - best.score.held_out
     against = leads < -NO_WORSE * current.score.held_out
-    error = float(np.std(leads, ddof=1)) * np.sqrt(len(leads))
-    return bool(against.mean() >= SCATTERED and leads.sum() < 2.0 * error)
+    return bool(against.mean() >= SCATTERED and leads.sum() < 2.0 * _scatter(leads))
+
+
+def _scatter(gains: Array) -> float:
+    """Standard error of a sum over runs, from how the runs differ."""
+    return float(np.std(gains, ddof=1)) * float(np.sqrt(len(gains)))
 
 
 def _verdict(
