@@ -145,13 +145,15 @@ def diagnose(
     share = _share_explained(search, last)
     rest = unexplained(last.fit, fitted, full, noise_scales)
     accepted = [one for one in search.rounds if one.decision.winner is not None]
-    if accepted and rest.present and share < LEAST_SHARE_EXPLAINED:
+    settled = [one for one in accepted if one.by_lengths]
+    if len(accepted) > len(settled) and rest.present and share < LEAST_SHARE_EXPLAINED:
+        doubtful = [effect_of(one.decision.key) for one in accepted if not one.by_lengths]
         notes.append(
-            f"{', '.join(last.effects)} would remove only {100 * share:.0f} % of the excess: the "
+            f"{', '.join(doubtful)} would remove only {100 * share:.0f} % of the excess: the "
             "nearest candidates, not the cause; not accepted"
         )
-        last = search.rounds[0].before
-        accepted = []
+        last = accepted[len(settled)].before
+        accepted = settled
         rest = unexplained(last.fit, fitted, full, noise_scales)
     ladder = _ladder(search, accepted, checked, free, _part(progress, 0.85, 0.95))
     final = _with_own_noise(last.fit, fitted)
@@ -218,7 +220,8 @@ def _with_own_noise(found: LikelihoodFit, runs: list[PreparedRun]) -> Likelihood
 
 
 def _share_explained(search: Search, last: Refit) -> float:
-    first = search.rounds[0].before
+    """Share of what forces had to explain, once lengths had settled the geometry."""
+    first = next(one.before for one in search.rounds if not one.by_lengths)
     count = float(first.evidence.counts.sum())
     return (first.held_out - last.held_out) / max(first.held_out - count, 1e-9)
 

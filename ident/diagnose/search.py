@@ -40,11 +40,15 @@ MOST_ROUNDS = 4
 
 @dataclass(frozen=True, slots=True)
 class Round:
-    """One round of the search: what stood before, what was decided, what was taken away again."""
+    """One round of the search: what stood before, what was decided, what was taken away again.
+
+    Those that cable lengths decide, before any force, say so.
+    """
 
     before: Refit
     decision: Decision
     removed: tuple[str, ...] = ()
+    by_lengths: bool = False
 
     @property
     def after(self) -> Refit:
@@ -101,7 +105,7 @@ class Search:
             after = displaced(current, one.key, one.values, one.stds, self.noise_scales)
             word = Candidate(effect_of(one.key), "accepted", one.delta_bic, one.share, (), str(one))
             decision = Decision((word,), after, one.key, (effect_of(one.key),))
-            self.rounds.append(Round(current, decision))
+            self.rounds.append(Round(current, decision, by_lengths=True))
             current = after
         return current
 
