@@ -11,13 +11,20 @@ import numpy as np
 
 from calib.base_tags import SURVEY_STD_M, SurveyedTag, find_base_tags
 from calib.boards import Board, board_from
-from calib.calibration_result import FORMAT, camera_entries, covariance_entry
+from calib.calibration_result import (
+    FORMAT,
+    CameraCovariance,
+    camera_entries,
+    covariance_entry,
+)
 from calib.camera import Camera
 from calib.camera_models import Array
 from calib.cameras_file import write_cameras
 from calib.clocks import board_moves, coarse_offsets_s
 from calib.intrinsics import CameraStart
 from calib.lens_choice import lens_warnings, weigh_lenses
+from calib.plumb_line import StringView, find_vertical
+from calib.plumb_line_file import read_plumb_line, vertical_entry
 from calib.recordings import find_recordings
 from calib.rig import Rig, solve_rig, start_cameras, tie_to_base
 from calib.sightings import Sightings, gather, see_boards
@@ -27,6 +34,7 @@ from calib.trust import Verdict, judge
 from calib.truth_checks import check_truth
 from calib.views import Views
 from cdpr.documents import DataError, write_json
+from cdpr.robot import STANDARD_GRAVITY_M_S2
 
 Progress = Callable[[str, float], None]
 
@@ -59,6 +67,8 @@ def calibrate_session(
     results_folder: Path | str | None = None,
     model: str = DEFAULT_MODEL,
     survey_std_m: float | None = None,
+    plumb_line: Path | str | None = None,
+    gravity_m_s2: Sequence[float] | Array = (0.0, 0.0, -STANDARD_GRAVITY_M_S2),
     progress: Progress | None = None,
 ) -> CalibrationResult:
     """Calibrate cameras, clocks and base frame from recordings of a board.
@@ -81,6 +91,8 @@ def calibrate_session(
         results_folder: takes calibration.json, None for none.
         model: lens model of every camera.
         survey_std_m: standard deviation of a surveyed coordinate; measured from the fit when None.
+        plumb_line: points clicked along hanging strings, see `calib.plumb_line_file`, or None.
+        gravity_m_s2: declared gravity in the base frame, which they are held against, (3,).
         progress: told a label and the fraction done.
 
     Raises:
@@ -92,6 +104,8 @@ def calibrate_session(
     board = board if isinstance(board, Board) else board_from(board)
     told("finding the board", 0.0)
     found = find_recordings(recordings)
+    names = [recording.name for recording in found]
+    strings = () if plumb_line is None else read_plumb_line(plumb_line, names)
     sightings = see_boards(
         found,
         board,
@@ -119,7 +133,14 @@ def calibrate_session(
     lenses = weigh_lenses(rig)
     warnings += [*clock_warnings(rig), *lens_warnings(rig.cameras, lenses)]
     verdict = replace(verdict, warnings=(*warnings, *verdict.warnings))
+    vertical: dict[str, Any] = {}
+    if strings and verdict.usable:
+        vertical = _vertical(rig, strings, np.asarray(gravity_m_s2, dtype=np.float64))
+        if vertical["verdict"] != "agrees":
+            verdict = replace(verdict, warnings=(*verdict.warnings, vertical["sentence"]))
     document = _document(rig, board, sightings, verdict)
+    if vertical:
+        document["vertical"] = vertical
     for entry, choice in zip(document["cameras"], lenses, strict=True):
         entry["lens_models_held_out_px"] = choice.held_out_px
     if results_folder is not None:
@@ -130,6 +151,13 @@ def calibrate_session(
         write_cameras(cameras_path, rig.cameras)
     told("calibrated", 1.0)
     return CalibrationResult(rig.cameras, document, rig)
+
+
+def _vertical(rig: Rig, strings: tuple[StringView, ...], gravity_m_s2: Array) -> dict[str, Any]:
+    known = covariance_entry(rig)
+    covariance = CameraCovariance(tuple(known["names"]), np.array(known["matrix"]))
+    vertical = find_vertical(rig.cameras, strings, covariance)
+    return vertical_entry(vertical, strings, gravity_m_s2)
 
 
 def rig_from_sightings(

@@ -55,6 +55,12 @@ class CalibrationSource:
     board: Mapping[str, object] | None = None
     base_tags: tuple[BaseTag, ...] = ()
 
+    @property
+    def plumb_line(self) -> Path | None:
+        """`plumb_line.csv` beside the recordings, None where there is none."""
+        path = None if self.recordings is None else self.recordings / "plumb_line.csv"
+        return path if path is not None and path.is_file() else None
+
 
 @dataclass(frozen=True, slots=True)
 class Payload:

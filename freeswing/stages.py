@@ -77,7 +77,10 @@ def _robot_files(session: Session) -> list[Path]:
 
 def _calibration_files(session: Session) -> list[Path]:
     source = session.calibration
-    return [session.path, *([source.recordings] if source and source.recordings else [])]
+    if source is None or source.recordings is None:
+        return [session.path]
+    judged = [] if source.plumb_line is None else [session.robot]  # by its gravity
+    return [session.path, source.recordings, *judged]
 
 
 def _tracking_files(session: Session) -> list[Path]:

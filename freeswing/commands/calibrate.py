@@ -36,10 +36,15 @@ def make(
     """cameras.toml on disk, and calibration.json as a document."""
     from calib.calibrate import calibrate_session
     from cdpr.documents import InputError
+    from cdpr.robot import STANDARD_GRAVITY_M_S2
+    from cdpr.robot_file import read_robot
 
     source = session.calibration
     if source is None or source.recordings is None or source.board is None:
         raise InputError(f"{session.path}: [calibration] names no recordings and no board")
+    gravity_m_s2 = (0.0, 0.0, -STANDARD_GRAVITY_M_S2)
+    if source.plumb_line is not None:
+        gravity_m_s2 = read_robot(session.robot).gravity_m_s2
     found = calibrate_session(
         source.recordings,
         source.board,
@@ -48,12 +53,17 @@ def make(
         cameras_path=session.cameras,
         results_folder=session.results,
         model=settings["model"],
+        plumb_line=source.plumb_line,
+        gravity_m_s2=gravity_m_s2,
         progress=console.progress,
     )
     for entry in found.document["cameras"]:
         console.say(
             f"camera {entry['name']}: {entry['views']} views, {entry['reprojection_px']:.3f} px"
         )
+    vertical = found.document.get("vertical")
+    if vertical and vertical["verdict"] == "agrees":  # anything else is among the warnings
+        console.say(vertical["sentence"])
     for warning in found.document["verdict"]["warnings"]:
         console.complain(warning)
     return [("calibration.json", found.document)]
