@@ -23,7 +23,7 @@ LEAST_RUNS = 3
 MOST_STARTS = 3
 ROUGH_TOLERANCE = 1.0
 # What an effect leaves is small beside the swings; what a fit in the wrong valley leaves is not.
-SMALL_BESIDE_SWINGS = 0.05
+SMALL_BESIDE_SWINGS = 0.25
 AT_THE_NOISE = 2.0
 
 
