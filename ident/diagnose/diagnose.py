@@ -35,7 +35,7 @@ Progress = Callable[[str, float], None]
 
 FORMAT = "freeswing-diagnosis/1"
 # Effects whose best mixture explains less than this of the excess are the nearest, not the cause.
-LEAST_SHARE_EXPLAINED = 0.5
+LEAST_SHARE_EXPLAINED = 0.75
 
 
 @dataclass(frozen=True, slots=True)
