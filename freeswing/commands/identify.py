@@ -25,7 +25,9 @@ def add_arguments(parser: ArgumentParser) -> None:
         help="of FIDIM: as published, or weighted by the samples' covariance",
     )
     parser.add_argument(
-        "--fidim-only", action="store_true", help="leave out the maximum-likelihood fit"
+        "--fidim-only",
+        action="store_true",
+        help="leave out the maximum-likelihood fit and the simulated predictions",
     )
     parser.add_argument(
         "--consistent",
@@ -75,6 +77,7 @@ def make(
     chosen = IdentifySettings(
         weighting=settings["weighting"],
         maximum_likelihood=settings["likelihood"],
+        predict=settings["likelihood"],
         consistent=settings.get("consistent", False),
         geometry=geometry,
     )
@@ -100,7 +103,7 @@ def _summarise(document: dict[str, Any], best: str, console: Console) -> None:
         console.say(f"  run {dropped['run']} left out: {dropped['why']}")
     for entry in document["validation"]:
         error, floor = (millimetres(entry[k]) for k in ("prediction_rmse_m", "noise_floor_m"))
-        sigma = number(entry["sigma_perp"])
-        console.say(f"  {entry['run']}: off by {error} (noise {floor}), sigma_perp {sigma}")
+        predicted = f"off by {error} (noise {floor}), " if entry["prediction_rmse_m"] else ""
+        console.say(f"  {entry['run']}: {predicted}sigma_perp {number(entry['sigma_perp'])}")
     for note in document["notes"]:
         console.say(f"  note: {note}")
