@@ -230,7 +230,6 @@ def add_views(
     local = 0
     rows = np.zeros((1, 1))
     spare = np.zeros(1)
-    target = np.zeros(1, dtype=np.int64)
     cost = 0.0
     for v in range(len(camera_of)):
         c, piece = camera_of[v], piece_of[v]

@@ -112,6 +112,17 @@ class Model:
         """Which of the values each run has for itself, (o,)."""
         return np.flatnonzero([parameter.per_run for parameter in self.parameters])
 
+    def place_of(self, effect: str) -> slice:
+        """Where an effect's values stand among `values`.
+
+        Raises:
+            ValueError: when it is not in the model.
+        """
+        where = [k for k, name in enumerate(self.names) if name.partition(".")[0] == effect]
+        if not where:
+            raise ValueError(f"{effect} is not among {self.effects}")
+        return slice(where[0], where[-1] + 1)
+
     @property
     def start_values(self) -> Array:
         """Values that leave the declared model as it is, (k,)."""

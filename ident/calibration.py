@@ -166,7 +166,7 @@ def _solved(
     """
     problem = Problem(current.model, current.samples, current.free)
     n_modes, n_shared = len(amplitudes), len(current.free)
-    weight = 1.0 / np.sqrt(current.correlation if current.correlation > 1.2 else 1.0)
+    weight = 1.0 / np.sqrt(current.enlargement)
     rows = []
     for motion, run, one in zip(current.motions, current.samples, errors, strict=True):
         shifts = _shifts(motion, run, one)

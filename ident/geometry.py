@@ -52,7 +52,7 @@ class GeometryPriors:
         model = build_model(robot, tuple(stds))
         spread = [stds[name.split(".")[0]] for name in model.names]
         parameters = tuple(
-            replace(parameter, low=-3.0 * std, high=3.0 * std, scale=std)
+            replace(parameter.known(0.0, std), scale=std)
             for parameter, std in zip(model.parameters, spread, strict=True)
         )
         return replace(model, parameters=parameters)
@@ -62,8 +62,7 @@ def corrected(robot: Robot, model: Model, values: Array) -> Robot:
     """The robot with its cable ends where a fit has found them."""
     moves = {name: np.zeros((robot.n_cables, 3)) for name in (_ENTRY, _ATTACHMENT)}
     for name in model.effects:
-        inside = [i for i, full in enumerate(model.names) if full.split(".")[0] == name]
-        moves[name] = values[inside].reshape(-1, 3)
+        moves[name] = values[model.place_of(name)].reshape(-1, 3)
     cables = tuple(
         replace(cable, entry_m=cable.entry_m + entry, attachment_m=cable.attachment_m + attachment)
         for cable, entry, attachment in zip(

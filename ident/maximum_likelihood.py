@@ -64,7 +64,7 @@ def ml_estimate(
         ValueError: when no run's samples can give a motion, or the fit breaks down.
     """
     asked = asked or Asked()
-    kept, samples, states, more = _begun(model, runs, free, inertia, asked.mass_kg)
+    kept, samples, states, more = begun(model, runs, free, inertia, asked.mass_kg)
     loads = Loads.of([run.payload for run in samples]).start(asked.mass_kg)
     state = State(np.array(inertia), model.start_values, states, np.ones(2), loads=loads)
     found, cost = fit(model, samples, state, progress=progress), None
@@ -155,14 +155,25 @@ def astray(found: LikelihoodFit) -> float:
     return float(unexplained_motion(found).max())
 
 
-def _begun(
+def begun(
     model: Model,
     runs: list[PreparedRun],
     free: tuple[str, ...] | None,
     inertia: Array,
-    mass_kg: float | None,
+    mass_kg: float | None = None,
 ) -> tuple[list[PreparedRun], list[Samples], Array, tuple[DroppedRun, ...]]:
-    """Runs that can be started, their samples and first states, and the others with reasons."""
+    """Runs that can be started, their samples and first states, and the others with reasons.
+
+    Args:
+        model: the robot.
+        runs: with and without payloads.
+        free: the coordinates to use of them, or None for full poses.
+        inertia: where to start, (9,).
+        mass_kg: a guess of the mass, where runs carry payloads.
+
+    Raises:
+        ValueError: when no run without payload can be started.
+    """
     kept, samples, states, dropped = [], [], [], []
     for run in runs:
         load = Loads.of([run.run.payload])

@@ -7,7 +7,7 @@ mass (m/s^2), torques likewise (m^2/s^2): free motion cannot tell the mass.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi as ca
 
@@ -45,6 +45,10 @@ class Parameter:
     def prior_std(self) -> float:
         """A third of the way from the start to the farther bound."""
         return max(self.high - self.start, self.start - self.low) / 3.0
+
+    def known(self, value: float, std: float) -> Parameter:
+        """The parameter with a value and its standard deviation as what is known beforehand."""
+        return replace(self, start=value, low=value - 3.0 * std, high=value + 3.0 * std)
 
 
 @dataclass(frozen=True, slots=True)

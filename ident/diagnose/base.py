@@ -8,14 +8,14 @@ from dataclasses import replace
 import numpy as np
 
 from cdpr.documents import DataError
-from cdpr.model import Model, build_model
-from cdpr.robot import Array, Robot
+from cdpr.model import Model
+from cdpr.robot import Array
+from ident.consistency import is_possible
+from ident.diagnose.spectrum import residual_power
 from ident.joint import State
 from ident.likelihood import LikelihoodFit, fit
-from ident.likelihood_run import Samples, residuals
-from ident.maximum_likelihood import astray, started
+from ident.maximum_likelihood import astray, begun
 from ident.prepare import PreparedRun
-from ident.starts import is_possible
 
 Progress = Callable[[str, float], None]
 
@@ -28,7 +28,7 @@ AT_THE_NOISE = 2.0
 
 
 def base_fit(
-    robot: Robot,
+    model: Model,
     runs: list[PreparedRun],
     free: tuple[str, ...] | None,
     starts: list[Array],
@@ -40,7 +40,7 @@ def base_fit(
     The first start that leads to residuals small beside the swings serves, else the likeliest.
 
     Args:
-        robot: declared geometry.
+        model: the declared one.
         runs: with role identify.
         free: coordinates to use of them, or None for full poses.
         starts: inertias to start from, each (9,), in the order in which to try them.
@@ -50,19 +50,18 @@ def base_fit(
     Raises:
         DataError: when fewer than three runs can be started, or no start leads to a fit.
     """
-    model = build_model(robot)
     found: list[tuple[LikelihoodFit, list[PreparedRun], list[str]]] = []
     failure = ""
     for inertia in starts[:MOST_STARTS]:
-        samples, states, kept, dropped = _begun(model, runs, free, inertia)
-        start = State(inertia, model.start_values, states, noise_scales)
         try:
+            kept, samples, states, left = begun(model, runs, free, inertia)
             refuse_few(kept)
+            start = State(inertia, model.start_values, states, noise_scales)
             rough = fit(model, samples, start, progress=progress, tolerance=ROUGH_TOLERANCE)
         except (ValueError, np.linalg.LinAlgError) as error:
             failure = failure or str(error)
             continue
-        found.append((rough, kept, dropped))
+        found.append((rough, kept, [f"run {one.run} left out: {one.why}" for one in left]))
         if is_possible(rough.inertia) and _follows(rough, noise_scales):
             break
     if not found:
@@ -83,25 +82,6 @@ def refuse_few(runs: list[PreparedRun]) -> None:
         )
 
 
-def _begun(
-    model: Model, runs: list[PreparedRun], free: tuple[str, ...] | None, inertia: Array
-) -> tuple[list[Samples], Array, list[PreparedRun], list[str]]:
-    samples, states, kept, dropped = [], [], [], []
-    for run in runs:
-        try:
-            one, state = started(model, run, free, inertia)
-        except (ValueError, np.linalg.LinAlgError) as error:
-            dropped.append(f"run {run.name} left out: {error}")
-            continue
-        samples.append(one)
-        states.append(state)
-        kept.append(run)
-    return samples, np.array(states), kept, dropped
-
-
 def _follows(found: LikelihoodFit, noise_scales: Array) -> bool:
-    if astray(found) < SMALL_BESIDE_SWINGS:
-        return True
-    pairs = zip(found.motions, found.samples, strict=True)
-    power = np.mean([np.mean(residuals(m, s, noise_scales) ** 2) for m, s in pairs])
-    return float(power) < AT_THE_NOISE
+    near = astray(found) < SMALL_BESIDE_SWINGS
+    return near or residual_power(found, noise_scales) < AT_THE_NOISE

@@ -115,13 +115,11 @@ def decided(
         colour: of the current residual.
         noise_scales: of metres and radians, (2,).
     """
-    count = float(current.evidence.counts.sum())
-    excess = max(current.held_out - count, LEAST_EXCESS * count)
     ranked = sorted(linear, key=lambda name: float(linear[name].held_out.sum()))
     complaints: dict[str, str] = {}
     passed: dict[str, Refit] = {}
     for name, one in tried.items():
-        complaint = _complaint(current, one, name, colour, len(ranked), index, count)
+        complaint = _complaint(current, one, name, colour, len(ranked), index)
         if complaint:
             complaints[name] = complaint
         else:
@@ -133,7 +131,7 @@ def decided(
         known = tried.get(one)
         held_out = known.held_out if known else float(linear[one].held_out.sum())
         bic = delta_bic(current, known.score if known else linear[one], one, colour)
-        gain = float((current.held_out - held_out) / excess)
+        gain = _gain(current, held_out)
         verdict, reason, others = _verdict(one, key, group, complaints, known, passed, gain)
         candidates.append(Candidate(effect_of(one), verdict, float(bic), gain, others, reason))
     return Decision(tuple(candidates), passed.get(key), key, group)
@@ -162,7 +160,7 @@ def unknowns(current: Refit, key: str) -> tuple[int, int]:
 
 
 def _complaint(
-    current: Refit, one: Refit, name: str, colour: float, n_tried: int, index: int, count: float
+    current: Refit, one: Refit, name: str, colour: float, n_tried: int, index: int
 ) -> str:
     """Why a refitted candidate does not pass, or nothing."""
     outside = plausible(one, name)
@@ -175,7 +173,7 @@ def _complaint(
     if chance > SIGNIFICANCE or delta_bic(current, one.score, name, colour) > LARGEST_DELTA_BIC:
         return f"not significant: p = {chance:.2g} with {n_tried} candidates tried"
     gains = current.score.held_out - one.score.held_out
-    worse = int((gains < -NO_WORSE * current.score.held_out).sum())
+    worse = runs_worse(gains, current.score)
     if gains.sum() <= 0.0 or worse > MOST_WORSE * len(gains):
         return f"{worse} of {len(gains)} left-out runs are predicted worse with it"
     if worse >= CONTRADICTED * len(gains) and gains.sum() < 2.0 * _scatter(gains):
@@ -183,14 +181,26 @@ def _complaint(
             f"{worse} of {len(gains)} left-out runs are predicted worse with it, and its gain is "
             "within the scatter from run to run"
         )
-    excess = excess_of(current)
-    gain = float(gains.sum()) / max(current.held_out - count, LEAST_EXCESS * count)
+    excess, gain = excess_of(current), _gain(current, one.held_out)
     if index and (excess < LEAST_EXCESS_LATER or gain < LEAST_GAIN_LATER):
         return (
             f"it would remove {100 * gain:.0f} % of an excess of {100 * excess:.0f} % over the "
             "noise: too little to claim another effect"
         )
     return ""
+
+
+def runs_worse(gains: Array, before: Score) -> int:
+    """How many runs lose what counts, by each run's gain (r,)."""
+    return int((gains < -NO_WORSE * before.held_out).sum())
+
+
+def _gain(current: Refit, held_out: float) -> float:
+    """Share of the left-out runs' excess over the noise that a sum of squares takes away."""
+    count = float(current.evidence.counts.sum())
+    return float(
+        (current.held_out - held_out) / max(current.held_out - count, LEAST_EXCESS * count)
+    )
 
 
 def excess_of(current: Refit) -> float:
@@ -220,8 +230,8 @@ def _as_good(one: Refit, best: Refit, current: Refit, colour: float) -> bool:
     if (one.held_out - best.held_out) / colour < CONFOUNDED_DIFFERENCE:
         return True
     leads = one.score.held_out - best.score.held_out
-    against = leads < -NO_WORSE * current.score.held_out
-    return bool(against.mean() >= SCATTERED and leads.sum() < 2.0 * _scatter(leads))
+    against = runs_worse(leads, current.score)
+    return bool(against >= SCATTERED * len(leads) and leads.sum() < 2.0 * _scatter(leads))
 
 
 def _scatter(gains: Array) -> float:

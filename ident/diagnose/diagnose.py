@@ -19,6 +19,7 @@ from ident.diagnose.decision import Candidate
 from ident.diagnose.experiments import separating_experiment
 from ident.diagnose.heldout import HeldOut, held_out
 from ident.diagnose.refit import Refit
+from ident.diagnose.screen import BASE
 from ident.diagnose.search import Round, Search
 from ident.diagnose.unexplained import Unexplained, unexplained
 from ident.diagnose.variants import effect_of
@@ -137,7 +138,7 @@ def diagnose(
     considered = tuple(name for name in names if name not in barred)
     starts = likelihood_starts(model, prepared, tuple(one.values for one in by_fidim.values()))
     base, fitted, dropped = base_fit(
-        robot, fitted, free, starts, noise_scales, _part(progress, 0.05, 0.2)
+        model, fitted, free, starts, noise_scales, _part(progress, 0.05, 0.2)
     )
     search = Search(noise_scales, considered, workers, executor, _part(progress, 0.2, 0.85))
     last = search.run(base)
@@ -287,19 +288,18 @@ def _candidate_entry(one: Candidate) -> dict[str, Any]:
 
 
 def _accepted(final: LikelihoodFit, groups: dict[str, tuple[str, ...]]) -> list[dict[str, Any]]:
-    entries, used = [], 0
+    entries = []
     for name in final.model.effects:
-        parameters = catalogue()[name].parameters(final.model.robot)
+        where = final.model.place_of(name)
         rows = [
             {
-                "name": parameter.name,
-                "value": float(final.values[used + k]),
-                "std": float(final.std[9 + used + k]),
+                "name": final.model.parameters[k].name,
+                "value": float(final.values[k]),
+                "std": float(final.std[BASE + k]),
             }
-            for k, parameter in enumerate(parameters)
-            if parameter.per_run or final.free[9 + used + k]
+            for k in range(where.start, where.stop)
+            if final.model.parameters[k].per_run or final.free[BASE + k]
         ]
-        used += len(parameters)
         group = [other for other in groups.get(name, ()) if other != name]
         entries.append({"effect": name, "parameters": rows, "confounded_with": group})
     return entries

@@ -24,11 +24,11 @@ from ident.diagnose.decision import (
     CONFOUNDED_DIFFERENCE,
     LARGEST_DELTA_BIC,
     MOST_WORSE,
-    NO_WORSE,
     SIGNIFICANCE,
+    runs_worse,
 )
 from ident.diagnose.rows import Evidence, Score, score
-from ident.diagnose.variants import effect_of, extended, inside, place_of
+from ident.diagnose.variants import effect_of, extended, inside
 from ident.likelihood import LikelihoodFit, low_band_factor
 from ident.likelihood_run import Samples
 
@@ -159,12 +159,11 @@ def _sure(
     chance = float(chi2.sf(max(drop, 0.0), len(columns))) * n_tried
     gains = before.held_out - after.held_out
     share = float(gains.sum()) / (float(before.held_out.sum()) - count)
-    worse = int((gains < -NO_WORSE * before.held_out).sum())
     if (
         chance > SIGNIFICANCE
         or bic > LARGEST_DELTA_BIC
         or share < LEAST_SHARE
-        or worse > MOST_WORSE * len(gains)
+        or runs_worse(gains, before) > MOST_WORSE * len(gains)
     ):
         return None
     mine = slice(len(known), None)
@@ -183,7 +182,7 @@ def _sure(
 
 def _parameters(lengths: _Lengths, key: str) -> tuple[Parameter, ...]:
     model = lengths.model
-    all_of_it = model.parameters[place_of(model, effect_of(key))]
+    all_of_it = model.parameters[model.place_of(effect_of(key))]
     chosen = inside(model.robot, key)
     return tuple(p for p, wanted in zip(all_of_it, chosen, strict=True) if wanted)
 
@@ -224,7 +223,7 @@ def _lengths(fit: LikelihoodFit, keys: Sequence[str], noise_scales: Array) -> _L
     columns = {CREEP: n_values + np.arange(n), STRETCH: np.array([n_values + n])}
     for key in keys:
         if effect_of(key) not in (CREEP, STRETCH):
-            where = place_of(model, effect_of(key))
+            where = model.place_of(effect_of(key))
             columns[key] = where.start + np.flatnonzero(inside(model.robot, key))
     triangles = np.array(triangles)
     seen = np.abs(triangles[:, :, :-1]).max(axis=(0, 1)) > 0.0

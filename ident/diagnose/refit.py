@@ -11,10 +11,10 @@ from cdpr.model import Model
 from cdpr.robot import Array
 from ident.diagnose.rows import Evidence, Score, score
 from ident.diagnose.screen import BASE, screen
-from ident.diagnose.variants import effect_of, extended, inside, place_of, reduced
+from ident.diagnose.spectrum import residual_power
+from ident.diagnose.variants import effect_of, extended, inside, reduced
 from ident.joint import State
 from ident.likelihood import LikelihoodFit, correlation_factor, fit
-from ident.likelihood_run import residuals
 
 RANKING_STEPS = 12
 # Surveys and calibrations are good to a few tenths of a millimetre: 0.3 mm for a displaced point.
@@ -27,16 +27,19 @@ class Refit:
     """A fit with a set of effects in the model.
 
     Attributes:
-        effects: in the model, the candidate last.
         fit: the fit.
         evidence: linear, at the fit, over inertia and effect values.
         score: of that evidence: its held-out costs count.
     """
 
-    effects: tuple[str, ...]
     fit: LikelihoodFit
     evidence: Evidence
     score: Score
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Names of those in the model."""
+        return self.fit.model.effects
 
     @property
     def held_out(self) -> float:
@@ -45,24 +48,19 @@ class Refit:
 
     def values_of(self, name: str) -> slice:
         """Where an effect's values stand among the fit's."""
-        return place_of(self.fit.model, name)
+        return self.fit.model.place_of(name)
 
 
 def colour_of(fit: LikelihoodFit, noise_scales: Array) -> float:
     """How much stronger than the noise the residual is in the band of the motion, >= 1."""
-    squares = np.mean(
-        [
-            np.mean(residuals(motion, run, noise_scales) ** 2)
-            for motion, run in zip(fit.motions, fit.samples, strict=True)
-        ]
-    )
-    return max(1.0, float(squares) * correlation_factor(fit.motions, fit.samples, noise_scales))
+    power = residual_power(fit, noise_scales)
+    return max(1.0, power * correlation_factor(fit.motions, fit.samples, noise_scales))
 
 
 def rescored(current: LikelihoodFit, noise_scales: Array, colour: float) -> Refit:
     """Score a fit that is there already."""
     linear = screen(current, (), noise_scales, colour=colour)
-    return Refit(current.model.effects, current, linear.evidence, score(linear.evidence))
+    return Refit(current, linear.evidence, score(linear.evidence))
 
 
 def refit(
@@ -81,25 +79,32 @@ def refit(
     Raises:
         ValueError: when the start cannot be simulated.
     """
-    model, free, start = current.model, current.free.copy(), current.state
-    own_values = start.own_values
-    name = effect_of(candidate)
+    model, free, state = _joined(current, candidate, values, noise_scales * np.sqrt(colour))
+    return rescored(_fitted(model, current, state, free), noise_scales, colour)
+
+
+def _joined(
+    found: LikelihoodFit, key: str, values: Array, scales: Array
+) -> tuple[Model, np.ndarray, State]:
+    """The model with a candidate, which unknowns are estimated, and a state to go on from.
+
+    `values` are those of the candidate's whole effect; what the model has of it already stays.
+    """
+    model, free, start = found.model, found.free.copy(), found.state
+    all_values, own_values = start.values, start.own_values
+    name = effect_of(key)
     if name in model.effects:
-        free[BASE:][place_of(model, name)] |= inside(model.robot, candidate)
-        all_values = start.values
+        free[BASE:][model.place_of(name)] |= inside(model.robot, key)
     else:
         model = extended(model, (name,))
-        free = np.concatenate([free, inside(model.robot, candidate)])
-        all_values = np.concatenate([start.values, values])
+        free = np.concatenate([free, inside(model.robot, key)])
+        all_values = np.concatenate([all_values, values])
         own_values = _with_new(own_values, len(model.own_values))
-    state = State(
-        start.inertia,
-        all_values,
-        start.starts,
-        noise_scales * np.sqrt(colour),
-        own_values=own_values,
+    return (
+        model,
+        free,
+        State(start.inertia, all_values, start.starts, scales, own_values=own_values),
     )
-    return rescored(_fitted(model, current, state, free), noise_scales, colour)
 
 
 def displaced(current: Refit, key: str, centre: Array, stds: Array, noise_scales: Array) -> Refit:
@@ -113,26 +118,15 @@ def displaced(current: Refit, key: str, centre: Array, stds: Array, noise_scales
         noise_scales: of metres and radians, (2,).
     """
     found, name = current.fit, effect_of(key)
-    model, free, start = found.model, found.free.copy(), found.state
-    values = start.values
-    if name not in model.effects:
-        model = extended(model, (name,))
-        values = np.concatenate([values, model.start_values[len(values) :]])
-        free = np.pad(free, (0, len(values) - len(start.values)))
-    chosen = np.arange(len(values))[place_of(model, name)][inside(model.robot, key)]
-    parameters = list(model.parameters)
+    nothing = np.array([p.start for p in effect_named(name).parameters(found.model.robot)])
+    scales = noise_scales * np.sqrt(colour_of(found, noise_scales))
+    model, free, state = _joined(found, key, nothing, scales)
+    values, parameters = state.values.copy(), list(model.parameters)
+    chosen = np.arange(len(values))[model.place_of(name)][inside(model.robot, key)]
     for k, value, std in zip(chosen, centre, stds, strict=True):
-        low, high = float(value - 3.0 * std), float(value + 3.0 * std)
-        parameters[k] = replace(parameters[k], start=float(value), low=low, high=high)
-    values, free = values.copy(), free.copy()
-    values[chosen], free[BASE + chosen] = centre, True
-    colour = colour_of(found, noise_scales)
-    scales = noise_scales * np.sqrt(colour)
-    state = State(start.inertia, values, start.starts, scales, own_values=start.own_values)
+        values[k], parameters[k] = value, parameters[k].known(float(value), float(std))
     known = replace(model, parameters=tuple(parameters))
-    return polished(
-        fit(known, found.samples, state, free, estimate_scales=False, grow=False), noise_scales
-    )
+    return polished(_fitted(known, found, replace(state, values=values), free), noise_scales)
 
 
 def polished(found: LikelihoodFit, noise_scales: Array) -> Refit:
@@ -146,7 +140,7 @@ def polished(found: LikelihoodFit, noise_scales: Array) -> Refit:
 def without(found: LikelihoodFit, name: str, noise_scales: Array) -> Refit:
     """A fit without one of its effects, from where it stands, converged."""
     model, start = found.model, found.state
-    place = np.arange(len(start.values))[place_of(model, name)]
+    place = np.arange(len(start.values))[model.place_of(name)]
     fewer = reduced(model, name)
     own = start.own_values
     if own is not None:

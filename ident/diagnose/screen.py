@@ -11,7 +11,7 @@ from cdpr.model import Model
 from cdpr.robot import Array
 from cdpr.sensitivity import linearise
 from ident.diagnose.rows import Evidence
-from ident.diagnose.variants import effect_of, extended, inside, place_of
+from ident.diagnose.variants import effect_of, extended, inside
 from ident.likelihood import LikelihoodFit
 from ident.likelihood_run import Samples, reduce_run
 
@@ -64,7 +64,7 @@ def screen(
     values = model.start_values.copy()
     values[: len(fit.values)] = fit.values
     for name in fresh:
-        where = place_of(model, name)
+        where = model.place_of(name)
         for k in range(where.start, where.stop):
             parameter = model.parameters[k]
             values[k] = (shapes or {}).get(name, {}).get(parameter.name, parameter.start)
@@ -94,7 +94,7 @@ def _count(samples: Samples, model: Model) -> int:
 
 
 def _amplitudes(model: Model, key: str) -> np.ndarray:
-    where = place_of(model, effect_of(key))
+    where = model.place_of(effect_of(key))
     chosen = inside(model.robot, key)
     parameters = model.parameters[where]
     offsets = [k for k, p in enumerate(parameters) if chosen[k] and p.amplitude and not p.per_run]

@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
+from functools import partial
 from multiprocessing import get_context
 
 from cdpr.effects import effect_named
@@ -30,7 +31,7 @@ from ident.diagnose.removal import is_no_worse, superfluous
 from ident.diagnose.rows import score
 from ident.diagnose.screen import BASE, Screen, screen
 from ident.diagnose.spectrum import common_frequency, too_small
-from ident.diagnose.variants import effect_of, inside, place_of, variants
+from ident.diagnose.variants import effect_of, inside, variants
 from ident.likelihood import LikelihoodFit
 
 Progress = Callable[[str, float], None]
@@ -186,22 +187,19 @@ class Search:
         found: dict[str, Refit] = {}
         if not jobs:
             return found
-        if self.workers < 2 and self.executor is None:
-            results = (_job(*job) for job in jobs)
-            for k, (name, result) in enumerate(zip(names, results, strict=True)):
-                self._tell(f"round {index + 1}: {name}", (index + (k + 1) / len(jobs)) * share)
-                found |= {} if result is None else {name: result}
-            return found
         with self._pool() as pool:
-            futures = [pool.submit(_job, *job) for job in jobs]
-            for k, (name, future) in enumerate(zip(names, futures, strict=True)):
+            calls = [
+                pool.submit(_job, *job).result if pool else partial(_job, *job) for job in jobs
+            ]
+            for k, (name, call) in enumerate(zip(names, calls, strict=True)):
                 self._tell(f"round {index + 1}: {name}", (index + k / len(jobs)) * share)
-                result = future.result()
+                result = call()
                 found |= {} if result is None else {name: result}
         return found
 
-    def _pool(self) -> AbstractContextManager[Executor]:
-        if self.executor is not None:
+    def _pool(self) -> AbstractContextManager[Executor | None]:
+        """Who makes the calls; None for this process itself."""
+        if self.executor is not None or self.workers < 2:
             return nullcontext(self.executor)
         return ProcessPoolExecutor(self.workers, mp_context=get_context("fork"))
 
@@ -226,4 +224,4 @@ def _job(
 
 def _start_of(one: Screen, key: str) -> Array:
     """Values of a candidate's effect as it was screened, doing nothing, (k,)."""
-    return one.values[place_of(one.model, effect_of(key))].copy()
+    return one.values[one.model.place_of(effect_of(key))].copy()

@@ -33,18 +33,6 @@ def inside(robot: Robot, key: str) -> np.ndarray:
     return np.array([part in ("", p.part) for p in effect_named(name).parameters(robot)])
 
 
-def place_of(model: Model, name: str) -> slice:
-    """Where an effect's values stand among a model's.
-
-    Raises:
-        ValueError: when it is not in the model.
-    """
-    where = [k for k, full in enumerate(model.names) if full.partition(".")[0] == name]
-    if not where:
-        raise ValueError(f"{name} is not among {model.effects}")
-    return slice(where[0], where[-1] + 1)
-
-
 def extended(model: Model, names: Sequence[str]) -> Model:
     """A model with further effects; what is known of those that it has stays known."""
     more = build_model(model.robot, (*model.effects, *names))
@@ -54,7 +42,7 @@ def extended(model: Model, names: Sequence[str]) -> Model:
 
 def reduced(model: Model, name: str) -> Model:
     """A model without one of its effects."""
-    where = place_of(model, name)
+    where = model.place_of(name)
     fewer = build_model(model.robot, tuple(other for other in model.effects if other != name))
     kept = (*model.parameters[: where.start], *model.parameters[where.stop :])
     return replace(fewer, parameters=kept)
