@@ -168,14 +168,32 @@ def read_stamps(recording: Recording) -> dict[int, float] | None:
     Raises:
         InputError: when the file does not hold `frame,t_s` rows with rising stamps.
     """
-    path = recording.path.parent / f"{recording.name}.csv"
+    path = stamp_file(recording)
     if not path.is_file():
         return None
+    stamps: dict[int, float] = {}
+    last = -np.inf
+    for row, number, time in stamp_rows(path):
+        if not time > last or number in stamps:
+            raise InputError(f"{path}: line {row}: stamps must rise, one a frame")
+        stamps[number], last = time, time
+    return stamps
+
+
+def stamp_file(recording: Recording) -> Path:
+    """Where a recording's time stamps are expected."""
+    return recording.path.parent / f"{recording.name}.csv"
+
+
+def stamp_rows(path: Path) -> Iterator[tuple[int, int, float]]:
+    """Line, frame number and stamp in seconds of each row of a `frame,t_s` file.
+
+    Raises:
+        InputError: when the file does not hold such rows.
+    """
     lines = read_text(path, _MOST_STAMP_BYTES).splitlines()
     if not lines or [part.strip() for part in lines[0].split(",")][:2] != ["frame", "t_s"]:
         raise InputError(f"{path}: the first line must be frame,t_s")
-    stamps: dict[int, float] = {}
-    last = -np.inf
     for row, line in enumerate(lines[1:], start=2):
         if not line.strip():
             continue
@@ -184,10 +202,9 @@ def read_stamps(recording: Recording) -> dict[int, float] | None:
             number, time = int(frame), float(stamp)
         except ValueError as error:
             raise InputError(f"{path}: line {row}: {line[:60]!r} is not frame,t_s") from error
-        if not (np.isfinite(time) and time > last) or number in stamps:
-            raise InputError(f"{path}: line {row}: stamps must be finite, rising, one a frame")
-        stamps[number], last = time, time
-    return stamps
+        if not np.isfinite(time):
+            raise InputError(f"{path}: line {row}: the stamp {stamp!r} is not a number of seconds")
+        yield row, number, time
 
 
 def stamps_of(recording: Recording, numbers: np.ndarray, frame_rate_hz: float | None) -> Array:

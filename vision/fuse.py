@@ -14,7 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vision.pose_kernels import linearise_block, solve_block
+from vision.linear import camera_matrices, lags, linearised_at
+from vision.pose_kernels import solve_block
 from vision.poses import Poses, motion_of_poses, unknown_poses
 from vision.run_views import Block, CameraViews, blocks
 from vision.single_pose import whitening
@@ -139,11 +140,6 @@ def _starts(
     return np.ascontiguousarray(position), np.ascontiguousarray(rotation), can
 
 
-def camera_matrices(views: Sequence[CameraViews]) -> Array:
-    """T_camera_base of all cameras, (n_c, 4, 4)."""
-    return np.array([view.camera.T_camera_base for view in views])
-
-
 def whitened(block: Block, noise: Array) -> Array:
     """Whitening of each sighting with the camera's floor (in rays) added, (n_o, 8, 8)."""
     if not len(block.things):
@@ -171,25 +167,16 @@ def _solve(
     account: _Account,
     free: int,
 ) -> None:
-    instant = np.repeat(np.arange(len(instants_s)), np.diff(block.starts))
-    lags = np.ascontiguousarray(block.times_s - instants_s[instant][:, None])
-    white = whitened(block, noise)
+    late, steady = lags(block, instants_s), np.ascontiguousarray(motions)
     scores = np.full(len(block.things), -1.0)
-    cameras = camera_matrices(views)
     solve_block(
-        block.starts, rotations, positions, known, np.ascontiguousarray(motions), free, cameras,
-        block.camera_of, block.points, block.rays, white, lags, block.counts, _ROBUST_LIMIT,
-        covariances, scores,
+        block.starts, rotations, positions, known, steady, free, camera_matrices(views),
+        block.camera_of, block.points, block.rays, whitened(block, noise), late, block.counts,
+        _ROBUST_LIMIT, covariances, scores,
     )  # fmt: skip
-    residuals = np.zeros((len(scores), 8))
-    jacobians, rates = np.zeros((len(scores), 8, 6)), np.zeros((len(scores), 8))
-    places = np.zeros((len(scores), 4, 3))
-    linearise_block(
-        block.starts, rotations, positions, known, np.ascontiguousarray(motions), cameras,
-        block.camera_of, block.points, block.rays, lags, block.counts,
-        residuals, jacobians, rates, places,
-    )  # fmt: skip
-    account.add(block, views, scores, known[instant], residuals, places)
+    found = linearised_at(block, views, rotations, positions, known, steady, late)
+    instant = np.repeat(np.arange(len(instants_s)), np.diff(block.starts))
+    account.add(block, views, scores, known[instant], found.residuals, found.places)
 
 
 class _Account:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from vision.run_views import Block, CameraViews
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,24 +38,43 @@ class Linear:
 
 def linearised(block: Block, views: Sequence[CameraViews], poses: Poses) -> Linear:
     """At a run's poses, each point carried to its own time by the motion."""
-    count, n_o = len(block.starts) - 1, len(block.things)
-    span = slice(block.first, block.first + count)
-    instant = np.repeat(np.arange(count), np.diff(block.starts))
-    lags = np.ascontiguousarray(block.times_s - poses.times_s[span][instant][:, None])
+    span = slice(block.first, block.first + len(block.starts) - 1)
+    return linearised_at(
+        block,
+        views,
+        np.ascontiguousarray(poses.rotations[span]),
+        np.ascontiguousarray(poses.positions_m[span]),
+        poses.known[span],
+        np.ascontiguousarray(poses.motions[span]),
+        lags(block, poses.times_s[span]),
+    )
+
+
+def linearised_at(
+    block: Block,
+    views: Sequence[CameraViews],
+    rotations: Array,
+    positions_m: Array,
+    known: Mask,
+    motions: Array,
+    lags_s: Array,
+) -> Linear:
+    """At poses of the block's instants: (m, 3, 3), (m, 3), (m,), (m, 6) and lags (n_o, 4)."""
+    n_o = len(block.things)
     found = Linear(
         np.zeros((n_o, 8)), np.zeros((n_o, 8, 6)), np.zeros((n_o, 8)), np.ones((n_o, 4, 3))
     )
     linearise_block(
         block.starts,
-        np.ascontiguousarray(poses.rotations[span]),
-        np.ascontiguousarray(poses.positions_m[span]),
-        poses.known[span],
-        np.ascontiguousarray(poses.motions[span]),
-        np.array([view.camera.T_camera_base for view in views]),
+        rotations,
+        positions_m,
+        known,
+        motions,
+        camera_matrices(views),
         block.camera_of,
         block.points,
         block.rays,
-        lags,
+        lags_s,
         block.counts,
         found.residuals,
         found.jacobians,
@@ -62,3 +82,14 @@ def linearised(block: Block, views: Sequence[CameraViews], poses: Poses) -> Line
         found.places,
     )
     return found
+
+
+def lags(block: Block, instants_s: Array) -> Array:
+    """How long after its instant each point was seen, (n_o, 4)."""
+    instant = np.repeat(np.arange(len(instants_s)), np.diff(block.starts))
+    return np.ascontiguousarray(block.times_s - instants_s[instant][:, None])
+
+
+def camera_matrices(views: Sequence[CameraViews]) -> Array:
+    """T_camera_base of all cameras, (n_c, 4, 4)."""
+    return np.array([view.camera.T_camera_base for view in views])

@@ -5,14 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from calib.recordings import Recording
-from cdpr.documents import InputError, read_text
-
-Array = NDArray[np.float64]
-
-_MOST_BYTES = 1 << 28
+from calib.recordings import Recording, stamp_file, stamp_rows
+from cdpr.documents import InputError
 
 
 def run_stamps(
@@ -25,7 +20,7 @@ def run_stamps(
     Raises:
         InputError: when the file is not `frame,t_s`, or there is neither file nor rate.
     """
-    path = recording.path.parent / f"{recording.name}.csv"
+    path = stamp_file(recording)
     if path.is_file():
         return _read(path), None
     if frame_rate_hz is None:
@@ -44,21 +39,9 @@ def stamp_of(number: int, stamps: dict[int, float] | None, rate_hz: float | None
 
 
 def _read(path: Path) -> dict[int, float]:
-    lines = read_text(path, _MOST_BYTES).splitlines()
-    if not lines or [part.strip() for part in lines[0].split(",")][:2] != ["frame", "t_s"]:
-        raise InputError(f"{path}: the first line must be frame,t_s")
     stamps: dict[int, float] = {}
     last = -np.inf
-    for row, line in enumerate(lines[1:], start=2):
-        if not line.strip():
-            continue
-        try:
-            frame, stamp = line.split(",")[:2]
-            number, time = int(frame), float(stamp)
-        except ValueError as error:
-            raise InputError(f"{path}: line {row}: {line[:60]!r} is not frame,t_s") from error
-        if not np.isfinite(time):
-            raise InputError(f"{path}: line {row}: the stamp {stamp!r} is not a number of seconds")
+    for _, number, time in stamp_rows(path):
         if time > last and number not in stamps:
             stamps[number] = last = time
     return stamps
