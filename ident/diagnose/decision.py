@@ -21,10 +21,11 @@ LARGEST_DELTA_BIC = -10.0
 # A cause helps wherever it shows; what trades small swings for large ones is a stand-in.
 MOST_WORSE = 0.25
 NO_WORSE = 0.01
+NO_WORSE_OF_GAIN = 0.1
 # A second effect must be worth its place: integrators, shapes of friction and points of
 # application differ a little from reality, and 0.1 mm samples see it.
 LEAST_GAIN_LATER = 0.25
-LEAST_EXCESS_LATER = 0.04
+LEAST_EXCESS_LATER = 0.005
 CONFOUNDED_DIFFERENCE = 12.0
 LEAST_EXCESS = 0.005
 SCATTERED = 1.0 / 3.0
@@ -191,8 +192,12 @@ def _complaint(
 
 
 def runs_worse(gains: Array, before: Score) -> int:
-    """How many runs lose what counts, by each run's gain (r,)."""
-    return int((gains < -NO_WORSE * before.held_out).sum())
+    """How many runs lose what counts beside themselves and the mean gain, by each's gain (r,).
+
+    A run at its noise loses a little to what the others leave uncertain.
+    """
+    least = np.maximum(NO_WORSE * before.held_out, NO_WORSE_OF_GAIN * gains.mean())
+    return int((gains < -least).sum())
 
 
 def _gain(current: Refit, held_out: float) -> float:

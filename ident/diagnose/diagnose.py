@@ -121,7 +121,9 @@ def diagnose(
         prepared = prepare_runs(runs, model, SignalSettings(), first_part)
     except ValueError as error:
         raise DataError(str(error)) from error
-    prepared, by_fidim, _ = fidim_estimates(model, prepared, "published", first_part)
+    taut, by_fidim, _ = fidim_estimates(model, prepared, "published", first_part)
+    # Where most cables seem slack, the declared robot is at fault, not the runs.
+    prepared = taut if 2 * len(taut.runs) > len(prepared.runs) else prepared
     full = all(set(run.signals.coordinates) == set(POSE_COORDINATES) for run in prepared.runs)
     free = None if full else prepared.free
     fitted = _of_role(prepared.runs, "identify")
