@@ -28,6 +28,7 @@ LEAST_GAIN_LATER = 0.25
 LEAST_EXCESS_LATER = 0.005
 CONFOUNDED_DIFFERENCE = 12.0
 LEAST_EXCESS = 0.005
+SMALL_LEAD = 0.1
 SCATTERED = 1.0 / 3.0
 CONTRADICTED = 0.15
 SCANNED_FREQUENCIES = 400
@@ -219,21 +220,28 @@ def _winner(
     """The best of those that passed, and all effects that held-out runs cannot tell from it."""
     if not passed:
         return "", ()
-    best = min(passed.values(), key=lambda one: one.held_out)
-    colour = colour_of(best.fit, noise_scales)
-    group = [name for name, one in passed.items() if _as_good(one, best, current, colour)]
+    first = min(passed, key=lambda name: passed[name].held_out)
+    colour = colour_of(passed[first].fit, noise_scales)
+    group = [name for name in passed if _as_good(passed, name, first, current, colour)]
     group.sort(key=lambda n: (sum(unknowns(current, n)), passed[n].held_out))
     return group[0], tuple(dict.fromkeys(map(effect_of, group)))
 
 
-def _as_good(one: Refit, best: Refit, current: Refit, colour: float) -> bool:
+def _as_good(
+    passed: dict[str, Refit], name: str, first: str, current: Refit, colour: float
+) -> bool:
     """Whether the best's lead is within the noise, or within its own scatter from run to run.
 
     A lead that a third of the runs contradict, and that is less than two of its standard errors,
-    could be another one's on the next recordings.
+    could be another one's on the next recordings. So could a small one against the likelihood.
     """
-    if (one.held_out - best.held_out) / colour < CONFOUNDED_DIFFERENCE:
+    one, best = passed[name], passed[first]
+    lead = one.held_out - best.held_out
+    if lead / colour < CONFOUNDED_DIFFERENCE:
         return True
+    bic = delta_bic(current, one.score, name, colour)
+    if bic <= delta_bic(current, best.score, first, colour):
+        return bool(lead < SMALL_LEAD * (current.held_out - best.held_out))
     leads = one.score.held_out - best.score.held_out
     against = runs_worse(leads, current.score)
     return bool(against >= SCATTERED * len(leads) and leads.sum() < 2.0 * _scatter(leads))
