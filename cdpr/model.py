@@ -7,7 +7,7 @@ cable lengths and their Jacobian, the constrained acceleration with the specific
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NoReturn
 
 import casadi as ca
@@ -211,14 +211,15 @@ def _functions(robot: Robot, s: _Symbols, geometry: Geometry, owned: Owned) -> d
     jacobian = length_jacobian(states, matrix)
     twist_map = ca.diagcat(ca.SX.eye(3), matrix)
     maps = {"matrix_map": twist_map, "matrix_rate": along(twist_map, s.zeta, s.rates)}
-    measured = {"measured": _measured(s, instant, matrix, owned)}
+    dynamics = _dynamics(robot, s, instant, spin, geometry, inertia, owned)
+    measured = {"measured": _measured(s, instant, matrix, owned, dynamics["acceleration"])}
     return {
         **_kinematics(robot, s, states, geometry, jacobian),
         "twist_map": _function("twist_map", s.some("zeta", "rates"), maps),
         "measured": _function("measured", s.named, measured),
         **_energies(s, geometry, inertia, spin, turn),
         "lagrangian": _lagrangian(robot, s, instant, spin, geometry, inertia, owned, jacobian),
-        **_dynamics(robot, s, instant, spin, geometry, inertia, owned),
+        **dynamics,
     }
 
 
@@ -268,8 +269,12 @@ def _kinematics(
     }
 
 
-def _measured(s: _Symbols, instant: Instant, matrix: Expression, owned: Owned) -> Expression:
+def _measured(
+    s: _Symbols, instant: Instant, matrix: Expression, owned: Owned, acceleration: ca.Function
+) -> Expression:
     measured = s.zeta
+    if isinstance(acceleration, ca.Function):
+        instant = replace(instant, second_rates=acceleration(*s.named.values())[0])
     for effect, values in owned:
         change = effect.measured(instant, values)
         if change is not None:

@@ -65,6 +65,7 @@ class Instant:
         cables: lengths and angles, one a cable.
         tensions: specific tensions tau / m (n,), without the effects that need them; None for
             effects that do not.
+        second_rates: zeta_ddot, (6,); None but for effects on what is measured.
     """
 
     time_s: Expression
@@ -75,6 +76,7 @@ class Instant:
     com: Expression
     cables: tuple[CableState, ...]
     tensions: Expression = None
+    second_rates: Expression = None
 
     @property
     def velocity(self) -> Expression:
