@@ -103,7 +103,7 @@ def decided(
     current: Refit,
     linear: dict[str, Score],
     tried: dict[str, Refit],
-    index: int,
+    later: bool,
     colour: float,
     noise_scales: Array,
 ) -> Decision:
@@ -113,7 +113,7 @@ def decided(
         current: the fit without any of the candidates.
         linear: what each makes of the linear evidence.
         tried: those that were fitted.
-        index: of the round, from 0.
+        later: whether something was accepted before.
         colour: of the current residual.
         noise_scales: of metres and radians, (2,).
     """
@@ -121,7 +121,7 @@ def decided(
     complaints: dict[str, str] = {}
     passed: dict[str, Refit] = {}
     for name, one in tried.items():
-        complaint = _complaint(current, one, name, colour, len(ranked), index)
+        complaint = _complaint(current, one, name, colour, len(ranked), later)
         if complaint:
             complaints[name] = complaint
         else:
@@ -162,7 +162,7 @@ def unknowns(current: Refit, key: str) -> tuple[int, int]:
 
 
 def _complaint(
-    current: Refit, one: Refit, name: str, colour: float, n_tried: int, index: int
+    current: Refit, one: Refit, name: str, colour: float, n_tried: int, later: bool
 ) -> str:
     """Why a refitted candidate does not pass, or nothing."""
     outside = plausible(one, name)
@@ -184,7 +184,7 @@ def _complaint(
             "within the scatter from run to run"
         )
     excess, gain = excess_of(current), _gain(current, one.held_out)
-    if index and (excess < LEAST_EXCESS_LATER or gain < LEAST_GAIN_LATER):
+    if later and (excess < LEAST_EXCESS_LATER or gain < LEAST_GAIN_LATER):
         return (
             f"it would remove {100 * gain:.0f} % of an excess of {100 * excess:.0f} % over the "
             "noise: too little to claim another effect"

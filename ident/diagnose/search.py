@@ -82,7 +82,8 @@ class Search:
         current = rescored(base, self.noise_scales, colour_of(base, self.noise_scales))
         current = self._geometry(current)
         for index in range(MOST_ROUNDS):
-            if index and (excess_of(current) < LEAST_EXCESS_LATER or too_small(current.fit)):
+            later = bool(self.rounds)
+            if later and (excess_of(current) < LEAST_EXCESS_LATER or too_small(current.fit)):
                 break
             done = self._round(current, index)
             self.rounds.append(done)
@@ -125,7 +126,7 @@ class Search:
         linear = {name: score(screens[name].with_candidate(name)) for name in left}
         worth_fitting = promising(current, linear, colour)
         tried = self._refits(current, screens, worth_fitting, index, colour)
-        decision = decided(current, linear, tried, index, colour, self.noise_scales)
+        decision = decided(current, linear, tried, bool(self.rounds), colour, self.noise_scales)
         if decision.winner is None:
             return Round(current, decision)
         # Ranking stopped early: the winner goes on to convergence.
