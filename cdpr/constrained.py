@@ -261,13 +261,16 @@ def length_change(
     acceleration: Expression | None = None,
 ) -> tuple[Expression, Expression, Expression]:
     """Change of the cable lengths and its two time derivatives along the motion, (n,) each."""
-    change = ca.SX.zeros(robot.n_cables)
-    for effect, values in owned:
-        if effect.needs_tension == needs_tension:
-            own = effect.length_change(robot, instant, values)
-            change = change if own is None else change + own
     variables = ca.vertcat(instant.time_s, instant.zeta, instant.rates)
     known = ca.SX.zeros(6) if acceleration is None else acceleration
     flow = ca.vertcat(1, instant.rates, known)
+    change = ca.SX.zeros(robot.n_cables)
+    for effect, values in owned:
+        if effect.needs_tension != needs_tension:
+            continue
+        own = effect.length_change(robot, instant, values)
+        lag = effect.length_lag(robot, instant, values)
+        change = change if own is None else change + own
+        change = change if lag is None else change + along(lag, variables, flow)
     rate = along(change, variables, flow)
     return change, rate, along(rate, variables, flow)

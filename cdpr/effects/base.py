@@ -126,6 +126,10 @@ class Effect:
         """How much longer each cable is than it was told to be, (n,); may use tensions."""
         return None
 
+    def length_lag(self, robot: Robot, instant: Instant, values: Expression) -> Expression | None:
+        """What lengthens each cable by its time derivative, (n,); may use tensions."""
+        return None
+
     def wrench(self, instant: Instant, values: Expression) -> Expression | None:
         """Specific wrench about P in the base frame, (6,), conjugate to the twist."""
         return None

@@ -7,6 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from cdpr.free_motion import admissible_rates
 from cdpr.model import build_model
 from cdpr.robot import Robot
 from cdpr.rotation import angle_rate_matrix, matrix_from_angles
@@ -59,6 +60,7 @@ def product_motion(
     zeta = np.concatenate([p, tait_bryan(q[None])[0]])
     rates = np.zeros(6) if twist is None else twist.copy()
     rates[3:] = np.linalg.solve(angle_rate_matrix(zeta[3:]), rates[3:])
+    rates = admissible_rates(model, zeta, rates, inertia, numbers)
     span = (0.0, float(times_s[-1]))
     motion = product_simulate(model, zeta, rates, span, inertia, numbers)
     found = motion.at(times_s)[0]
@@ -233,7 +235,10 @@ def test_elastic_cables_beside_real_springs() -> None:
     world = _of_mass(world)
     held = world.length / (1.0 + tensions_at_rest(world, p, q) / stiff)
     other = simulate(world._replace(stiffness_ea=stiff, relaxation=1e-3, length=held), p, q, 6.0)
-    values = {"cable_elasticity.mass_over_stiffness_s2_m": MASS_KG / stiff}
+    values = {
+        "cable_elasticity.mass_over_stiffness_s2_m": MASS_KG / stiff,
+        "cable_elasticity.damping_s3_m": 1e-3 * MASS_KG / stiff,
+    }
     positions, _ = product_motion(robot, "bologna-4", p, q, other.times_s, values)
     size = apart_mm(simulate(world, p, q, 6.0).positions_m, other)
     apart = apart_mm(positions, other)
