@@ -38,6 +38,7 @@ class Samples:
         lengths_std_m: their standard deviation.
         span_s: start and end of the window.
         payload: a known mass on the platform, or None.
+        temper: factor on its noise, where the model is known to follow it worse than others.
     """
 
     name: str
@@ -50,6 +51,7 @@ class Samples:
     lengths_std_m: float
     span_s: tuple[float, float]
     payload: Payload | None = None
+    temper: float = 1.0
 
     def until(self, end_s: float) -> Samples:
         """The samples up to a time."""
@@ -200,7 +202,8 @@ def _whitened(poses: Array, samples: Samples, scales: Array) -> Array:
         difference[:, 3:] = (turn @ difference[:, 3:, None])[..., 0]
     else:
         difference = poses[:, samples.columns] - samples.values
-    return (samples.whitener @ difference[..., None])[..., 0] / scales[samples.groups]
+    noise = samples.temper * scales[samples.groups]
+    return (samples.whitener @ difference[..., None])[..., 0] / noise
 
 
 def _sample_rows(linear: Linearised, samples: Samples, scales: Array) -> Array:
@@ -225,7 +228,7 @@ def _whitened_change(change: Array, samples: Samples, scales: Array) -> Array:
         change = np.concatenate([change[:, :3], turn @ change[:, 3:]], axis=1)
     else:
         change = change[:, samples.columns]
-    return samples.whitener @ change / scales[samples.groups][:, None]
+    return samples.whitener @ change / (samples.temper * scales[samples.groups])[:, None]
 
 
 def _length_rows(motion: Motion, samples: Samples) -> Array:

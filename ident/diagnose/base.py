@@ -12,6 +12,7 @@ from cdpr.model import Model
 from cdpr.robot import Array
 from ident.consistency import is_possible
 from ident.diagnose.spectrum import residual_power
+from ident.diagnose.temper import tempered
 from ident.joint import State
 from ident.likelihood import LikelihoodFit, fit
 from ident.maximum_likelihood import astray, begun
@@ -69,8 +70,8 @@ def base_fit(
     most = max(len(kept) for _, kept, _ in found)
     best = min((one for one in found if len(one[1]) == most), key=lambda one: one[0].deviance)
     rough, kept, dropped = best
-    exact = replace(rough.state, scales=noise_scales)
-    return fit(model, rough.samples, exact, estimate_scales=False, grow=False), kept, dropped
+    exact, samples = replace(rough.state, scales=noise_scales), tempered(rough, noise_scales)
+    return fit(model, samples, exact, estimate_scales=False, grow=False), kept, dropped
 
 
 def refuse_few(runs: list[PreparedRun]) -> None:

@@ -12,6 +12,7 @@ from cdpr.robot import Array
 from ident.diagnose.rows import Evidence, Score, score
 from ident.diagnose.screen import BASE, screen
 from ident.diagnose.spectrum import residual_power
+from ident.diagnose.temper import tempered
 from ident.diagnose.variants import effect_of, extended, inside, reduced
 from ident.joint import State
 from ident.likelihood import LikelihoodFit, correlation_factor, fit
@@ -133,7 +134,8 @@ def polished(found: LikelihoodFit, noise_scales: Array) -> Refit:
     """A fit that goes on to convergence."""
     colour = colour_of(found, noise_scales)
     state = replace(found.state, scales=noise_scales * np.sqrt(colour))
-    exact = fit(found.model, found.samples, state, found.free, estimate_scales=False, grow=False)
+    samples = tempered(found, noise_scales)
+    exact = fit(found.model, samples, state, found.free, estimate_scales=False, grow=False)
     return rescored(exact, noise_scales, colour)
 
 

@@ -1,0 +1,31 @@
+"""Runs that a model follows far worse than the others, weighed so that they do not decide alone.
+
+Near a singularity a run answers to everything at once. While its cause is not in the model, such a
+run bends the inertia of all the others; what it says of candidates counts again once it is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from cdpr.robot import Array
+from ident.likelihood import LikelihoodFit
+from ident.likelihood_run import Samples, residuals
+
+OUTSTANDING = 4.0
+
+
+def tempered(found: LikelihoodFit, noise_scales: Array) -> list[Samples]:
+    """The fit's samples, runs of more than `OUTSTANDING` times the median power held at that.
+
+    Args:
+        found: the fit whose residuals decide.
+        noise_scales: of metres and radians, (2,).
+    """
+    pairs = zip(found.motions, found.samples, strict=True)
+    powers = np.array([np.mean((residuals(m, s, noise_scales) * s.temper) ** 2) for m, s in pairs])
+    limit = OUTSTANDING * max(1.0, float(np.median(powers)))
+    factors = np.sqrt(np.maximum(1.0, powers / limit))
+    return [replace(s, temper=float(f)) for s, f in zip(found.samples, factors, strict=True)]
