@@ -13,7 +13,7 @@ class ClockOffset(Effect):
     """A measured orientation is the one that the platform had `delay` before its time stamp.
 
     Position and orientation then come from instruments whose clocks differ. Second order in the
-    delay: good to 0.1 mrad for 20 ms at 2 Hz and 10 degrees.
+    delay: good to 0.1 mrad for 20 ms at 1 Hz and 10 degrees.
     """
 
     name = "clock_offset"

@@ -11,6 +11,7 @@ from model_cases import (
     random_states,
     report,
     robot_named,
+    swing_start,
     true_inertia,
     twist_of,
 )
@@ -20,6 +21,7 @@ from cdpr.effects import catalogue
 from cdpr.free_motion import admissible_rates
 from cdpr.model import build_model
 from cdpr.rotation import exp_rotation, matrix_from_angles
+from cdpr.simulation import simulate
 from tests.oracle.dynamics import derivative
 from tests.oracle.newton_euler import start_state
 from tests.oracle.world import plain_world
@@ -237,3 +239,15 @@ def test_orientations_lag_by_the_clocks_offset():
     error = np.abs(seen[0][:, 3:] - (zetas - delay * rates)[:, 3:]).max()
     assert error < 1e-9, f"{error:.3g} rad"
     assert np.array_equal(seen[0][:, :3], zetas[:, :3])
+
+
+def test_a_long_lag_is_that_of_the_motion_itself():
+    model, inertia, zeta, rates = swing_start("bologna-4")
+    motion, delay = simulate(model, zeta, rates, (0.0, 4.0), inertia), 0.02
+    late = build_model(model.robot, ("clock_offset",))
+    times = np.linspace(0.5, 3.5, 301)
+    zetas, rates, _ = motion.at(times)
+    seen = evaluate(late.measured, times, zetas, rates, inertia, np.array([delay]))[0]
+    true = motion.at(times - delay)[0]
+    error, size = np.abs(seen - true)[:, 3:].max(), np.abs(zetas - true)[:, 3:].max()
+    assert error < 0.01 * size, f"{error:.2g} of {size:.2g} rad"

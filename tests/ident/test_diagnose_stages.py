@@ -5,11 +5,15 @@ import pytest
 
 from freeswing.session import read_session
 from freeswing.swings import load_robot, load_swings, load_target
+from ident.diagnose.decision import runs_worse
 from ident.diagnose.diagnose import diagnose
 from ident.diagnose.kinematics import displacements
 from ident.diagnose.refit import refit, without
 from ident.diagnose.removal import is_no_worse, superfluous
+from ident.diagnose.rows import Score
+from ident.diagnose.temper import OUTSTANDING, tempered
 from ident.diagnose.variants import variants
+from ident.likelihood_run import residuals
 from tests.oracle.sessions import make_session
 
 POINTS = ("attachment_offset", "anchor_offset", "clock_offset")
@@ -76,3 +80,38 @@ def test_a_cause_is_not_superfluous(tmp_path):
     assert model.effects == ("gravity_tilt",)
     with_drag = refit(found.final, "translational_drag", np.array([0.0, 0.5]), WHITE, 1.0)
     assert superfluous(with_drag, ("translational_drag",)) == ""
+
+
+def test_a_cause_beside_another_is_found_where_little_is_left_of_it(tmp_path):
+    """The drag leaves 2 % over the noise once the creep is in; its evidence is overwhelming."""
+    effects = {"winch_creep": "large", "translational_drag": "medium"}
+    names = (*effects, "rotational_drag", "constant_force")
+    _, found = diagnosed(tmp_path, effects, 26, names)
+    values = accepted(found)
+    assert set(values) == set(effects), values
+    rate, std = values["translational_drag"]["rate_1_s"]
+    assert rate == pytest.approx(0.02, abs=4 * std + 2e-4), (rate, std)
+
+
+def test_a_tilted_pulley_does_not_make_runs_slack(tmp_path):
+    """With a wrong geometry the tensions of a first solution mean nothing."""
+    _, found = diagnosed(tmp_path, {"pulley_axis": "large"}, 27, ("pulley_axis", "anchor_offset"))
+    assert "pulley_axis" in accepted(found)
+
+
+def test_a_small_loss_beside_the_gain_contradicts_nothing():
+    nothing = np.zeros(0)
+    before = Score(nothing, nothing, nothing, 900.0, np.array([600.0, 100.0, 100.0, 100.0]), 0)
+    assert runs_worse(np.array([500.0, -4.0, -5.0, 1.0]), before) == 0
+    assert runs_worse(np.array([500.0, -40.0, -50.0, 1.0]), before) == 2
+    assert runs_worse(np.array([6.0, -4.0, -0.5, 1.0]), before) == 1
+
+
+def test_a_run_that_stands_out_weighs_no_more_than_its_limit(tmp_path):
+    _, found = diagnosed(tmp_path, {"gravity_tilt": "large"}, 28, ())
+    fit = found.final
+    pairs = zip(fit.motions, fit.samples, strict=True)
+    powers = [np.mean((residuals(m, s, WHITE) * s.temper) ** 2) for m, s in pairs]
+    limit = OUTSTANDING * max(1.0, np.median(powers))
+    for power, samples in zip(powers, tempered(fit, WHITE), strict=True):
+        assert samples.temper == pytest.approx(np.sqrt(max(1.0, power / limit)))
