@@ -27,6 +27,7 @@ for place in (ROOT, ROOT / "benchmarks"):
 from sealed_sessions import made, selected  # noqa: E402
 
 from tests.oracle.cases import TIERS, Case  # noqa: E402
+from tests.oracle.effects import SIZES  # noqa: E402
 
 FLOOR_FACTOR = 1.5
 TIMEOUT_S = 1800
@@ -108,14 +109,12 @@ def summary(rows: list[dict[str, Any]]) -> list[str]:
     clean = [row for row in rows if row["kind"] == "clean" and "failed" not in row]
     alarms = sum(bool(row["accepted"]) for row in clean)
     lines.append(f"false alarms on clean sessions: {alarms} of {len(clean)}")
-    smallest: dict[str, str] = {}
+    sizes: dict[str, list[str]] = {}
     for row in rows:
-        if row["kind"] == "single" and "failed" not in row:
+        if row["kind"] == "single" and "failed" not in row and row["found"]:
             name, size = row["effects"][0]
-            order = ("small", "medium", "large")
-            if row["found"] and order.index(size) <= order.index(smallest.get(name, "large")):
-                smallest[name] = size
-            smallest.setdefault(name, "large") if row["found"] else None
+            sizes.setdefault(name, []).append(size)
+    smallest = {name: min(found, key=SIZES.index) for name, found in sizes.items()}
     lines.append("smallest size found: " + ", ".join(f"{k} {v}" for k, v in smallest.items()))
     held = [row for row in rows if row.get("effects") and row["kind"] in ("single", "pair")]
     near = sum(row["after_over_floor"] <= FLOOR_FACTOR for row in held if "failed" not in row)
