@@ -12,6 +12,7 @@ import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from zipfile import BadZipFile, ZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -124,6 +125,15 @@ def save_piece(path: Path, piece: Piece, follower: Follower) -> None:
         counters=np.array([follower.misses, follower.count], dtype=np.int64),
     )
     replace_file(path, buffer.getvalue())
+
+
+def is_whole(path: Path) -> bool:
+    """Whether a piece is there and undamaged; one that is not is made again."""
+    try:
+        with ZipFile(path) as archive:
+            return archive.testzip() is None
+    except (BadZipFile, OSError):
+        return False
 
 
 def load_piece(path: Path) -> Piece:

@@ -17,6 +17,7 @@ from vision.pieces import (
     FRAMES_A_PIECE,
     Piece,
     input_hash,
+    is_whole,
     load_piece,
     piece_path,
     restore,
@@ -86,7 +87,7 @@ def collect_sightings(
 
 def _existing(folder: Path, camera: str, inputs: str) -> list[Path]:
     paths: list[Path] = []
-    while (path := piece_path(folder, camera, inputs, len(paths))).is_file():
+    while is_whole(path := piece_path(folder, camera, inputs, len(paths))):
         paths.append(path)
     return paths
 

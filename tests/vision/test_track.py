@@ -75,7 +75,7 @@ def test_tracking_json_counts_every_frame(session) -> None:
     assert written["runs"] == json.loads(json.dumps(document["runs"])), "document differs"
 
 
-def test_killed_and_resumed_gives_the_same_bytes(session, tmp_path, monkeypatch) -> None:
+def test_killed_damaged_and_resumed_gives_the_same_bytes(session, tmp_path, monkeypatch) -> None:
     _, run, _ = session
     monkeypatch.setattr(pieces, "FRAMES_A_PIECE", 16)
     monkeypatch.setattr(sightings, "FRAMES_A_PIECE", 16)
@@ -96,6 +96,8 @@ def test_killed_and_resumed_gives_the_same_bytes(session, tmp_path, monkeypatch)
         track(run, cut)
     assert len(list((cut / "results").rglob("*.npz"))) == 5
     monkeypatch.setattr(sightings, "save_piece", saved)
+    damaged = sorted((cut / "results").rglob("*.npz"))[1]
+    damaged.write_bytes(damaged.read_bytes()[:-400])
     track(run, cut)
     for name in ("tracking.json", "tracks/swing.csv"):
         one = (whole / "results" / name).read_bytes()
