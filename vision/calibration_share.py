@@ -20,10 +20,11 @@ from numpy.typing import NDArray
 
 from calib.camera_models import PARAMETER_NAMES
 from cdpr.pose_errors import PoseErrors, error_terms, fitted_terms
+from vision.blocks import blocks
 from vision.fuse import Fit, free_of, whitened
 from vision.linear import linearised
 from vision.poses import Poses
-from vision.run_views import Block, CameraViews, blocks
+from vision.run_views import Block, CameraViews
 from vision.watch import Watch
 
 Array = NDArray[np.float64]

@@ -14,10 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from vision.blocks import blocks
 from vision.linear import camera_matrices, lags, linearised_at
 from vision.pose_kernels import solve_block
 from vision.poses import Poses, motion_of_poses, unknown_poses
-from vision.run_views import Block, CameraViews, blocks
+from vision.run_views import Block, CameraViews
 from vision.single_pose import whitening
 from vision.watch import Watch
 

@@ -18,10 +18,11 @@ from numpy.typing import NDArray
 
 from cdpr.rigid_fit import fit_rigid
 from cdpr.rotation import invert
+from vision.blocks import blocks
 from vision.marker_pose import pose_from_one_view, refined
 from vision.markers import ball_shrink
 from vision.poses import Poses
-from vision.run_views import Block, CameraViews, blocks
+from vision.run_views import Block, CameraViews
 from vision.single_pose import Pose, extrapolate
 from vision.watch import Watch
 

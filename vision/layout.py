@@ -13,10 +13,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from vision.blocks import blocks
 from vision.fuse import Fit, whitened
 from vision.linear import linearised
 from vision.poses import Poses
-from vision.run_views import Block, CameraViews, blocks
+from vision.run_views import Block, CameraViews
 from vision.watch import Watch
 
 Array = NDArray[np.float64]

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vision.pose_kernels import linearise_block
-
-if TYPE_CHECKING:
-    from vision.poses import Poses
-    from vision.run_views import Block, CameraViews
+from vision.poses import Poses
+from vision.run_views import Block, CameraViews
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 
 from calib.camera import Camera
 from cdpr.rotation import exp_rotation
+from vision.blocks import blocks
 from vision.fuse import Fit, whitened
 from vision.linear import linearised
 from vision.poses import Poses
 from vision.rig_kernels import CLOCK, LINE, PER_CAMERA, POSE, add_rig_equations
-from vision.run_views import CameraViews, blocks
+from vision.run_views import CameraViews
 from vision.settings import SURVEY_STD_M
 from vision.watch import Watch
 

@@ -10,16 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vision.linear import linearised
-
-if TYPE_CHECKING:
-    from vision.poses import Poses
-    from vision.run_views import Block, CameraViews
+from vision.poses import Poses
+from vision.run_views import Block, CameraViews
 
 Array = NDArray[np.float64]
 
