@@ -82,8 +82,7 @@ class Search:
         current = rescored(base, self.noise_scales, colour_of(base, self.noise_scales))
         current = self._geometry(current)
         for index in range(MOST_ROUNDS):
-            later = bool(self.rounds)
-            if later and (excess_of(current) < LEAST_EXCESS_LATER or too_small(current.fit)):
+            if index and (excess_of(current) < LEAST_EXCESS_LATER or too_small(current.fit)):
                 break
             done = self._round(current, index)
             self.rounds.append(done)

@@ -99,6 +99,14 @@ def test_a_tilted_pulley_does_not_make_runs_slack(tmp_path):
     assert "pulley_axis" in accepted(found)
 
 
+def test_what_lengths_settle_to_the_noise_leaves_a_verdict_on_the_others(tmp_path):
+    """Nothing is left for forces: they are looked at all the same, and told why not."""
+    _, found = diagnosed(tmp_path, {"anchor_offset": "large"}, 29, (*POINTS, "rotational_drag"))
+    assert list(accepted(found)) == ["anchor_offset"]
+    verdicts = {c["effect"]: c["verdict"] for c in found.document()["candidates"]}
+    assert verdicts["rotational_drag"] == "rejected", verdicts
+
+
 def test_a_small_loss_beside_the_gain_contradicts_nothing():
     nothing = np.zeros(0)
     before = Score(nothing, nothing, nothing, 900.0, np.array([600.0, 100.0, 100.0, 100.0]), 0)
