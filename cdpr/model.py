@@ -272,10 +272,13 @@ def _kinematics(
 def _measured(
     s: _Symbols, instant: Instant, matrix: Expression, owned: Owned, acceleration: ca.Function
 ) -> Expression:
-    measured = s.zeta
-    if isinstance(acceleration, ca.Function):
-        instant = replace(instant, second_rates=acceleration(*s.named.values())[0])
-    for effect, values in owned:
+    measured, measuring = s.zeta, [one for one in owned if one[0].changes_measurement]
+    if not measuring:
+        return measured
+    swings = isinstance(acceleration, ca.Function)  # held by six cables it may as well be still
+    second_rates = acceleration(*s.named.values())[0] if swings else ca.SX.zeros(6)
+    instant = replace(instant, second_rates=second_rates)
+    for effect, values in measuring:
         change = effect.measured(instant, values)
         if change is not None:
             measured = measured + ca.vertcat(change[:3], ca.solve(matrix, change[3:]))

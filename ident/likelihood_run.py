@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cdpr.batch import evaluate, with_jacobian
-from cdpr.effects import Effect, effect_named
+from cdpr.effects import effect_named
 from cdpr.free_motion import coordinate_indices
 from cdpr.robot import POSE_COORDINATES, Array
 from cdpr.rotation import angle_rate_matrix
@@ -190,9 +190,7 @@ def _own_priors(motion: Motion, directions: int, columns: int) -> Array:
 
 
 def _changes_measurement(motion: Motion) -> bool:
-    return any(
-        type(effect_named(name)).measured is not Effect.measured for name in motion.model.effects
-    )
+    return any(effect_named(name).changes_measurement for name in motion.model.effects)
 
 
 def _whitened(poses: Array, samples: Samples, scales: Array) -> Array:

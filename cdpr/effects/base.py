@@ -112,6 +112,11 @@ class Effect:
     needs_tension: bool = False
     stage: str = "force"  # "kinematics", "base" (gravity), "force" or "measurement"
 
+    @property
+    def changes_measurement(self) -> bool:
+        """Whether what is measured is another pose than the platform's."""
+        return type(self).measured is not Effect.measured
+
     def parameters(self, robot: Robot) -> tuple[Parameter, ...]:
         """The unknowns, in the order in which hooks receive them."""
         raise NotImplementedError

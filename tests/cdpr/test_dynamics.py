@@ -142,6 +142,14 @@ def test_six_cables_and_more_have_kinematics_and_forces_but_no_free_motion(n):
         free_basis(model, (), zeta, zeta, model.start_values)
 
 
+@pytest.mark.parametrize("n", [6, 7, 8])
+def test_six_cables_and_more_can_have_a_late_clock(n):
+    model = build_model(ring(n), ("clock_offset",))
+    rates = np.array([0.1, 0.2, 0.3, 0.0, 0.0, 0.5])
+    seen = evaluate(model.measured, 0.0, np.zeros(6), rates, model.robot.inertia, [0.01])[0]
+    assert np.allclose(seen, [0.0, 0.0, 0.0, *(-0.01 * rates[3:])])
+
+
 def test_held_and_pulled_motions_agree():
     model = build_model(robot_named("bologna-4"), ("pulley_friction", "tether"))
     zetas, rates, inertia = allowed_states(model, 5)
