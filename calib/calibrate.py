@@ -13,7 +13,7 @@ from calib.base_tags import SURVEY_STD_M, SurveyedTag, find_base_tags
 from calib.boards import Board, board_from
 from calib.calibration_result import (
     FORMAT,
-    CameraCovariance,
+    camera_covariance,
     camera_entries,
     covariance_entry,
 )
@@ -154,9 +154,7 @@ def calibrate_session(
 
 
 def _vertical(rig: Rig, strings: tuple[StringView, ...], gravity_m_s2: Array) -> dict[str, Any]:
-    known = covariance_entry(rig)
-    covariance = CameraCovariance(tuple(known["names"]), np.array(known["matrix"]))
-    vertical = find_vertical(rig.cameras, strings, covariance)
+    vertical = find_vertical(rig.cameras, strings, camera_covariance(rig))
     return vertical_entry(vertical, strings, gravity_m_s2)
 
 

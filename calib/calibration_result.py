@@ -98,13 +98,20 @@ def read_camera_covariance(path: Path | str) -> CameraCovariance:
     return CameraCovariance(names, matrix)
 
 
-def covariance_entry(rig: Rig) -> dict[str, Any]:
-    """The covariance of the cameras' unknowns as the document stores it."""
+def camera_covariance(rig: Rig) -> CameraCovariance:
+    """The covariance of the cameras' unknowns."""
     end = camera_slices(rig.cameras)[-1].stop
+    names = tuple(named(rig.adjustment.scene)[:end])
+    return CameraCovariance(names, rig.adjustment.covariance[:end, :end])
+
+
+def covariance_entry(rig: Rig) -> dict[str, Any]:
+    """The same as the document stores it."""
+    known = camera_covariance(rig)
     return {
         "tangent": TANGENT,
-        "names": named(rig.adjustment.scene)[:end],
-        "matrix": rig.adjustment.covariance[:end, :end].tolist(),
+        "names": list(known.names),
+        "matrix": known.matrix.tolist(),
     }
 
 

@@ -11,7 +11,7 @@ from cdpr.documents import DataError
 from cdpr.model import Model
 from cdpr.robot import Array
 from ident.consistency import is_possible
-from ident.diagnose.spectrum import residual_power
+from ident.diagnose.spectrum import residual_powers
 from ident.diagnose.temper import tempered
 from ident.joint import State
 from ident.likelihood import LikelihoodFit, fit
@@ -85,4 +85,4 @@ def refuse_few(runs: list[PreparedRun]) -> None:
 
 def _follows(found: LikelihoodFit, noise_scales: Array) -> bool:
     near = astray(found) < SMALL_BESIDE_SWINGS
-    return near or residual_power(found, noise_scales) < AT_THE_NOISE
+    return near or bool(residual_powers(found, noise_scales).mean() < AT_THE_NOISE)

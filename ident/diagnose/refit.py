@@ -11,7 +11,7 @@ from cdpr.model import Model
 from cdpr.robot import Array
 from ident.diagnose.rows import Evidence, Score, score
 from ident.diagnose.screen import BASE, screen
-from ident.diagnose.spectrum import residual_power
+from ident.diagnose.spectrum import residual_powers
 from ident.diagnose.temper import tempered
 from ident.diagnose.variants import effect_of, extended, inside, reduced
 from ident.joint import State
@@ -54,7 +54,7 @@ class Refit:
 
 def colour_of(fit: LikelihoodFit, noise_scales: Array) -> float:
     """How much stronger than the noise the residual is in the band of the motion, >= 1."""
-    power = residual_power(fit, noise_scales)
+    power = float(residual_powers(fit, noise_scales).mean())
     return max(1.0, power * correlation_factor(fit.motions, fit.samples, noise_scales))
 
 

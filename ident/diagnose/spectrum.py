@@ -14,10 +14,10 @@ SMALLEST_RESIDUAL_M = 2e-5
 SMALLEST_RESIDUAL_RAD = 1e-4
 
 
-def residual_power(fit: LikelihoodFit, noise_scales: Array) -> float:
-    """Mean square of the whitened residuals, all runs alike: one at the noise."""
+def residual_powers(fit: LikelihoodFit, noise_scales: Array) -> Array:
+    """Mean square of each run's whitened residuals, (r,): one at the noise."""
     pairs = zip(fit.motions, fit.samples, strict=True)
-    return float(np.mean([np.mean(residuals(m, run, noise_scales) ** 2) for m, run in pairs]))
+    return np.array([np.mean(residuals(m, run, noise_scales) ** 2) for m, run in pairs])
 
 
 def mean_log_spectrum(fit: LikelihoodFit, noise_scales: Array) -> tuple[Array, Array]:

@@ -11,8 +11,9 @@ from dataclasses import replace
 import numpy as np
 
 from cdpr.robot import Array
+from ident.diagnose.spectrum import residual_powers
 from ident.likelihood import LikelihoodFit
-from ident.likelihood_run import Samples, residuals
+from ident.likelihood_run import Samples
 
 OUTSTANDING = 4.0
 
@@ -24,8 +25,8 @@ def tempered(found: LikelihoodFit, noise_scales: Array) -> list[Samples]:
         found: the fit whose residuals decide.
         noise_scales: of metres and radians, (2,).
     """
-    pairs = zip(found.motions, found.samples, strict=True)
-    powers = np.array([np.mean((residuals(m, s, noise_scales) * s.temper) ** 2) for m, s in pairs])
+    held_back = np.array([samples.temper for samples in found.samples])
+    powers = residual_powers(found, noise_scales) * held_back**2
     limit = OUTSTANDING * max(1.0, float(np.median(powers)))
     factors = np.sqrt(np.maximum(1.0, powers / limit))
     return [replace(s, temper=float(f)) for s, f in zip(found.samples, factors, strict=True)]
