@@ -30,20 +30,20 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from calib.board_detection import BoardDetector  # noqa: E402
-from calib.boards import Board  # noqa: E402
-from calib.camera import Camera  # noqa: E402
-from calib.exchange.lens import lens  # noqa: E402
-from calib.rig import solve_rig, start_cameras  # noqa: E402
-from calib.tag_bend import straightened  # noqa: E402
-from calib.tag_patterns import tag_dictionary  # noqa: E402
-from calib.triangulation import triangulate  # noqa: E402
-from calib.truth_checks import rigidly_fitted  # noqa: E402
-from calib.views import make_views  # noqa: E402
-from cdpr.rotation import exp_rotation, transform  # noqa: E402
+from freeswing.calib.board.boards import Board  # noqa: E402
+from freeswing.calib.board.detection import BoardDetector  # noqa: E402
+from freeswing.calib.camera.camera import Camera  # noqa: E402
+from freeswing.calib.exchange.lens import lens  # noqa: E402
+from freeswing.calib.rig.solve_rig import solve_rig, start_cameras  # noqa: E402
+from freeswing.calib.rig.triangulation import triangulate  # noqa: E402
+from freeswing.calib.rig.views import make_views  # noqa: E402
+from freeswing.calib.tags.tag_bend import straightened  # noqa: E402
+from freeswing.calib.tags.tag_patterns import tag_dictionary  # noqa: E402
+from freeswing.calib.verdict.truth_checks import rigidly_fitted  # noqa: E402
+from freeswing.cdpr.rotation import exp_rotation, transform  # noqa: E402
+from freeswing.vision.render.patterns import charuco_patch  # noqa: E402
+from freeswing.vision.render.render_scene import Look, Renderer, Scene, still  # noqa: E402
 from tests.calib import rigs  # noqa: E402
-from vision.patterns import charuco_patch  # noqa: E402
-from vision.simulate import Look, Renderer, Scene, still  # noqa: E402
 
 COLUMNS, ROWS, SQUARE_M, MARKER_M, FAMILY = 9, 6, 0.07, 0.0525, "DICT_5X5_100"
 REPEATS = 3

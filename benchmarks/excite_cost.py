@@ -17,14 +17,13 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "ident"))
-from excitation_bench import bologna_4
-
-from cdpr.dynamics import body_regressor, internal_regressor
-from cdpr.free_motion import free_basis
-from cdpr.rotation import angle_rate_matrix, angles_from_matrix, matrix_from_angles
-from cdpr.rotation import quaternion_from_matrix as to_quaternion
-from ident.excitation import ExcitationOptions, make_bench, plan_swings
-from ident.excitation_choice import stacked_cost
+from freeswing.cdpr.model.free_motion import free_basis
+from freeswing.cdpr.model.internal_dynamics import body_regressor, internal_regressor
+from freeswing.cdpr.rotation import angle_rate_matrix, angles_from_matrix, matrix_from_angles
+from freeswing.cdpr.rotation import quaternion_from_matrix as to_quaternion
+from freeswing.excite.choose_swings import stacked_cost
+from freeswing.excite.excite import ExcitationOptions, make_bench, plan_swings
+from tests.excite.excitation_bench import bologna_4
 from tests.oracle.newton_euler import simulate
 from tests.oracle.world import Body, plain_world
 

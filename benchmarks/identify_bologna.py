@@ -16,11 +16,11 @@ from pathlib import Path
 
 import numpy as np
 
-from freeswing.session import read_session
-from freeswing.swings import load_robot, load_swings, load_target
-from ident.geometry import GeometryPriors
-from ident.identify import IdentifySettings, identify
-from ident.signals import SignalSettings
+from freeswing.ident.identify import IdentifySettings, identify
+from freeswing.ident.likelihood.cable_ends import GeometryPriors
+from freeswing.ident.signals.derivatives import SignalSettings
+from freeswing.session.load_swings import load_robot, load_swings, load_target
+from freeswing.session.session_file import read_session
 
 
 def main() -> None:

@@ -23,17 +23,17 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from cdpr.robot import INERTIA_NAMES, Array
-from cdpr.simulation import Motion
-from ident.fidim import fidim
-from ident.guess import first_state
-from ident.joint import State
-from ident.likelihood import fit
-from ident.motion import regressor
-from ident.prepare import prepare_runs
-from ident.runs import SwingRun
-from ident.samples import prepare
-from ident.signals import SignalSettings
+from freeswing.cdpr.model.regressor import regressor
+from freeswing.cdpr.robot import INERTIA_NAMES, Array
+from freeswing.cdpr.simulation.free_swing import Motion
+from freeswing.ident.fidim.fidim import fidim
+from freeswing.ident.likelihood.guess_run_start import first_state
+from freeswing.ident.likelihood.joint_problem import State
+from freeswing.ident.likelihood.likelihood import fit
+from freeswing.ident.likelihood.raw_samples import prepare
+from freeswing.ident.runs import SwingRun
+from freeswing.ident.signals.derivatives import SignalSettings
+from freeswing.ident.signals.prepare import prepare_runs
 from tests.ident.swings import PAPER_LENGTHS_M, TRUE_INERTIA, paper_model, recorded, tilted_swing
 
 NOISE_M = 1e-4

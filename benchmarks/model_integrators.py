@@ -17,12 +17,11 @@ from harness import Row, best_of, publish
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "cdpr")]
 
-from model_cases import released, rest_of, robot_named  # noqa: E402
-
-from cdpr.batch import evaluate  # noqa: E402
-from cdpr.model import build_model  # noqa: E402
-from cdpr.sensitivity import linearise  # noqa: E402
-from cdpr.simulation import simulate  # noqa: E402
+from freeswing.cdpr.model.batch import evaluate  # noqa: E402
+from freeswing.cdpr.model.equations import build_model  # noqa: E402
+from freeswing.cdpr.simulation.free_swing import simulate  # noqa: E402
+from freeswing.cdpr.simulation.sensitivity import linearise  # noqa: E402
+from tests.cdpr.model_cases import released, rest_of, robot_named  # noqa: E402
 
 TIMES_S = np.arange(1001) / 100.0
 SPAN = (0.0, 10.0)

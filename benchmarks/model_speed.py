@@ -17,17 +17,16 @@ from harness import Row, best_of, publish
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "cdpr")]
 
-from model_cases import MIDDLE, TABLE_2, released, rest_of, robot_named  # noqa: E402
-
-from cdpr.batch import Bound, evaluate, only  # noqa: E402
-from cdpr.dynamics import body_regressor, internal_regressor, twist_of  # noqa: E402
-from cdpr.elastic import elastic_model, elastic_values  # noqa: E402
-from cdpr.free_motion import assemble, free_basis  # noqa: E402
-from cdpr.model import build_model  # noqa: E402
-from cdpr.rotation import matrix_from_angles  # noqa: E402
-from cdpr.sensitivity import linearise  # noqa: E402
-from cdpr.simulation import simulate  # noqa: E402
-from cdpr.statics import equilibrium_at_lengths  # noqa: E402
+from freeswing.cdpr.model.batch import Bound, evaluate, only  # noqa: E402
+from freeswing.cdpr.model.elastic_motion import elastic_model, elastic_values  # noqa: E402
+from freeswing.cdpr.model.equations import build_model  # noqa: E402
+from freeswing.cdpr.model.free_motion import assemble, free_basis  # noqa: E402
+from freeswing.cdpr.model.internal_dynamics import body_regressor, internal_regressor, twist_of  # noqa: E402
+from freeswing.cdpr.model.statics import equilibrium_at_lengths  # noqa: E402
+from freeswing.cdpr.rotation import matrix_from_angles  # noqa: E402
+from freeswing.cdpr.simulation.free_swing import simulate  # noqa: E402
+from freeswing.cdpr.simulation.sensitivity import linearise  # noqa: E402
+from tests.cdpr.model_cases import MIDDLE, TABLE_2, released, rest_of, robot_named  # noqa: E402
 
 TIMES_S = np.arange(1001) / 100.0
 SAMPLES = 100_000
@@ -37,7 +36,8 @@ def start_up() -> list[Row]:
     """A fresh process that imports the model and builds one."""
     code = (
         "import time; t = time.process_time()\n"
-        "from cdpr.model import build_model; from cdpr.simulation import simulate\n"
+        "from freeswing.cdpr.model.equations import build_model\n"
+        "from freeswing.cdpr.simulation.free_swing import simulate\n"
         "a = time.process_time() - t; t = time.process_time()\n"
         "from tests.oracle.robots import declared_robot; r = declared_robot('bologna-4')\n"
         "t = time.process_time(); build_model(r); print(a, time.process_time() - t)"

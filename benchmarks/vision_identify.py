@@ -19,10 +19,10 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from cdpr.robot import INERTIA_NAMES
+from freeswing.cdpr.robot import INERTIA_NAMES
 from freeswing.demo.filmed import write_filmed_session
 from freeswing.main import main as freeswing
-from freeswing.session import read_session
+from freeswing.session.session_file import read_session
 
 NO_DRAG = (0.0, 0.6)
 

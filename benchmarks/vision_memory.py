@@ -23,15 +23,15 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from calib.cameras_file import read_cameras, write_cameras
-from calib.recordings import Recording
-from cdpr.target import read_target
+from freeswing.calib.board.recordings import Recording
+from freeswing.calib.camera.cameras_file import read_cameras, write_cameras
+from freeswing.cdpr.measured.target import read_target
+from freeswing.vision.look.pieces import FRAMES_A_PIECE, load_piece
+from freeswing.vision.look.sightings import collect_sightings
+from freeswing.vision.look.watched_target import Watch
+from freeswing.vision.settings import Settings
+from freeswing.vision.track_run import track_run
 from tests.vision.loops import PERIOD, RATE_HZ, small_cameras, write_looped_session
-from vision.pieces import FRAMES_A_PIECE, load_piece
-from vision.run_track import track_run
-from vision.settings import Settings
-from vision.sightings import collect_sightings
-from vision.watch import Watch
 
 CAMERAS = 8
 FOLLOWED = (400, 1600, 6400)

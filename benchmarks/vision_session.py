@@ -23,12 +23,16 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from calib.calibrate import calibrate_session
-from calib.camera import Camera
-from calib.cameras_file import read_cameras
-from cdpr.rotation import exp_rotation, log_rotation
-from cdpr.target import Target
-from cdpr.trajectory_files import read_trajectory
+from freeswing.calib.calibrate import calibrate_session
+from freeswing.calib.camera.camera import Camera
+from freeswing.calib.camera.cameras_file import read_cameras
+from freeswing.cdpr.files.trajectory_files import read_trajectory
+from freeswing.cdpr.measured.target import Target
+from freeswing.cdpr.rotation import exp_rotation, log_rotation
+from freeswing.vision.render.patterns import charuco_patch, plain_patch
+from freeswing.vision.render.record import record
+from freeswing.vision.rig.rig_effects import moved_by
+from freeswing.vision.track_session import track_session
 from tests.vision.scenes import (
     SurveyedTag,
     arc_of_cameras,
@@ -38,10 +42,6 @@ from tests.vision.scenes import (
     standing_tags,
     swing,
 )
-from vision.patterns import charuco_patch, plain_patch
-from vision.record import record
-from vision.rig_effects import moved_by
-from vision.track import track_session
 
 BOARD = {
     "kind": "charuco",

@@ -21,15 +21,15 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from calib.camera import Camera
-from calib.recordings import Recording, read_frames
-from calib.tag_patterns import cut_dictionary, tag_dictionary
-from cdpr.target import Tag, Target
+from freeswing.calib.board.recordings import Recording, read_frames
+from freeswing.calib.camera.camera import Camera
+from freeswing.calib.tags.tag_patterns import cut_dictionary, tag_dictionary
+from freeswing.cdpr.measured.target import Tag, Target
+from freeswing.vision.look.follow import Follower
+from freeswing.vision.look.video import write_video
+from freeswing.vision.look.watched_target import Watch
+from freeswing.vision.render.render_scene import Look, Renderer
 from tests.vision.scenes import facing, look_at, scene_of, swing
-from vision.follow import Follower
-from vision.simulate import Look, Renderer
-from vision.video import write_video
-from vision.watch import Watch
 
 SIZE_PX = (1280, 1024)
 FOCAL_PX = 1300.0

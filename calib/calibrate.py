@@ -9,32 +9,32 @@ from typing import Any
 
 import numpy as np
 
-from calib.base_tags import SURVEY_STD_M, SurveyedTag, find_base_tags
-from calib.boards import Board, board_from
-from calib.calibration_result import (
+from freeswing.calib.board.boards import Board, board_from
+from freeswing.calib.board.recordings import find_recordings
+from freeswing.calib.board.sightings import Sightings, gather, see_boards
+from freeswing.calib.camera.camera import Camera
+from freeswing.calib.camera.cameras_file import write_cameras
+from freeswing.calib.camera.intrinsics import CameraStart
+from freeswing.calib.camera.lens_choice import lens_warnings, weigh_lenses
+from freeswing.calib.camera.lens_models import Array
+from freeswing.calib.rig.coarse_clocks import board_moves, coarse_offsets_s
+from freeswing.calib.rig.solve_rig import Rig, solve_rig, start_cameras, tie_to_base
+from freeswing.calib.rig.views import Views
+from freeswing.calib.tags.base_tags import SURVEY_STD_M, SurveyedTag, find_base_tags
+from freeswing.calib.tags.tag_bend import straightened
+from freeswing.calib.verdict.calibration_result import (
     FORMAT,
     camera_covariance,
     camera_entries,
     covariance_entry,
 )
-from calib.camera import Camera
-from calib.camera_models import Array
-from calib.cameras_file import write_cameras
-from calib.clocks import board_moves, coarse_offsets_s
-from calib.intrinsics import CameraStart
-from calib.lens_choice import lens_warnings, weigh_lenses
-from calib.plumb_line import StringView, find_vertical
-from calib.plumb_line_file import read_plumb_line, vertical_entry
-from calib.recordings import find_recordings
-from calib.rig import Rig, solve_rig, start_cameras, tie_to_base
-from calib.sightings import Sightings, gather, see_boards
-from calib.survey_check import SurveyCheck, check_survey
-from calib.tag_bend import straightened
-from calib.trust import Verdict, judge
-from calib.truth_checks import check_truth
-from calib.views import Views
-from cdpr.documents import DataError, write_json
-from cdpr.robot import STANDARD_GRAVITY_M_S2
+from freeswing.calib.verdict.plumb_line import StringView, find_vertical
+from freeswing.calib.verdict.plumb_line_file import read_plumb_line, vertical_entry
+from freeswing.calib.verdict.survey_check import SurveyCheck, check_survey
+from freeswing.calib.verdict.trust import Verdict, judge
+from freeswing.calib.verdict.truth_checks import check_truth
+from freeswing.cdpr.files.documents import DataError, write_json
+from freeswing.cdpr.robot import STANDARD_GRAVITY_M_S2
 
 Progress = Callable[[str, float], None]
 
@@ -91,7 +91,8 @@ def calibrate_session(
         results_folder: takes calibration.json, None for none.
         model: lens model of every camera.
         survey_std_m: standard deviation of a surveyed coordinate; measured from the fit when None.
-        plumb_line: points clicked along hanging strings, see `calib.plumb_line_file`, or None.
+        plumb_line: points clicked along hanging strings, see `calib.verdict.plumb_line_file`, or
+            None.
         gravity_m_s2: declared gravity in the base frame, which they are held against, (3,).
         progress: told a label and the fraction done.
 

@@ -60,7 +60,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def exit_status(failure: BaseException) -> int:
     """2 for a file or a flag that is wrong, 1 for data that cannot give a result."""
-    from cdpr.problems import InputError
+    from freeswing.cdpr.files.problems import InputError
 
     unusable_file = isinstance(failure, OSError) and failure.filename is not None
     return WRONG_INPUT if isinstance(failure, InputError) or unusable_file else NO_RESULT
@@ -68,7 +68,7 @@ def exit_status(failure: BaseException) -> int:
 
 def describe(failure: BaseException) -> str:
     """One plain sentence for a failure; what is not ours to explain says how to learn more."""
-    from cdpr.problems import DataError, InputError
+    from freeswing.cdpr.files.problems import DataError, InputError
 
     if isinstance(failure, InputError | DataError):
         return str(failure)

@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cdpr.robot import INERTIA_NAMES, Array
-from ident.consistency import Consistency, consistency
-from ident.fidim import FidimEstimate
-from ident.fidim_calibration import CalibrationShare
-from ident.frozen import freeze
-from ident.payload import MassEstimate
-from ident.runs import DroppedRun
-from ident.weighted import WeightedSolution
+from freeswing.cdpr.frozen import freeze
+from freeswing.cdpr.robot import INERTIA_NAMES, Array
+from freeswing.ident.fidim.calibration_share import CalibrationShare
+from freeswing.ident.fidim.fidim import FidimEstimate
+from freeswing.ident.fidim.payload_mass import MassEstimate
+from freeswing.ident.fidim.weighted_least_squares import WeightedSolution
+from freeswing.ident.judge.consistency import Consistency, consistency
+from freeswing.ident.runs import DroppedRun
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +35,7 @@ class Estimate:
         held_cost: see `Consistency.cost`; None where the inertia was free.
         reduced: essential parameters solved again alone: names, values, standard deviations.
         calibration: amplitudes of the cameras' calibration errors that go with the values
-            (`ident.calibration`), (r,); empty where none were fitted.
+            (`ident.likelihood.calibration_modes`), (r,); empty where none were fitted.
         extra: more numbers for the result file, JSON-ready.
     """
 

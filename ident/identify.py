@@ -7,17 +7,21 @@ from typing import Any
 
 import numpy as np
 
-from cdpr.documents import DataError
-from cdpr.model import Model, build_model
-from cdpr.robot import Robot
-from ident.calibration import freed
-from ident.comparison import ParameterComparison, compare
-from ident.estimate import Estimate
-from ident.fidim_stage import Weighting, fidim_estimates
-from ident.geometry import GeometryPriors, corrected
-from ident.law import LawlessError, fidim_complaint
-from ident.maximum_likelihood import Asked, best_ml_estimate
-from ident.prepare import (
+from freeswing.cdpr.files.documents import DataError
+from freeswing.cdpr.model.equations import Model, build_model
+from freeswing.cdpr.robot import Robot
+from freeswing.ident.estimate import Estimate
+from freeswing.ident.fidim.fidim_stage import Weighting, fidim_estimates
+from freeswing.ident.judge.comparison import ParameterComparison, compare
+from freeswing.ident.judge.free_swing_law import LawlessError, fidim_complaint
+from freeswing.ident.judge.validate import ValidatedRun, validate_run
+from freeswing.ident.likelihood.cable_ends import GeometryPriors, corrected
+from freeswing.ident.likelihood.calibration_modes import freed
+from freeswing.ident.likelihood.inertia_starts import likelihood_starts
+from freeswing.ident.likelihood.maximum_likelihood import Asked, best_ml_estimate
+from freeswing.ident.runs import SwingRun
+from freeswing.ident.signals.derivatives import SignalSettings
+from freeswing.ident.signals.prepare import (
     LARGEST_AMPLIFICATION,
     PreparedRuns,
     Progress,
@@ -29,10 +33,6 @@ from ident.prepare import (
     usable,
     without,
 )
-from ident.runs import SwingRun
-from ident.signals import SignalSettings
-from ident.starts import likelihood_starts
-from ident.validate import ValidatedRun, validate_run
 
 FORMAT = "freeswing-identification/1"
 

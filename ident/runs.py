@@ -7,9 +7,9 @@ from typing import Literal
 
 import numpy as np
 
-from cdpr.pose_errors import PoseErrors
-from cdpr.robot import Array, frozen_array
-from cdpr.trajectory import Trajectory
+from freeswing.cdpr.measured.pose_errors import PoseErrors
+from freeswing.cdpr.measured.trajectory import Trajectory
+from freeswing.cdpr.robot import Array, frozen_array
 
 Role = Literal["identify", "validate"]
 

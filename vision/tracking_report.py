@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from cdpr.pose_errors import PoseErrors
-from vision.calibration_share import common_errors
-from vision.fuse import Fit
-from vision.layout import LayoutChange
-from vision.run_track import RunTrack
-from vision.watch import Watch
+from freeswing.cdpr.measured.pose_errors import PoseErrors
+from freeswing.vision.fuse.calibration_share import common_errors
+from freeswing.vision.fuse.fuse_cameras import Fit
+from freeswing.vision.fuse.tag_layout import LayoutChange
+from freeswing.vision.look.watched_target import Watch
+from freeswing.vision.track_run import RunTrack
 
 
 def tracking_document(
@@ -24,7 +24,7 @@ def tracking_document(
     which a camera's mean ray passes the platform that all cameras agree on. `position_std_mm`
     is the scatter of single poses, as in the track; `calibration_std_mm` is how far the
     calibration's own uncertainty may shift all of them together (null when it is not known),
-    and `calibration_errors` how: see `cdpr.pose_errors.PoseErrors`.
+    and `calibration_errors` how: see `cdpr.measured.pose_errors.PoseErrors`.
     """
     errors = common_errors([track.calibration for track in tracks])
     runs = [_run(track, watch, own) for track, own in zip(tracks, errors, strict=True)]

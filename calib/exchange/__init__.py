@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from calib.camera import Camera
-from calib.cameras_file import read_cameras, write_cameras
-from cdpr.documents import InputError
+from freeswing.calib.camera.camera import Camera
+from freeswing.calib.camera.cameras_file import read_cameras, write_cameras
+from freeswing.cdpr.files.documents import InputError
 
 FORMATS = ("freeswing", "opencv", "kalibr", "ros", "anipose", "colmap", "qualisys")
 _LOOKED_AT_BYTES = 20_000
@@ -102,4 +102,4 @@ def _refuse_impossible(path: Path, cameras: Sequence[Camera]) -> None:
 def _module(kind: str):
     if kind not in _MODULES:
         raise InputError(f"camera format {kind!r} is not one of {', '.join(FORMATS)}")
-    return importlib.import_module(f"calib.exchange.{_MODULES[kind]}")
+    return importlib.import_module(f"freeswing.calib.exchange.{_MODULES[kind]}")

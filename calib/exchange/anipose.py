@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from calib.camera import Camera
-from calib.camera_models import FISHEYE
-from calib.exchange.lens import ODD_ENTRY, distortion, lens, matrix, shortest, usable
-from cdpr.documents import InputError, dump_toml, read_text
-from cdpr.rotation import exp_rotation, log_rotation, transform
+from freeswing.calib.camera.camera import Camera
+from freeswing.calib.camera.lens_models import FISHEYE
+from freeswing.calib.exchange.lens import ODD_ENTRY, distortion, lens, matrix, shortest, usable
+from freeswing.cdpr.files.documents import InputError, dump_toml, read_text
+from freeswing.cdpr.rotation import exp_rotation, log_rotation, transform
 
 _MOST_BYTES = 1 << 24
 

@@ -11,11 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
-from calib.camera import Camera
-from calib.camera_models import PARAMETER_NAMES
-from calib.exchange.lens import ODD_ENTRY, usable
-from cdpr.documents import InputError, read_text, replace_file
-from cdpr.rotation import matrix_from_quaternion, quaternion_from_matrix, transform
+from freeswing.calib.camera.camera import Camera
+from freeswing.calib.camera.lens_models import PARAMETER_NAMES
+from freeswing.calib.exchange.lens import ODD_ENTRY, usable
+from freeswing.cdpr.files.documents import InputError, read_text, replace_file
+from freeswing.cdpr.rotation import matrix_from_quaternion, quaternion_from_matrix, transform
 
 HALF_PIXEL = 0.5
 _MOST_BYTES = 1 << 28

@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from calib.camera import Camera
-from calib.camera_models import FISHEYE
-from calib.exchange.lens import ODD_ENTRY, distortion, lens, shortest, usable
-from calib.exchange.plain_yaml import load_yaml
-from cdpr.documents import InputError, replace_file
-from cdpr.rotation import invert
+from freeswing.calib.camera.camera import Camera
+from freeswing.calib.camera.lens_models import FISHEYE
+from freeswing.calib.exchange.lens import ODD_ENTRY, distortion, lens, shortest, usable
+from freeswing.calib.exchange.plain_yaml import load_yaml
+from freeswing.cdpr.files.documents import InputError, replace_file
+from freeswing.cdpr.rotation import invert
 
 
 def read(path: Path) -> tuple[Camera, ...]:

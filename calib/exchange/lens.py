@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from calib.camera import Camera
-from calib.camera_models import FISHEYE, Array, full_parameters
-from cdpr.documents import InputError
+from freeswing.calib.camera.camera import Camera
+from freeswing.calib.camera.lens_models import FISHEYE, Array, full_parameters
+from freeswing.cdpr.files.documents import InputError
 
 # places of FULL_OPENCV's k1 k2 p1 p2 k3 k4 k5 k6 in both lists are the same
 _MOST_COEFFICIENTS = 8

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from cdpr.documents import InputError, read_text
+from freeswing.cdpr.files.documents import InputError, read_text
 
 MOST_BYTES = 1 << 24
 MOST_DEEP = 20

@@ -13,11 +13,11 @@ from pathlib import Path
 
 import numpy as np
 
-from calib.camera import Camera
-from calib.camera_models import FISHEYE
-from calib.exchange.lens import ODD_ENTRY, distortion, lens, shortest, usable
-from cdpr.documents import InputError, read_text, replace_file
-from cdpr.rotation import invert, transform
+from freeswing.calib.camera.camera import Camera
+from freeswing.calib.camera.lens_models import FISHEYE
+from freeswing.calib.exchange.lens import ODD_ENTRY, distortion, lens, shortest, usable
+from freeswing.cdpr.files.documents import InputError, read_text, replace_file
+from freeswing.cdpr.rotation import invert, transform
 
 SUBPIXELS = 64.0
 _HALF_TURN = np.diag([1.0, -1.0, -1.0])

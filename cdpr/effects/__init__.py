@@ -1,4 +1,4 @@
-"""The catalogue of effects: every module of this folder that defines `EFFECT` is one.
+"""The catalogue of effects: every module below this folder that defines `EFFECT` is one.
 
 Adding an effect is adding a file; the simulator, the fits and the diagnosis read it from here.
 """
@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from functools import cache
 from importlib import import_module
-from pkgutil import iter_modules
+from pkgutil import walk_packages
 
-from cdpr.effects.base import Effect, Instant, Parameter
+from freeswing.cdpr.effects.base import Effect, Instant, Parameter
 
 __all__ = ["Effect", "Instant", "Parameter", "catalogue", "effect_named"]
 
@@ -17,7 +17,7 @@ __all__ = ["Effect", "Instant", "Parameter", "catalogue", "effect_named"]
 @cache
 def catalogue() -> dict[str, Effect]:
     """Every effect by name, in alphabetical order."""
-    modules = (import_module(f"{__name__}.{info.name}") for info in iter_modules(__path__))
+    modules = (import_module(info.name) for info in walk_packages(__path__, f"{__name__}."))
     effects = (module.EFFECT for module in modules if hasattr(module, "EFFECT"))
     return {effect.name: effect for effect in sorted(effects, key=lambda e: e.name)}
 

@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 
 import casadi as ca
 
-from cdpr.body import Expression, along
-from cdpr.pulley import CableState, Geometry
-from cdpr.robot import Robot
+from freeswing.cdpr.model.body import Expression, along
+from freeswing.cdpr.model.pulley import CableState, Geometry
+from freeswing.cdpr.robot import Robot
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from contextlib import AbstractContextManager
 
-    from freeswing.crew import Crew
-    from freeswing.session import Session
+    from freeswing.session.session_file import Session
+    from freeswing.workers.crew import Crew
 
 
 def add_session(parser: ArgumentParser) -> None:
@@ -39,7 +39,7 @@ def add_workers(parser: ArgumentParser) -> None:
 
 def open_session(options: Namespace) -> Session:
     """The session that the flags of `add_session` name."""
-    from freeswing.session import read_session
+    from freeswing.session.session_file import read_session
 
     session, results = options.session, options.results
     if getattr(options, "cluster", None):  # whose workers start in other folders
@@ -49,6 +49,6 @@ def open_session(options: Namespace) -> Session:
 
 def crew_of(options: Namespace, session: Session) -> AbstractContextManager[Crew]:
     """Those whom the flags of `add_workers` name."""
-    from freeswing.crew import crew_for
+    from freeswing.workers.crew import crew_for
 
     return crew_for(session, options.workers, options.cluster)

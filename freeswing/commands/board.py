@@ -12,8 +12,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
     from freeswing.printing.sheet import Sheet
-    from freeswing.session import Session
-    from vision.patterns import Patch
+    from freeswing.session.session_file import Session
+    from freeswing.vision.render.patterns import Patch
 
 
 FORMATS = ("pdf", "svg", "png")
@@ -37,7 +37,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(options: Namespace, console: Console) -> None:
     """A file for the board and for each tag on the platform and on the frame."""
-    from cdpr.documents import DataError, InputError, replace_file
+    from freeswing.cdpr.files.documents import DataError, InputError, replace_file
 
     if not 10.0 <= options.dpi <= MOST_DPI:
         raise InputError(f"--dpi {options.dpi:g} must lie in 10 to {MOST_DPI:g}")
@@ -73,8 +73,8 @@ def _sheets(session: Session) -> Iterator[tuple[str, Sheet]]:
     import numpy as np
 
     from freeswing.printing.sheet import Sheet
-    from freeswing.swings import load_target
-    from vision.patterns import tag_patch
+    from freeswing.session.load_swings import load_target
+    from freeswing.vision.render.patterns import tag_patch
 
     calibration = session.calibration
     if calibration is not None and calibration.board is not None:
@@ -92,7 +92,7 @@ def _sheets(session: Session) -> Iterator[tuple[str, Sheet]]:
 
 
 def _board_label(table: Mapping[str, object]) -> str:
-    from calib.boards import board_from
+    from freeswing.calib.board.boards import board_from
 
     board = board_from(table)
     counts = f"{board.columns} x {board.rows}"
@@ -105,8 +105,8 @@ def _board_label(table: Mapping[str, object]) -> str:
 
 
 def _board_patch(table: Mapping[str, object]) -> Patch:
-    from calib.boards import board_from
-    from vision.patterns import aprilgrid_patch, charuco_patch, chessboard_patch
+    from freeswing.calib.board.boards import board_from
+    from freeswing.vision.render.patterns import aprilgrid_patch, charuco_patch, chessboard_patch
 
     board = board_from(table)
     counts = (board.columns, board.rows)

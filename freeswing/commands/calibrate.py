@@ -9,8 +9,8 @@ from freeswing.commands.arguments import add_session, open_session
 from freeswing.console import Console
 
 if TYPE_CHECKING:
-    from freeswing.crew import Crew
-    from freeswing.session import Session
+    from freeswing.session.session_file import Session
+    from freeswing.workers.crew import Crew
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -22,7 +22,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(options: Namespace, console: Console) -> None:
     """Calibrate, write cameras.toml and results/calibration.json."""
-    from freeswing.stages import CALIBRATE
+    from freeswing.session.stages import CALIBRATE
 
     session = open_session(options)
     result = CALIBRATE.take(session, console, {"model": options.model})
@@ -34,10 +34,10 @@ def make(
     session: Session, console: Console, settings: dict[str, Any], crew: Crew
 ) -> list[tuple[str, dict[str, Any]]]:
     """cameras.toml on disk, and calibration.json as a document."""
-    from calib.calibrate import calibrate_session
-    from cdpr.documents import InputError
-    from cdpr.robot import STANDARD_GRAVITY_M_S2
-    from cdpr.robot_file import read_robot
+    from freeswing.calib.calibrate import calibrate_session
+    from freeswing.cdpr.files.documents import InputError
+    from freeswing.cdpr.files.robot_file import read_robot
+    from freeswing.cdpr.robot import STANDARD_GRAVITY_M_S2
 
     source = session.calibration
     if source is None or source.recordings is None or source.board is None:

@@ -15,7 +15,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(options: Namespace, console: Console) -> None:
     """Examine the session; fails where a finding keeps a command from a result."""
-    from cdpr.documents import DataError, write_json
+    from freeswing.cdpr.files.documents import DataError, write_json
     from freeswing.doctor.examine import examine
 
     session = open_session(options)

@@ -32,14 +32,14 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(options: Namespace, console: Console) -> None:
     """Read, convert, write; markers stay markers where both formats hold markers."""
-    from cdpr.documents import InputError
+    from freeswing.cdpr.files.documents import InputError
 
     source, result = Path(options.source), Path(options.result)
     if result.exists() and source.exists() and result.samefile(source):
         raise InputError(f"{result}: source and result are the same file; name another")
     losses: list[str] = []
     if _is_of_cameras(source, options):
-        from freeswing.camera_conversion import convert_cameras
+        from freeswing.export.camera_conversion import convert_cameras
 
         _refuse_trajectory(result)
         losses = convert_cameras(source, result, options.source_format, options.to)
@@ -57,14 +57,14 @@ def _is_of_cameras(source: Path, options: Namespace) -> bool:
 
 
 def _refuse_trajectory(result: Path) -> None:
-    from cdpr.documents import InputError
+    from freeswing.cdpr.files.documents import InputError
 
     if result.suffix.lower() in SUFFIXES:
         raise InputError(f"{result}: cameras do not become a trajectory; its ending says it is one")
 
 
 def _convert_trajectory(source: Path, result: Path, options: Namespace) -> None:
-    from cdpr.documents import InputError
+    from freeswing.cdpr.files.documents import InputError
 
     if result.suffix.lower() not in SUFFIXES:
         known = ", ".join(SUFFIXES)
@@ -77,7 +77,7 @@ def _convert_trajectory(source: Path, result: Path, options: Namespace) -> None:
 
 
 def _write_poses(source: Path, result: Path, options: Namespace) -> None:
-    from cdpr.trajectory_files import read_trajectory, write_csv, write_tum
+    from freeswing.cdpr.files.trajectory_files import read_trajectory, write_csv, write_tum
 
     trajectory = read_trajectory(source, _robot(options), _target(options))
     write = write_csv if result.suffix.lower() == ".csv" else write_tum
@@ -85,9 +85,14 @@ def _write_poses(source: Path, result: Path, options: Namespace) -> None:
 
 
 def _write_markers(source: Path, result: Path, options: Namespace) -> None:
-    from cdpr.documents import InputError
-    from cdpr.marker_recording import recording_from_poses
-    from cdpr.trajectory_files import read_recording, read_trajectory, write_c3d, write_trc
+    from freeswing.cdpr.files.documents import InputError
+    from freeswing.cdpr.files.trajectory_files import (
+        read_recording,
+        read_trajectory,
+        write_c3d,
+        write_trc,
+    )
+    from freeswing.cdpr.measured.marker_recording import recording_from_poses
 
     if source.suffix.lower() in (".trc", ".c3d"):
         recording = read_recording(source)
@@ -104,12 +109,12 @@ def _write_markers(source: Path, result: Path, options: Namespace) -> None:
 
 
 def _robot(options: Namespace):
-    from cdpr.robot_file import read_robot
+    from freeswing.cdpr.files.robot_file import read_robot
 
     return read_robot(options.robot) if options.robot else None
 
 
 def _target(options: Namespace):
-    from cdpr.target import read_target
+    from freeswing.cdpr.measured.target import read_target
 
     return read_target(options.target) if options.target else None

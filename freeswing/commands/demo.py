@@ -23,9 +23,9 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(options: Namespace, console: Console) -> None:
     """Record, solve, and end with the report's path."""
-    from cdpr.documents import InputError
+    from freeswing.cdpr.files.documents import InputError
     from freeswing.commands.run import run_session
-    from freeswing.session import read_session
+    from freeswing.session.session_file import read_session
 
     folder = Path(options.folder)
     folder = folder.resolve() if options.cluster else folder

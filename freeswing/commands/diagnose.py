@@ -9,8 +9,8 @@ from freeswing.commands.arguments import add_session, add_workers, crew_of, open
 from freeswing.console import Console
 
 if TYPE_CHECKING:
-    from freeswing.crew import Crew
-    from freeswing.session import Session
+    from freeswing.session.session_file import Session
+    from freeswing.workers.crew import Crew
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -27,7 +27,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(options: Namespace, console: Console) -> None:
     """Diagnose and say before and after."""
-    from freeswing.stages import DIAGNOSE
+    from freeswing.session.stages import DIAGNOSE
 
     session = open_session(options)
     with crew_of(options, session) as crew:
@@ -42,11 +42,11 @@ def make(
     """diagnosis.json and diagnosis_motion.json as documents."""
     import os
 
-    from cdpr.documents import InputError
-    from cdpr.effects import catalogue
-    from freeswing.motions import ladder_motions
-    from freeswing.swings import load_robot, load_swings, load_target
-    from ident.diagnose.diagnose import diagnose
+    from freeswing.cdpr.effects import catalogue
+    from freeswing.cdpr.files.documents import InputError
+    from freeswing.ident.diagnose.diagnose import diagnose
+    from freeswing.results.motions import ladder_motions
+    from freeswing.session.load_swings import load_robot, load_swings, load_target
 
     only = settings["only"]
     for name in only or ():

@@ -46,7 +46,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(options: Namespace, console: Console) -> None:
     """Plan, and say what the plan is worth."""
-    from ident.excitation import ExcitationOptions, SwingLimits, excite
+    from freeswing.excite.excite import ExcitationOptions, SwingLimits, excite
 
     path = Path(options.robot)
     limits = SwingLimits(tension_N=tuple(options.tension_n), reach_m=options.reach_m)

@@ -11,8 +11,8 @@ from freeswing.console import Console
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from cdpr.robot import Robot
-    from freeswing.exports import Inertia
+    from freeswing.cdpr.robot import Robot
+    from freeswing.export.write_exports import Inertia
 
 SUFFIXES = {"urdf": ".urdf", "mjcf": ".xml", "plain": ".json"}
 
@@ -31,9 +31,9 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(options: Namespace, console: Console) -> None:
     """Write results/platform.urdf, .xml or .json."""
-    from cdpr.documents import InputError, replace_file, write_json
-    from freeswing import exports
-    from freeswing.swings import load_robot
+    from freeswing.cdpr.files.documents import InputError, replace_file, write_json
+    from freeswing.export import write_exports as exports
+    from freeswing.session.load_swings import load_robot
 
     # `--json` names the format here, besides its use in every command: the file on stdout.
     kind = options.kind or ("plain" if options.json else None)
@@ -53,8 +53,8 @@ def run(options: Namespace, console: Console) -> None:
 
 
 def _inertia(options: Namespace, results: Path, robot: Robot) -> Inertia:
-    from cdpr.documents import DataError
-    from freeswing.exports import inertia_from
+    from freeswing.cdpr.files.documents import DataError
+    from freeswing.export.write_exports import inertia_from
     from freeswing.report.material import ESTIMATE_ORDER, read_result
 
     identification = read_result(results / "identification.json", "identification")

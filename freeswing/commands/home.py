@@ -44,7 +44,7 @@ def run(options: Namespace, console: Console) -> None:
 
 
 def _home(path: Path, options: Namespace, console: Console) -> None:
-    from calib.start_pose import home
+    from freeswing.homing.home import home
 
     beside = path if path.is_dir() else path.parent
     folder = beside / "results" if options.results is None else Path(options.results)
@@ -67,7 +67,7 @@ def _home(path: Path, options: Namespace, console: Console) -> None:
 
 
 def _advise(path: Path, options: Namespace, console: Console) -> None:
-    from calib.start_pose_advice import advise
+    from freeswing.homing.swivel_advice import advise
 
     folder = path.parent / "results" if options.results is None else Path(options.results)
     document = advise(path, console.progress, folder)
@@ -87,8 +87,8 @@ def _advise(path: Path, options: Namespace, console: Console) -> None:
 
 
 def _simulate(path: Path, options: Namespace, console: Console) -> None:
-    from calib.start_pose_acquisition import simulate_homing
-    from cdpr.documents import InputError
+    from freeswing.cdpr.files.documents import InputError
+    from freeswing.homing.acquisition import simulate_homing
 
     if options.poses < 3:
         raise InputError(f"--poses {options.poses}: at least 3 static poses are needed")

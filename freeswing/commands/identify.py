@@ -9,8 +9,8 @@ from freeswing.commands.arguments import add_session, open_session
 from freeswing.console import Console
 
 if TYPE_CHECKING:
-    from freeswing.crew import Crew
-    from freeswing.session import Session
+    from freeswing.session.session_file import Session
+    from freeswing.workers.crew import Crew
 
 FURTHER = ("consistent", "entry_std_m", "attachment_std_m")  # settings that are absent by default
 
@@ -46,7 +46,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(options: Namespace, console: Console) -> None:
     """Identify and say the parameters with their 95 % intervals."""
-    from freeswing.stages import IDENTIFY
+    from freeswing.session.stages import IDENTIFY
 
     session = open_session(options)
     settings = {"weighting": options.weighting, "likelihood": not options.fidim_only}
@@ -61,12 +61,12 @@ def make(
     session: Session, console: Console, settings: dict[str, Any], crew: Crew
 ) -> list[tuple[str, dict[str, Any]]]:
     """identification.json and motion.json as documents."""
-    from cdpr.documents import InputError
-    from freeswing.motions import predicted_motions
-    from freeswing.places import swing_places
-    from freeswing.swings import load_robot, load_swings, load_target
-    from ident.geometry import GeometryPriors
-    from ident.identify import IdentifySettings, identify
+    from freeswing.cdpr.files.documents import InputError
+    from freeswing.ident.identify import IdentifySettings, identify
+    from freeswing.ident.likelihood.cable_ends import GeometryPriors
+    from freeswing.ident.swing_places import swing_places
+    from freeswing.results.motions import predicted_motions
+    from freeswing.session.load_swings import load_robot, load_swings, load_target
 
     robot = load_robot(session)
     swings = load_swings(session, robot, load_target(session))

@@ -11,7 +11,7 @@ from freeswing.commands.arguments import add_session, open_session
 from freeswing.console import Console
 
 if TYPE_CHECKING:
-    from freeswing.session import Session
+    from freeswing.session.session_file import Session
 
 
 def add_arguments(parser: ArgumentParser) -> None:

@@ -9,8 +9,8 @@ from freeswing.commands.arguments import add_session, add_workers, crew_of, open
 from freeswing.console import Console
 
 if TYPE_CHECKING:
-    from freeswing.crew import Crew
-    from freeswing.session import Session
+    from freeswing.session.session_file import Session
+    from freeswing.workers.crew import Crew
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -30,7 +30,7 @@ def run(options: Namespace, console: Console) -> None:
 def run_session(session: Session, console: Console, crew: Crew) -> None:
     """All steps of a session, then the report, whose path is said last."""
     from freeswing.commands.report import write_report
-    from freeswing.stages import STAGES
+    from freeswing.session.stages import STAGES
 
     for stage in STAGES:
         if not stage.due(session):

@@ -11,8 +11,8 @@ from freeswing.console import Console
 if TYPE_CHECKING:
     from numpy import ndarray
 
-    from cdpr.model import Model
-    from cdpr.robot import Robot
+    from freeswing.cdpr.model.equations import Model
+    from freeswing.cdpr.robot import Robot
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -45,9 +45,9 @@ def run(options: Namespace, console: Console) -> None:
     """Find the rest pose, let go beside it, integrate, sample, write."""
     import numpy as np
 
-    from cdpr.documents import InputError
-    from cdpr.trajectory import Trajectory
-    from cdpr.trajectory_files import write_csv, write_tum
+    from freeswing.cdpr.files.documents import InputError
+    from freeswing.cdpr.files.trajectory_files import write_csv, write_tum
+    from freeswing.cdpr.measured.trajectory import Trajectory
 
     result = Path(options.result)
     writers = {".csv": write_csv, ".tum": write_tum}
@@ -70,12 +70,12 @@ def run(options: Namespace, console: Console) -> None:
 def _poses(options: Namespace, times: ndarray, generator) -> ndarray:
     import numpy as np
 
-    from cdpr.documents import InputError
-    from cdpr.free_motion import admissible_rates
-    from cdpr.model import build_model
-    from cdpr.robot_file import read_robot
-    from cdpr.simulation import simulate
-    from freeswing.demo.release import release, rest_at_lengths
+    from freeswing.cdpr.files.documents import InputError
+    from freeswing.cdpr.files.robot_file import read_robot
+    from freeswing.cdpr.model.equations import build_model
+    from freeswing.cdpr.model.free_motion import admissible_rates
+    from freeswing.cdpr.simulation.free_swing import simulate
+    from freeswing.cdpr.simulation.release import release, rest_at_lengths
 
     robot = read_robot(options.robot)
     if robot.inertia is None:
@@ -96,8 +96,8 @@ def _poses(options: Namespace, times: ndarray, generator) -> ndarray:
 
 
 def _model(robot: Robot, options: Namespace, build_model) -> Model:
-    from cdpr.documents import InputError
-    from cdpr.effects import catalogue
+    from freeswing.cdpr.effects import catalogue
+    from freeswing.cdpr.files.documents import InputError
 
     known = catalogue()
     for name in options.effect:
@@ -107,7 +107,7 @@ def _model(robot: Robot, options: Namespace, build_model) -> Model:
 
 
 def _values(model: Model, options: Namespace) -> ndarray:
-    from cdpr.documents import InputError
+    from freeswing.cdpr.files.documents import InputError
 
     values = model.start_values.copy()
     names = [parameter.name for parameter in model.parameters]

@@ -9,8 +9,8 @@ from freeswing.commands.arguments import add_session, add_workers, crew_of, open
 from freeswing.console import Console
 
 if TYPE_CHECKING:
-    from freeswing.crew import Crew
-    from freeswing.session import Session
+    from freeswing.session.session_file import Session
+    from freeswing.workers.crew import Crew
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -39,11 +39,11 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(options: Namespace, console: Console) -> None:
     """Track, write results/tracks/*.csv and results/tracking.json."""
-    from freeswing.stages import TRACK
+    from freeswing.session.stages import TRACK
 
     session = open_session(options)
     if options.view:
-        from vision.view import require_viewer
+        from freeswing.vision.show.rerun_view import require_viewer
 
         require_viewer()
     settings = {"correct_rig": not options.trust_cameras, "refine_layout": options.refine_layout}
@@ -59,11 +59,11 @@ def make(
     session: Session, console: Console, settings: dict[str, Any], crew: Crew
 ) -> list[tuple[str, dict[str, Any]]]:
     """The tracks on disk, and tracking.json as a document."""
-    from calib.cameras_file import read_cameras
-    from cdpr.documents import DataError, InputError
-    from freeswing.swings import load_target
-    from vision.settings import Settings
-    from vision.track import track_session
+    from freeswing.calib.camera.cameras_file import read_cameras
+    from freeswing.cdpr.files.documents import DataError, InputError
+    from freeswing.session.load_swings import load_target
+    from freeswing.vision.settings import Settings
+    from freeswing.vision.track_session import track_session
 
     if not session.cameras.is_file():
         raise DataError(f"{session.cameras}: no such file; run freeswing calibrate first")
@@ -88,11 +88,11 @@ def make(
 
 def _draw(session: Session, console: Console, *, view: bool, overlay: bool) -> None:
     """The pictures of a tracked session."""
-    from calib.cameras_file import read_cameras
-    from freeswing.swings import load_target
-    from vision.overlay import write_overlay
-    from vision.tracked import tracked_run
-    from vision.view import write_view
+    from freeswing.calib.camera.cameras_file import read_cameras
+    from freeswing.session.load_swings import load_target
+    from freeswing.vision.show.overlay import write_overlay
+    from freeswing.vision.show.rerun_view import write_view
+    from freeswing.vision.tracked_runs import tracked_run
 
     target = load_target(session)
     if target is None:

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from cdpr.documents import dump_toml, write_json
-from cdpr.robot_file import write_robot
-from cdpr.target import write_target
+from freeswing.cdpr.files.documents import dump_toml, write_json
+from freeswing.cdpr.files.robot_file import write_robot
+from freeswing.cdpr.measured.target import write_target
 from freeswing.demo.mocap import run_table, truth_document
 from freeswing.demo.rig import (
     BOARD,

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from cdpr.documents import dump_toml, write_json
-from cdpr.marker_recording import MarkerRecording, recording_from_poses
-from cdpr.robot import INERTIA_NAMES
-from cdpr.robot_file import write_robot
-from cdpr.target import Marker, Target, write_target
-from cdpr.trajectory import Trajectory
-from cdpr.trajectory_files import write_trc
+from freeswing.cdpr.files.documents import dump_toml, write_json
+from freeswing.cdpr.files.robot_file import write_robot
+from freeswing.cdpr.files.trajectory_files import write_trc
+from freeswing.cdpr.measured.marker_recording import MarkerRecording, recording_from_poses
+from freeswing.cdpr.measured.target import Marker, Target, write_target
+from freeswing.cdpr.measured.trajectory import Trajectory
+from freeswing.cdpr.robot import INERTIA_NAMES
 from freeswing.demo.truth import (
     EFFECT,
     EFFECT_VALUES,

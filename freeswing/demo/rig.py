@@ -9,15 +9,15 @@ from pathlib import Path
 
 import numpy as np
 
-from calib.camera import Camera
-from cdpr.robot import POSE_COORDINATES, Array
-from cdpr.rotation import exp_rotation
-from cdpr.target import Tag, Target
-from cdpr.trajectory import Trajectory
+from freeswing.calib.camera.camera import Camera
+from freeswing.cdpr.measured.target import Tag, Target
+from freeswing.cdpr.measured.trajectory import Trajectory
+from freeswing.cdpr.robot import POSE_COORDINATES, Array
+from freeswing.cdpr.rotation import exp_rotation
 from freeswing.demo.truth import Swing
-from vision.patterns import Patch, charuco_patch, tag_patch
-from vision.record import record
-from vision.simulate import Look, Motion, Scene, motion_of
+from freeswing.vision.render.patterns import Patch, charuco_patch, tag_patch
+from freeswing.vision.render.record import record
+from freeswing.vision.render.render_scene import Look, Motion, Scene, motion_of
 
 Progress = Callable[[str, float], None]
 

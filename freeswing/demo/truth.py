@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdpr.model import build_model
-from cdpr.robot import Array, Cable, Platform, Robot
-from cdpr.simulation import Motion, simulate
-from freeswing.demo.release import release, rest_at_lengths
+from freeswing.cdpr.model.equations import build_model
+from freeswing.cdpr.robot import Array, Cable, Platform, Robot
+from freeswing.cdpr.simulation.free_swing import Motion, simulate
+from freeswing.cdpr.simulation.release import release, rest_at_lengths
 
 EFFECT = "translational_drag"
 EFFECT_VALUES = (0.05, 0.6)

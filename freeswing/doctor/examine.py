@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Generator, Iterator
 from typing import TypeVar
 
-from cdpr.documents import DataError, InputError
-from cdpr.robot import Robot
-from cdpr.target import Target
+from freeswing.cdpr.files.documents import DataError, InputError
+from freeswing.cdpr.measured.target import Target
+from freeswing.cdpr.robot import Robot
 from freeswing.doctor.finding import Finding
 from freeswing.doctor.geometry import robot_findings
 from freeswing.doctor.motion import run_findings
 from freeswing.doctor.recordings import calibration_findings, video_findings
 from freeswing.doctor.split import split_findings
-from freeswing.session import Run, Session
-from freeswing.swings import load_robot, load_swing, load_target, trajectory_path
-from ident.runs import SwingRun
+from freeswing.ident.runs import SwingRun
+from freeswing.session.load_swings import load_robot, load_swing, load_target, trajectory_path
+from freeswing.session.session_file import Run, Session
 
 Progress = Callable[[str, float], None]
 Loaded = TypeVar("Loaded")

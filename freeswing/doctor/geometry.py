@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from cdpr.robot import Robot
+from freeswing.cdpr.robot import Robot
 from freeswing.doctor.finding import Finding
 
 LARGEST_FRAME_M = 200.0

@@ -6,13 +6,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from cdpr.batch import evaluate
-from cdpr.documents import DataError
-from cdpr.model import build_model
-from cdpr.robot import Robot
-from cdpr.trajectory import Trajectory
+from freeswing.cdpr.files.documents import DataError
+from freeswing.cdpr.measured.trajectory import Trajectory
+from freeswing.cdpr.model.batch import evaluate
+from freeswing.cdpr.model.equations import build_model
+from freeswing.cdpr.robot import Robot
 from freeswing.doctor.finding import Finding
-from ident.runs import SwingRun
+from freeswing.ident.runs import SwingRun
 
 WORTHWHILE_WINDOW_S = 5.0
 MOST_MISSING = 0.05

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from cdpr.documents import InputError
+from freeswing.cdpr.files.documents import InputError
 from freeswing.doctor.finding import Finding
-from freeswing.session import Run, Session
+from freeswing.session.session_file import Run, Session
 
 VIDEO_SUFFIXES = (".mkv", ".avi", ".mp4", ".mov")
 IMAGE_SUFFIXES = (".png", ".bmp", ".tif", ".tiff", ".pgm", ".jpg", ".jpeg")
@@ -47,7 +47,7 @@ def video_findings(session: Session, run: Run) -> Iterator[Finding]:
         yield Finding("error", subject, text, "correct video")
         return
     if session.cameras.is_file():
-        from calib.cameras_file import read_cameras
+        from freeswing.calib.camera.cameras_file import read_cameras
 
         try:
             known = {camera.name for camera in read_cameras(session.cameras)}
@@ -75,7 +75,7 @@ def _has_image(folder: Path) -> bool:
 
 
 def _camera_file(session: Session) -> Iterator[Finding]:
-    from calib.cameras_file import read_cameras
+    from freeswing.calib.camera.cameras_file import read_cameras
 
     try:
         read_cameras(session.cameras)

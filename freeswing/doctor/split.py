@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from freeswing.doctor.finding import Finding
-from freeswing.provenance import hashes
-from freeswing.session import Run, Session
-from ident.runs import SwingRun
+from freeswing.ident.runs import SwingRun
+from freeswing.session.provenance import hashes
+from freeswing.session.session_file import Run, Session
 
 FEWEST_IDENTIFY = 3
 

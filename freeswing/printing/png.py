@@ -6,7 +6,7 @@ from io import BytesIO
 
 import numpy as np
 
-from cdpr.documents import DataError
+from freeswing.cdpr.files.documents import DataError
 from freeswing.printing.sheet import Sheet
 
 MM_AN_INCH = 25.4

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from cdpr.rotation import matrix_from_quaternion
+from freeswing.cdpr.rotation import matrix_from_quaternion
 from freeswing.report.figures import AFTER, BEFORE, INK, SERIES, figure
 from freeswing.report.material import Document, Material
 from freeswing.report.words import number, plain

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from cdpr.documents import InputError
+from freeswing.cdpr.files.documents import InputError
 
 RESULTS = ("calibration", "tracking", "identification", "diagnosis", "motion")
 FILES = {kind: (f"{kind}.json",) for kind in RESULTS} | {

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 from jinja2 import Environment, PackageLoader, StrictUndefined, UndefinedError
 from markupsafe import Markup
 
-from cdpr.documents import InputError, replace_file
+from freeswing.cdpr.files.documents import InputError, replace_file
 from freeswing.report.answer import Answer
 from freeswing.report.cameras import Cameras
 from freeswing.report.dropped import Dropped

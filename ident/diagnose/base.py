@@ -7,16 +7,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from cdpr.documents import DataError
-from cdpr.model import Model
-from cdpr.robot import Array
-from ident.consistency import is_possible
-from ident.diagnose.spectrum import residual_powers
-from ident.diagnose.temper import tempered
-from ident.joint import State
-from ident.likelihood import LikelihoodFit, fit
-from ident.maximum_likelihood import astray, begun
-from ident.prepare import PreparedRun
+from freeswing.cdpr.files.documents import DataError
+from freeswing.cdpr.model.equations import Model
+from freeswing.cdpr.robot import Array
+from freeswing.ident.diagnose.outstanding_runs import tempered
+from freeswing.ident.diagnose.spectrum import residual_powers
+from freeswing.ident.judge.consistency import is_possible
+from freeswing.ident.likelihood.joint_problem import State
+from freeswing.ident.likelihood.likelihood import LikelihoodFit, fit
+from freeswing.ident.likelihood.maximum_likelihood import astray, begun
+from freeswing.ident.signals.prepare import PreparedRun
 
 Progress = Callable[[str, float], None]
 

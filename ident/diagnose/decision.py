@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
-from cdpr.effects import effect_named
-from cdpr.robot import Array
-from ident.diagnose.refit import Refit, colour_of, plausible
-from ident.diagnose.rows import Score
-from ident.diagnose.variants import effect_of, inside
+from freeswing.cdpr.effects import effect_named
+from freeswing.cdpr.robot import Array
+from freeswing.ident.diagnose.leave_one_out import Score
+from freeswing.ident.diagnose.refit import Refit, colour_of, plausible
+from freeswing.ident.diagnose.variants import effect_of, inside
 
 REFITTED = 4
 NEARLY_AS_GOOD = 0.5

@@ -9,28 +9,28 @@ from typing import Any
 
 import numpy as np
 
-from cdpr.documents import DataError
-from cdpr.effects import catalogue
-from cdpr.model import build_model
-from cdpr.robot import INERTIA_NAMES, POSE_COORDINATES, Array, Robot
-from ident.calibration import with_calibration
-from ident.diagnose.base import base_fit, refuse_few
-from ident.diagnose.decision import Candidate, excess_of
-from ident.diagnose.experiments import separating_experiment
-from ident.diagnose.heldout import HeldOut, held_out
-from ident.diagnose.refit import Refit
-from ident.diagnose.screen import BASE
-from ident.diagnose.search import Round, Search
-from ident.diagnose.unexplained import Unexplained, unexplained
-from ident.diagnose.variants import effect_of
-from ident.fidim_stage import fidim_estimates
-from ident.identify import session_notes
-from ident.likelihood import LikelihoodFit, fit
-from ident.prepare import PreparedRun, prepare_runs
-from ident.runs import SwingRun
-from ident.samples import UNIT_NOISE_M, UNIT_NOISE_RAD
-from ident.signals import SignalSettings
-from ident.starts import likelihood_starts
+from freeswing.cdpr.effects import catalogue
+from freeswing.cdpr.files.documents import DataError
+from freeswing.cdpr.model.equations import build_model
+from freeswing.cdpr.robot import INERTIA_NAMES, POSE_COORDINATES, Array, Robot
+from freeswing.ident.diagnose.base import base_fit, refuse_few
+from freeswing.ident.diagnose.decision import Candidate, excess_of
+from freeswing.ident.diagnose.experiments import separating_experiment
+from freeswing.ident.diagnose.heldout import HeldOut, held_out
+from freeswing.ident.diagnose.refit import Refit
+from freeswing.ident.diagnose.screen import BASE
+from freeswing.ident.diagnose.search import Round, Search
+from freeswing.ident.diagnose.unexplained import Unexplained, unexplained
+from freeswing.ident.diagnose.variants import effect_of
+from freeswing.ident.fidim.fidim_stage import fidim_estimates
+from freeswing.ident.identify import session_notes
+from freeswing.ident.likelihood.calibration_modes import with_calibration
+from freeswing.ident.likelihood.inertia_starts import likelihood_starts
+from freeswing.ident.likelihood.likelihood import LikelihoodFit, fit
+from freeswing.ident.likelihood.raw_samples import UNIT_NOISE_M, UNIT_NOISE_RAD
+from freeswing.ident.runs import SwingRun
+from freeswing.ident.signals.derivatives import SignalSettings
+from freeswing.ident.signals.prepare import PreparedRun, prepare_runs
 
 Progress = Callable[[str, float], None]
 

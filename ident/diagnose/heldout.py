@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdpr.batch import evaluate
-from cdpr.free_motion import free_basis
-from cdpr.model import Model
-from cdpr.robot import POSE_COORDINATES, Array
-from ident.motion import SwingMotion
-from ident.prediction import Prediction, predict
-from ident.prepare import PreparedRun
+from freeswing.cdpr.model.batch import evaluate
+from freeswing.cdpr.model.equations import Model
+from freeswing.cdpr.model.free_motion import free_basis
+from freeswing.cdpr.model.regressor import SwingMotion
+from freeswing.cdpr.robot import POSE_COORDINATES, Array
+from freeswing.ident.judge.prediction import Prediction, predict
+from freeswing.ident.signals.prepare import PreparedRun
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,23 +14,23 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
-from cdpr.batch import evaluate, with_jacobian
-from cdpr.effects import Parameter
-from cdpr.model import Model
-from cdpr.robot import Array
-from cdpr.rotation import angle_rate_matrix
-from cdpr.simulation import Motion
-from ident.diagnose.decision import (
+from freeswing.cdpr.effects import Parameter
+from freeswing.cdpr.model.batch import evaluate, with_jacobian
+from freeswing.cdpr.model.equations import Model
+from freeswing.cdpr.robot import Array
+from freeswing.cdpr.rotation import angle_rate_matrix
+from freeswing.cdpr.simulation.free_swing import Motion
+from freeswing.ident.diagnose.decision import (
     CONFOUNDED_DIFFERENCE,
     LARGEST_DELTA_BIC,
     MOST_WORSE,
     SIGNIFICANCE,
     runs_worse,
 )
-from ident.diagnose.rows import Evidence, Score, score
-from ident.diagnose.variants import effect_of, extended, inside
-from ident.likelihood import LikelihoodFit, low_band_factor
-from ident.likelihood_run import Samples
+from freeswing.ident.diagnose.leave_one_out import Evidence, Score, score
+from freeswing.ident.diagnose.variants import effect_of, extended, inside
+from freeswing.ident.likelihood.likelihood import LikelihoodFit, low_band_factor
+from freeswing.ident.likelihood.likelihood_run import Samples
 
 LEAST_EXCESS = 0.1
 LEAST_SHARE = 0.5

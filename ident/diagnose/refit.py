@@ -6,16 +6,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cdpr.effects import effect_named
-from cdpr.model import Model
-from cdpr.robot import Array
-from ident.diagnose.rows import Evidence, Score, score
-from ident.diagnose.screen import BASE, screen
-from ident.diagnose.spectrum import residual_powers
-from ident.diagnose.temper import tempered
-from ident.diagnose.variants import effect_of, extended, inside, reduced
-from ident.joint import State
-from ident.likelihood import LikelihoodFit, correlation_factor, fit
+from freeswing.cdpr.effects import effect_named
+from freeswing.cdpr.model.equations import Model
+from freeswing.cdpr.robot import Array
+from freeswing.ident.diagnose.leave_one_out import Evidence, Score, score
+from freeswing.ident.diagnose.outstanding_runs import tempered
+from freeswing.ident.diagnose.screen import BASE, screen
+from freeswing.ident.diagnose.spectrum import residual_powers
+from freeswing.ident.diagnose.variants import effect_of, extended, inside, reduced
+from freeswing.ident.likelihood.joint_problem import State
+from freeswing.ident.likelihood.likelihood import LikelihoodFit, correlation_factor, fit
 
 RANKING_STEPS = 12
 # Surveys and calibrations are good to a few tenths of a millimetre: 0.3 mm for a displaced point.

@@ -6,14 +6,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cdpr.effects import effect_named
-from ident.diagnose.decision import (
+from freeswing.cdpr.effects import effect_named
+from freeswing.ident.diagnose.decision import (
     CONFOUNDED_DIFFERENCE,
     LARGEST_DELTA_BIC,
     delta_bic,
 )
-from ident.diagnose.refit import Refit, colour_of
-from ident.diagnose.screen import BASE
+from freeswing.ident.diagnose.refit import Refit, colour_of
+from freeswing.ident.diagnose.screen import BASE
 
 
 def superfluous(current: Refit, kept: Sequence[str]) -> str:

@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cdpr.model import Model
-from cdpr.robot import Array
-from cdpr.sensitivity import linearise
-from ident.diagnose.rows import Evidence
-from ident.diagnose.variants import effect_of, extended, inside
-from ident.likelihood import LikelihoodFit
-from ident.likelihood_run import Samples, reduce_run
+from freeswing.cdpr.model.equations import Model
+from freeswing.cdpr.robot import Array
+from freeswing.cdpr.simulation.sensitivity import linearise
+from freeswing.ident.diagnose.leave_one_out import Evidence
+from freeswing.ident.diagnose.variants import effect_of, extended, inside
+from freeswing.ident.likelihood.likelihood import LikelihoodFit
+from freeswing.ident.likelihood.likelihood_run import Samples, reduce_run
 
 BASE = 9
 

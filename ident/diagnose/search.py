@@ -15,9 +15,9 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from multiprocessing import get_context
 
-from cdpr.effects import effect_named
-from cdpr.robot import Array, Robot
-from ident.diagnose.decision import (
+from freeswing.cdpr.effects import effect_named
+from freeswing.cdpr.robot import Array, Robot
+from freeswing.ident.diagnose.decision import (
     LEAST_EXCESS_LATER,
     Candidate,
     Decision,
@@ -25,14 +25,22 @@ from ident.diagnose.decision import (
     excess_of,
     promising,
 )
-from ident.diagnose.kinematics import displacements
-from ident.diagnose.refit import Refit, colour_of, displaced, polished, refit, rescored, without
-from ident.diagnose.removal import is_no_worse, superfluous
-from ident.diagnose.rows import score
-from ident.diagnose.screen import BASE, Screen, screen
-from ident.diagnose.spectrum import common_frequency, too_small
-from ident.diagnose.variants import effect_of, inside, variants
-from ident.likelihood import LikelihoodFit
+from freeswing.ident.diagnose.kinematics import displacements
+from freeswing.ident.diagnose.leave_one_out import score
+from freeswing.ident.diagnose.refit import (
+    Refit,
+    colour_of,
+    displaced,
+    polished,
+    refit,
+    rescored,
+    without,
+)
+from freeswing.ident.diagnose.removal import is_no_worse, superfluous
+from freeswing.ident.diagnose.screen import BASE, Screen, screen
+from freeswing.ident.diagnose.spectrum import common_frequency, too_small
+from freeswing.ident.diagnose.variants import effect_of, inside, variants
+from freeswing.ident.likelihood.likelihood import LikelihoodFit
 
 Progress = Callable[[str, float], None]
 

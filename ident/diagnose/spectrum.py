@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from cdpr.robot import Array
-from ident.likelihood import LikelihoodFit
-from ident.likelihood_run import residuals
+from freeswing.cdpr.robot import Array
+from freeswing.ident.likelihood.likelihood import LikelihoodFit
+from freeswing.ident.likelihood.likelihood_run import residuals
 
 LOWEST_HZ = 0.15
 # No calibration or survey can be trusted below this: nothing is sought in such a residual.

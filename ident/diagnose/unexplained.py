@@ -6,11 +6,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cdpr.robot import Array
-from ident.diagnose.spectrum import common_frequency, mean_log_spectrum, too_small
-from ident.likelihood import LikelihoodFit
-from ident.likelihood_run import predicted, residuals
-from ident.prepare import PreparedRun
+from freeswing.cdpr.robot import Array
+from freeswing.ident.diagnose.spectrum import common_frequency, mean_log_spectrum, too_small
+from freeswing.ident.likelihood.likelihood import LikelihoodFit
+from freeswing.ident.likelihood.likelihood_run import predicted, residuals
+from freeswing.ident.signals.prepare import PreparedRun
 
 LEAST_EXCESS = 0.15
 LEAST_COLOUR = 1.6
@@ -113,7 +113,7 @@ def _hint(
     fit: LikelihoodFit, runs: list[PreparedRun], full: bool, frequency_hz: float
 ) -> list[str]:
     """The few generic force terms that explain most of the missing force (greedy regression)."""
-    from ident.diagnose.heldout import internal_residual
+    from freeswing.ident.diagnose.heldout import internal_residual
 
     right, columns = [], []
     names: list[str] = []
@@ -132,7 +132,7 @@ def _hint(
 
 
 def _free_map(fit: LikelihoodFit, motion) -> Array:
-    from cdpr.free_motion import free_basis
+    from freeswing.cdpr.model.free_motion import free_basis
 
     return free_basis(fit.model, motion.free, motion.zetas, motion.rates, fit.values).xi_perp
 

@@ -11,9 +11,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from cdpr.effects import effect_named
-from cdpr.model import Model, build_model
-from cdpr.robot import Robot
+from freeswing.cdpr.effects import effect_named
+from freeswing.cdpr.model.equations import Model, build_model
+from freeswing.cdpr.robot import Robot
 
 
 def effect_of(key: str) -> str:

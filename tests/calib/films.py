@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from calib.calibrate import CalibrationResult, calibrate_session
-from calib.camera import Camera
-from calib.rig import Rig
+from freeswing.calib.calibrate import CalibrationResult, calibrate_session
+from freeswing.calib.camera.camera import Camera
+from freeswing.calib.rig.solve_rig import Rig
+from freeswing.vision.render.patterns import Patch, charuco_patch
+from freeswing.vision.render.record import record
+from freeswing.vision.render.render_scene import Look, Scene
 from tests.calib import rigs
-from vision.patterns import Patch, charuco_patch
-from vision.record import record
-from vision.simulate import Look, Scene
 
 FLIP = np.diag([1.0, -1.0, -1.0, 1.0])
 BOARD = {

@@ -6,11 +6,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from calib.camera import Camera
-from calib.reprojection import Scene, camera_slices
-from calib.rig import Rig
-from calib.views import Views, make_views
-from cdpr.rotation import exp_rotation, invert, log_rotation, transform
+from freeswing.calib.camera.camera import Camera
+from freeswing.calib.rig.reprojection import Scene, camera_slices
+from freeswing.calib.rig.solve_rig import Rig
+from freeswing.calib.rig.views import Views, make_views
+from freeswing.cdpr.rotation import exp_rotation, invert, log_rotation, transform
 
 LENS = np.array([1100.0, 1105, 640, 510, -0.1, 0.05, 5e-4, -3e-4])
 
@@ -101,7 +101,7 @@ def film_points(
 
 
 def errors(scene: Scene, cameras: tuple[Camera, ...], reference: int | None) -> np.ndarray:
-    """True minus estimated unknowns of all cameras, in the order of `calib.reprojection`."""
+    """True minus estimated unknowns of all cameras, in the order of `calib.rig.reprojection`."""
     T_rig_base = np.eye(4) if reference is None else invert(cameras[reference].T_camera_base)
     parts = []
     for found, true in zip(scene.cameras, cameras, strict=True):

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from cdpr.marker_recording import MarkerRecording
-from cdpr.robot import Cable, Robot
-from cdpr.target import Marker, Target
-from cdpr.trajectory import Trajectory
-from cdpr.trajectory_files import read_trajectory
+from freeswing.cdpr.files.trajectory_files import read_trajectory
+from freeswing.cdpr.measured.marker_recording import MarkerRecording
+from freeswing.cdpr.measured.target import Marker, Target
+from freeswing.cdpr.measured.trajectory import Trajectory
+from freeswing.cdpr.robot import Cable, Robot
 
 POSE = ("x", "y", "z", "phi", "theta", "chi")
 POSITIONS = [[0, 0, 0], [-0.18, -0.15, 0.04], [0.19, -0.14, 0.04], [0.2, 0.14, 0.05]]

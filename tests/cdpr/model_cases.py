@@ -5,12 +5,17 @@ import sys
 import numpy as np
 import pytest
 
-from cdpr.batch import evaluate
-from cdpr.free_motion import admissible_rates, assemble, choose_free_coordinates, coordinate_indices
-from cdpr.model import build_model
-from cdpr.robot import Cable, Platform, Robot
-from cdpr.rotation import matrix_from_angles, quaternion_from_matrix
-from cdpr.statics import equilibrium_at_lengths
+from freeswing.cdpr.model.batch import evaluate
+from freeswing.cdpr.model.equations import build_model
+from freeswing.cdpr.model.free_motion import (
+    admissible_rates,
+    assemble,
+    choose_free_coordinates,
+    coordinate_indices,
+)
+from freeswing.cdpr.model.statics import equilibrium_at_lengths
+from freeswing.cdpr.robot import Cable, Platform, Robot
+from freeswing.cdpr.rotation import matrix_from_angles, quaternion_from_matrix
 from tests.oracle.robots import declared_robot, with_eyelets
 from tests.oracle.world import Body
 

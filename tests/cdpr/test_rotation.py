@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from cdpr.rotation import (
+from freeswing.cdpr.rotation import (
     angle_rate_matrix,
     angles_from_matrix,
     exp_rotation,

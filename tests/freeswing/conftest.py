@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cdpr.robot_file import write_robot
-from cdpr.trajectory import Trajectory
-from cdpr.trajectory_files import write_csv
+from freeswing.cdpr.files.robot_file import write_robot
+from freeswing.cdpr.files.trajectory_files import write_csv
+from freeswing.cdpr.measured.trajectory import Trajectory
 from tests.oracle.robots import declared_robot
 
 SESSION = """format = "freeswing-session/1"

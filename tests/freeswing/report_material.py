@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from cdpr.robot import INERTIA_NAMES
+from freeswing.cdpr.robot import INERTIA_NAMES
 from freeswing.report.material import Material
 
 VALUES = (0.0016, -0.0025, 0.2, 0.0563, 0.0627, 0.0322, 1e-4, -3e-4, 2e-4)

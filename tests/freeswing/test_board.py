@@ -10,10 +10,11 @@ import cv2
 import numpy as np
 import pytest
 
-from calib.tag_patterns import tag_dictionary
+from freeswing.calib.tags.tag_patterns import tag_dictionary
 from freeswing.main import main
+from tests.places import SAMPLES
 
-ROBOT = Path(__file__).parents[2] / "samples" / "three-cables" / "robot.toml"
+ROBOT = SAMPLES / "three-cables" / "robot.toml"
 CHARUCO = """board.kind = "charuco"
 board.squares = [5, 4]
 board.square_m = 0.0373

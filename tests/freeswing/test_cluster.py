@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from cdpr.documents import DataError
-from freeswing import cluster as front
+from freeswing.cdpr.files.documents import DataError
 from freeswing.main import main
+from freeswing.workers import cluster as front
+from tests.places import SAMPLES
 
 if TYPE_CHECKING:
     from distributed import LocalCluster
 
-SAMPLES = Path(__file__).parents[2] / "samples"
 NOBODY = "tcp://127.0.0.1:9"
 
 

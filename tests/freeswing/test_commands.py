@@ -10,12 +10,13 @@ import mujoco
 import numpy as np
 import pytest
 
-from cdpr.documents import write_json
-from cdpr.robot import INERTIA_NAMES
-from cdpr.trajectory_files import read_trajectory
+from freeswing.cdpr.files.documents import write_json
+from freeswing.cdpr.files.trajectory_files import read_trajectory
+from freeswing.cdpr.robot import INERTIA_NAMES
 from freeswing.main import main
+from tests.places import SAMPLES
 
-ROBOT = Path(__file__).parents[2] / "samples" / "three-cables" / "robot.toml"
+ROBOT = SAMPLES / "three-cables" / "robot.toml"
 LENGTHS = "1.2,1.3,1.3"
 
 

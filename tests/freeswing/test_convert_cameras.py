@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from calib.camera import Camera
-from calib.cameras_file import read_cameras, write_cameras
-from cdpr.rotation import exp_rotation, transform
+from freeswing.calib.camera.camera import Camera
+from freeswing.calib.camera.cameras_file import read_cameras, write_cameras
+from freeswing.cdpr.rotation import exp_rotation, transform
 from freeswing.main import main
 
 LENS = np.array([1100.0, 1101.0, 640.25, 511.125, -0.1, 0.05, 1e-3, -2e-3])

@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cdpr.model import build_model
-from freeswing import stages
+from freeswing.cdpr.model.equations import build_model
 from freeswing.demo import mocap, truth
+from freeswing.ident.diagnose.heldout import held_out
+from freeswing.ident.identify import IdentifySettings, identify
 from freeswing.main import main
-from freeswing.session import read_session
-from freeswing.swings import load_robot, load_swings, load_target
-from ident.diagnose.heldout import held_out
-from ident.identify import IdentifySettings, identify
+from freeswing.session import stages
+from freeswing.session.load_swings import load_robot, load_swings, load_target
+from freeswing.session.session_file import read_session
 
 FEW_SWINGS = ("swing-01", "swing-02", "swing-03", "check-01")
 SHORT_S = 4.0

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from freeswing.main import COMMANDS
+from tests.places import ROOT
 
-ROOT = Path(__file__).parents[2]
 EXAMPLES = re.findall(
     r"^## (.+?)$.*?^```python\n(.*?)^```",
     (ROOT / "docs" / "api.md").read_text(encoding="utf-8"),
@@ -62,7 +62,7 @@ def test_formats_and_code_know_the_same_effects() -> None:
     )
     files = {
         path.stem
-        for path in (ROOT / "cdpr" / "effects").glob("*.py")
+        for path in (ROOT / "cdpr" / "effects").rglob("*.py")
         if path.stem not in ("__init__", "base")
     }
     assert files - named == set()

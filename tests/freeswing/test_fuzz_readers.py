@@ -16,27 +16,32 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from calib import exchange
-from calib.boards import read_board
-from calib.calibration_result import read_camera_covariance
-from calib.camera import Camera
-from calib.cameras_file import read_cameras, write_cameras
-from calib.recordings import Recording, read_stamps
-from calib.start_pose_files import read_homing
-from cdpr.documents import DataError, InputError
-from cdpr.marker_recording import MarkerRecording
-from cdpr.robot_file import read_robot
-from cdpr.rotation import exp_rotation, transform
-from cdpr.target import read_target
-from cdpr.trajectory_files import read_recording, read_trajectory, write_c3d, write_trc
+from freeswing.calib import exchange
+from freeswing.calib.board.boards import read_board
+from freeswing.calib.board.recordings import Recording, read_stamps
+from freeswing.calib.camera.camera import Camera
+from freeswing.calib.camera.cameras_file import read_cameras, write_cameras
+from freeswing.calib.verdict.calibration_result import read_camera_covariance
+from freeswing.cdpr.files.documents import DataError, InputError
+from freeswing.cdpr.files.robot_file import read_robot
+from freeswing.cdpr.files.trajectory_files import (
+    read_recording,
+    read_trajectory,
+    write_c3d,
+    write_trc,
+)
+from freeswing.cdpr.measured.marker_recording import MarkerRecording
+from freeswing.cdpr.measured.target import read_target
+from freeswing.cdpr.rotation import exp_rotation, transform
+from freeswing.homing.homing_files import read_homing
 from freeswing.report.material import read_material
 from freeswing.report.page import render_page
+from freeswing.vision.fuse.calibration_share import read_calibration_noise
+from freeswing.vision.look.stamps import run_stamps
 from tests.freeswing.hostile_files import broken
 from tests.freeswing.report_material import whole_material
-from vision.calibration_share import read_calibration_noise
-from vision.stamps import run_stamps
+from tests.places import SAMPLES
 
-SAMPLES = Path(__file__).parents[2] / "samples"
 EXAMPLES = settings(
     max_examples=60,
     deadline=None,

@@ -11,11 +11,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from calib.camera import Camera
-from calib.cameras_file import write_cameras
-from cdpr.target import Tag, Target, write_target
+from freeswing.calib.camera.camera import Camera
+from freeswing.calib.camera.cameras_file import write_cameras
+from freeswing.cdpr.measured.target import Tag, Target, write_target
 from freeswing.main import main
-from vision.video import write_video
+from freeswing.vision.look.video import write_video
 
 ONE_FOLDER = [HealthCheck.function_scoped_fixture, HealthCheck.too_slow]
 

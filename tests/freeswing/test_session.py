@@ -10,8 +10,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from cdpr.documents import InputError
-from freeswing.session import read_session
+from freeswing.cdpr.files.documents import InputError
+from freeswing.session.session_file import read_session
 
 WHOLE = """
 format = "freeswing-session/1"

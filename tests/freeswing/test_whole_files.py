@@ -12,13 +12,13 @@ from pathlib import Path
 
 import pytest
 
-from cdpr.documents import InputError, write_json
+from freeswing.cdpr.files.documents import InputError, write_json
 from freeswing.main import main
 
 WRITER = """
 import sys
 from pathlib import Path
-from cdpr.documents import replace_file
+from freeswing.cdpr.files.documents import replace_file
 path = Path(sys.argv[1])
 print("ready", flush=True)
 while True:

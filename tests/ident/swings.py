@@ -6,13 +6,13 @@ from functools import cache
 
 import numpy as np
 
-from cdpr.free_motion import assemble
-from cdpr.model import Model, build_model
-from cdpr.robot import POSE_COORDINATES, Array
-from cdpr.simulation import Motion, simulate
-from cdpr.trajectory import Trajectory
-from ident.guess import taut_equilibrium
-from ident.runs import Payload, SwingRun
+from freeswing.cdpr.measured.trajectory import Trajectory
+from freeswing.cdpr.model.equations import Model, build_model
+from freeswing.cdpr.model.free_motion import assemble
+from freeswing.cdpr.robot import POSE_COORDINATES, Array
+from freeswing.cdpr.simulation.free_swing import Motion, simulate
+from freeswing.ident.likelihood.guess_run_start import taut_equilibrium
+from freeswing.ident.runs import Payload, SwingRun
 from tests.oracle.robots import declared_robot
 
 # FIDIM 2022, Table 2: optimised cable lengths in metres, a column an equilibrium.
@@ -77,7 +77,7 @@ def recorded(
 
 def lengths_of(motion: Motion) -> Array:
     """The cable lengths that the motion keeps, (n,)."""
-    from cdpr.batch import evaluate
+    from freeswing.cdpr.model.batch import evaluate
 
     return evaluate(motion.model.lengths, motion.zetas[0], motion.values)[0]
 

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from cdpr.robot import Robot
-from freeswing.session import read_session
-from freeswing.swings import load_robot, load_swings, load_target
-from ident.identify import Identification, IdentifySettings, identify
-from ident.runs import SwingRun
-from ident.signals import SignalSettings
+from freeswing.cdpr.robot import Robot
+from freeswing.ident.identify import Identification, IdentifySettings, identify
+from freeswing.ident.runs import SwingRun
+from freeswing.ident.signals.derivatives import SignalSettings
+from freeswing.session.load_swings import load_robot, load_swings, load_target
+from freeswing.session.session_file import read_session
+from tests.places import REAL
 
-FOLDER = Path(__file__).resolve().parents[3] / "shared" / "real" / "bologna-2020"
+FOLDER = REAL / "bologna-2020"
 pytestmark = pytest.mark.skipif(
     not FOLDER.is_dir(), reason=f"the recordings of bologna-2020 are not at {FOLDER}"
 )

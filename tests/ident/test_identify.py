@@ -8,15 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cdpr.documents import DataError
-from cdpr.robot import INERTIA_NAMES, POSE_COORDINATES, Platform
-from cdpr.trajectory import Trajectory
-from ident.identify import Identification, IdentifySettings, identify
-from ident.motion import free_motion, full_motion
-from ident.prepare import guessed_inertia, prepare_runs
-from ident.runs import Payload, SwingRun
-from ident.signals import SignalSettings, signals_of
-from ident.weighted import noisy_regressor, weighted_fidim
+from freeswing.cdpr.files.documents import DataError
+from freeswing.cdpr.measured.trajectory import Trajectory
+from freeswing.cdpr.robot import INERTIA_NAMES, POSE_COORDINATES, Platform
+from freeswing.ident.fidim.weighted_least_squares import noisy_regressor, weighted_fidim
+from freeswing.ident.identify import Identification, IdentifySettings, identify
+from freeswing.ident.runs import Payload, SwingRun
+from freeswing.ident.signals.derivatives import SignalSettings, signals_of
+from freeswing.ident.signals.motions import free_motion, full_motion
+from freeswing.ident.signals.prepare import guessed_inertia, prepare_runs
 from tests.ident.swings import REGULAR, TRUE_INERTIA, paper_model, recorded, swing
 
 FIDIM = IdentifySettings(maximum_likelihood=False, predict=False)

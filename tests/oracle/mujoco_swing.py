@@ -5,7 +5,7 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from cdpr.robot import Robot
+from freeswing.cdpr.robot import Robot
 from tests.oracle.newton_euler import Motion
 from tests.oracle.world import Array, Body
 

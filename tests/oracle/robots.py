@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cdpr.robot import Cable, Platform, Robot
+from freeswing.cdpr.robot import Cable, Platform, Robot
 from tests.oracle.world import Array, Body
 
 _X, _Y, _Z = np.eye(3)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from cdpr.robot import Robot
+from freeswing.cdpr.robot import Robot
 from tests.oracle.world import Array
 
 POSE_HEADER = ("x_m", "y_m", "z_m", "qw", "qx", "qy", "qz")

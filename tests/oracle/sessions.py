@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from cdpr.robot import POSE_COORDINATES, Robot
+from freeswing.cdpr.robot import POSE_COORDINATES, Robot
 from tests.oracle import session_files as files
 from tests.oracle.effects import EFFECTS, Scene, add_effect
 from tests.oracle.geometry import turn

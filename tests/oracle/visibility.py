@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cdpr.robot import POSE_COORDINATES
+from freeswing.cdpr.robot import POSE_COORDINATES
 from tests.oracle.equilibrium import (
     ROTATION_SCALE_M,
     freedom_of,

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cdpr.robot import Robot
+from freeswing.cdpr.robot import Robot
 
 Array = NDArray[np.float64]
 

@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from cdpr.robot import INERTIA_NAMES
-
-SAMPLES = Path(__file__).parents[2] / "samples"
+from freeswing.cdpr.robot import INERTIA_NAMES
+from tests.places import SAMPLES
 
 
 def expected(name: str) -> dict[str, Any]:

@@ -14,25 +14,25 @@ from pathlib import Path
 import av
 import numpy as np
 
-from calib.camera import Camera
-from calib.cameras_file import write_cameras
-from cdpr.documents import dump_toml
-from cdpr.robot import POSE_COORDINATES
-from cdpr.rotation import exp_rotation
-from cdpr.target import Tag, write_target
-from cdpr.trajectory import Trajectory
-from cdpr.trajectory_files import write_csv
+from freeswing.calib.camera.camera import Camera
+from freeswing.calib.camera.cameras_file import write_cameras
+from freeswing.cdpr.files.documents import dump_toml
+from freeswing.cdpr.files.trajectory_files import write_csv
+from freeswing.cdpr.measured.target import Tag, write_target
+from freeswing.cdpr.measured.trajectory import Trajectory
+from freeswing.cdpr.robot import POSE_COORDINATES
+from freeswing.cdpr.rotation import exp_rotation
 from freeswing.demo.rig import base_tags, demo_target
+from freeswing.vision.look.video import write_stamps
+from freeswing.vision.render.patterns import Patch, charuco_patch, tag_patch
+from freeswing.vision.render.render_scene import Look, Renderer, Scene, motion_of
 from tests.oracle import session_files as files
 from tests.oracle.robots import declared_robot, true_body
 from tests.oracle.runs import TrueRun, draw_run
 from tests.oracle.sessions import make_scene, tait_bryan
+from tests.places import SAMPLES
 from tests.vision.scenes import look_at
-from vision.patterns import Patch, charuco_patch, tag_patch
-from vision.simulate import Look, Renderer, Scene, motion_of
-from vision.video import write_stamps
 
-SAMPLES = Path(__file__).parents[2] / "samples"
 SEED = 53
 ROLES = ("identify", "identify", "identify", "validate")
 SIZE_PX = (480, 360)

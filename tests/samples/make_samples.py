@@ -10,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-from cdpr.marker_recording import MarkerRecording
-from cdpr.robot import Cable, Platform, Robot
-from cdpr.target import Marker, Target, write_target
-from cdpr.trajectory_files import write_trc
+from freeswing.cdpr.files.trajectory_files import write_trc
+from freeswing.cdpr.measured.marker_recording import MarkerRecording
+from freeswing.cdpr.measured.target import Marker, Target, write_target
+from freeswing.cdpr.robot import Cable, Platform, Robot
 from tests.oracle import session_files as files
 from tests.oracle.equilibrium import displaced, lengths_at, settle, tensions_at_rest
 from tests.oracle.geometry import turn
@@ -22,8 +22,8 @@ from tests.oracle.robots import about_p, declared_robot, true_body
 from tests.oracle.runs import draw_run
 from tests.oracle.sessions import make_scene, make_session
 from tests.oracle.world import Body, plain_world
+from tests.places import SAMPLES
 
-SAMPLES = Path(__file__).parents[2] / "samples"
 ROLES = ("identify",) * 5 + ("validate",) * 2
 DURATION_S = 8.0
 MARKERS_M = {

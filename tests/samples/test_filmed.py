@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from calib.cameras_file import read_cameras
-from cdpr.trajectory_files import read_trajectory
+from freeswing.calib.camera.cameras_file import read_cameras
+from freeswing.cdpr.files.trajectory_files import read_trajectory
 from freeswing.main import main
 from tests.samples.expectations import SAMPLES, check_diagnosis, check_inertia, expected, result
 

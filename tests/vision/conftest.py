@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from freeswing.vision.rig.rig_effects import moved_by
 from tests.vision.films import KNOCK_RAD, LATE_S, cameras, film, track
-from vision.rig_effects import moved_by
 
 
 @pytest.fixture(scope="session")

@@ -7,9 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from calib.camera import Camera
-from cdpr.rotation import log_rotation
-from cdpr.target import Target
+from freeswing.calib.camera.camera import Camera
+from freeswing.cdpr.measured.target import Target
+from freeswing.cdpr.rotation import log_rotation
+from freeswing.vision.render.record import record
+from freeswing.vision.render.render_scene import Look
+from freeswing.vision.track_session import track_session
 from tests.vision.scenes import (
     OPENCV_PARAMS,
     SurveyedTag,
@@ -19,9 +22,6 @@ from tests.vision.scenes import (
     standing_tags,
     swing,
 )
-from vision.record import record
-from vision.simulate import Look
-from vision.track import track_session
 
 FRAMES = 60
 STAMPS = 0.3 + np.arange(FRAMES) / 50.0

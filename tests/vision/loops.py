@@ -7,16 +7,16 @@ from pathlib import Path
 
 import numpy as np
 
-from calib.camera import Camera
-from calib.cameras_file import write_cameras
-from cdpr.documents import dump_toml
-from cdpr.robot_file import write_robot
-from cdpr.rotation import exp_rotation
-from cdpr.target import Target, write_target
+from freeswing.calib.camera.camera import Camera
+from freeswing.calib.camera.cameras_file import write_cameras
+from freeswing.cdpr.files.documents import dump_toml
+from freeswing.cdpr.files.robot_file import write_robot
+from freeswing.cdpr.measured.target import Target, write_target
+from freeswing.cdpr.rotation import exp_rotation
+from freeswing.vision.look.video import write_video
+from freeswing.vision.render.render_scene import Look, Renderer
 from tests.oracle.robots import declared_robot
 from tests.vision.scenes import arc_of_cameras, platform_tags, scene_of
-from vision.simulate import Look, Renderer
-from vision.video import write_video
 
 RATE_HZ = 50.0
 PERIOD = 50

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from calib.camera import Camera
-from cdpr.rotation import exp_rotation
-from cdpr.target import Tag
-from vision.patterns import Patch, tag_patch
-from vision.simulate import Scene
+from freeswing.calib.camera.camera import Camera
+from freeswing.cdpr.measured.target import Tag
+from freeswing.cdpr.rotation import exp_rotation
+from freeswing.vision.render.patterns import Patch, tag_patch
+from freeswing.vision.render.render_scene import Scene
 
 OPENCV_PARAMS = [900.0, 905.0, 359.5, 287.5, -0.12, 0.05, 0.001, -0.0005]
 

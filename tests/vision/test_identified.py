@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cdpr.robot import INERTIA_NAMES
+from freeswing.cdpr.robot import INERTIA_NAMES
 from freeswing.demo.filmed import write_filmed_session
 from freeswing.main import main
 

@@ -9,9 +9,12 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from cdpr.documents import InputError
-from cdpr.target import Target
-from cdpr.trajectory_files import read_trajectory
+from freeswing.cdpr.files.documents import InputError
+from freeswing.cdpr.files.trajectory_files import read_trajectory
+from freeswing.cdpr.measured.target import Target
+from freeswing.vision.look import pieces, sightings
+from freeswing.vision.settings import Settings
+from freeswing.vision.track_session import track_session
 from tests.vision.films import (
     BASE,
     FRAMES,
@@ -22,9 +25,6 @@ from tests.vision.films import (
     errors,
     track,
 )
-from vision import pieces, sightings
-from vision.settings import Settings
-from vision.track import track_session
 
 
 def test_poses_scatter_as_they_claim(session) -> None:

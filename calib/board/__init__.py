@@ -1,0 +1,1 @@
+"""The calibration board: its numbers, its corners in images and its motion."""

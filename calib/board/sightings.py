@@ -1,0 +1,264 @@
+"""Runs the detectors over calibration recordings and lines the cameras' frames up in time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+
+from freeswing.calib.board.board_motion import Timeline, linked, timeline
+from freeswing.calib.board.boards import Board
+from freeswing.calib.board.detection import BoardDetector
+from freeswing.calib.board.recordings import Recording, read_frames, stamps_of
+from freeswing.calib.camera.lens_models import Array
+from freeswing.calib.rig.views import Views, make_views
+
+Progress = Callable[[str, float], None]
+
+MOST_FRAMES = 600
+BURST = 5
+LEAST_FLOW = 4
+_LARGEST_BEND = 0.35
+_WORKERS = 2
+
+
+@dataclass(frozen=True, slots=True)
+class Sightings:
+    """The board in one camera's recording.
+
+    Attributes:
+        name: the camera.
+        size_px: width and height.
+        n_frames: frames in the recording.
+        numbers: frames with the board, (n,).
+        stamps_s: their stamps by the camera's own clock, NaN when unknown, (n,).
+        labels: how a person finds them, (n,).
+        pixels: corners, NaN where unseen, (n, n_points, 2).
+        covariance_px2: what the detector says of their noise, by groups of corners found
+            together, (n, n_groups, 2 c, 2 c).
+        border_cells: width of the border of the board's tags as found.
+        still_frames: a few images spread over the recording, for what does not move.
+    """
+
+    name: str
+    size_px: tuple[int, int]
+    n_frames: int
+    numbers: np.ndarray
+    stamps_s: Array
+    labels: tuple[str, ...]
+    pixels: Array
+    covariance_px2: Array
+    border_cells: int = 1
+    still_frames: tuple[np.ndarray, ...] = ()
+
+
+def see_boards(
+    recordings: Iterable[Recording],
+    board: Board,
+    frame_rate_hz: float | None,
+    n_still: int = 0,
+    progress: Progress | None = None,
+) -> tuple[Sightings, ...]:
+    """Detect the board in every recording, cameras side by side.
+
+    Recordings of more than `MOST_FRAMES` frames are searched in bursts of `BURST` frames spread
+    evenly, so that image velocities stay available.
+    """
+    recordings = tuple(recordings)
+    done = [0]
+
+    def run(recording: Recording) -> Sightings:
+        result = _see_board(recording, board, frame_rate_hz, n_still)
+        done[0] += 1
+        if progress is not None:
+            progress(f"board in {recording.name}", done[0] / len(recordings))
+        return result
+
+    with ThreadPoolExecutor(_WORKERS) as pool:
+        return tuple(pool.map(run, recordings))
+
+
+def _see_board(
+    recording: Recording, board: Board, frame_rate_hz: float | None, n_still: int
+) -> Sightings:
+    count = len(recording.images) or _count_frames(recording)
+    wanted = _wanted(count)
+    still_at = set(np.linspace(0, count - 1, n_still).round().astype(int)) if n_still else set()
+    detector = BoardDetector(board)
+    numbers, labels, found, stills, size = [], [], [], [], (0, 0)
+    for position, (number, label, image) in enumerate(read_frames(recording)):
+        size = (image.shape[1], image.shape[0])
+        if position in still_at:
+            stills.append(image)
+        if position not in wanted:
+            continue
+        corners = detector.detect(image)
+        if corners is not None:
+            numbers.append(number)
+            labels.append(label)
+            found.append(corners)
+    frames = np.array(numbers, dtype=int)
+    empty = detector.nothing()
+    return Sightings(
+        recording.name,
+        size,
+        count,
+        frames,
+        stamps_of(recording, frames, frame_rate_hz),
+        tuple(labels),
+        np.stack([empty.pixels, *(corners.pixels for corners in found)])[1:],
+        np.stack([empty.covariance_px2, *(corners.covariance_px2 for corners in found)])[1:],
+        detector.border_cells,
+        tuple(stills),
+    )
+
+
+def _count_frames(recording: Recording) -> int:
+    """Frames of a video: from its header where it is believable, else by decoding it."""
+    import av
+
+    with av.open(str(recording.path)) as container:
+        return sum(1 for packet in container.demux(video=0) if packet.size)
+
+
+def _wanted(count: int) -> set[int]:
+    if count <= MOST_FRAMES:
+        return set(range(count))
+    starts = np.linspace(0, count - BURST, MOST_FRAMES // BURST).round().astype(int)
+    return {int(start + k) for start in starts for k in range(BURST)}
+
+
+def smoothness(sightings: Sightings) -> tuple[np.ndarray, Array]:
+    """How the board moves through each frame.
+
+    It moves on smoothly where the bend of its way over three frames is small beside the step, or
+    beside the recording's usual step: where it turns round it hardly moves, and yet is not cut.
+
+    Returns:
+        1 where the frame and its two neighbours show one smooth motion, -1 where they do not (a
+        cut, a new pose), 0 where too little is seen to tell, (n,); and the image speed of the
+        board in px/s where the motion is smooth, else 0, (n,).
+    """
+    pixels, stamps, numbers = sightings.pixels, sightings.stamps_s, sightings.numbers
+    smooth, speed = np.zeros(len(numbers), dtype=int), np.zeros(len(numbers))
+    if len(numbers) < 3:
+        return smooth, speed
+    ahead, behind = pixels[2:] - pixels[1:-1], pixels[1:-1] - pixels[:-2]
+    known = np.isfinite(ahead + behind)[..., 0]
+    span = stamps[2:] - stamps[:-2]
+    told = (numbers[2:] - numbers[:-2] == 2) & (known.sum(axis=1) >= LEAST_FLOW) & (span > 0.0)
+    bend, step = np.full(len(told), np.nan), np.full(len(told), np.nan)
+    for row in np.flatnonzero(told):
+        both = known[row]
+        bend[row] = np.median(np.linalg.norm((ahead - behind)[row, both], axis=-1))
+        step[row] = np.median(np.linalg.norm((ahead + behind)[row, both], axis=-1))
+    usual = float(np.median(step[told])) if told.any() else 0.0
+    goes_on = told & (bend < _LARGEST_BEND * np.maximum(step, usual) + 1.0)
+    smooth[1:-1] = goes_on.astype(int) - (told & ~goes_on)
+    speed[1:-1][goes_on] = (step / span)[goes_on]
+    return smooth, speed
+
+
+@dataclass(frozen=True, slots=True)
+class Gathered:
+    """Simultaneous frames of the cameras put together.
+
+    Attributes:
+        views: the sightings; a view's lag is its own stamp minus its moment's base time, so it
+            holds the clock offset too.
+        line: the moments' base times and the pieces of smooth motion; None without stamps.
+        speed_px_s: image speed of the board in each view, 0 where unknown, (n_views,).
+    """
+
+    views: Views
+    line: Timeline | None
+    speed_px_s: Array
+
+
+def gather(
+    all_sightings: tuple[Sightings, ...],
+    frame_rate_hz: float | None,
+    offsets_s: Array | None = None,
+) -> Gathered:
+    """Put simultaneous frames of the cameras together.
+
+    Frames are matched by stamps to within half a frame where every camera has its own stamps,
+    else by frame number.
+
+    Args:
+        all_sightings: one a camera.
+        frame_rate_hz: nominal rate, None when unknown.
+        offsets_s: what is known of each camera's clock offset, zero when None.
+    """
+    stamped = all(np.isfinite(s.stamps_s).all() for s in all_sightings)
+    offsets = np.zeros(len(all_sightings)) if offsets_s is None or not stamped else offsets_s
+    keys = [
+        s.stamps_s + offset if stamped else s.numbers.astype(float)
+        for s, offset in zip(all_sightings, offsets, strict=True)
+    ]
+    joined = np.concatenate(keys) if keys else np.zeros(0)
+    group, times = _moments(keys, _reach(all_sightings, keys, frame_rate_hz))
+    camera = np.repeat(np.arange(len(keys)), [len(key) for key in keys])
+    moves = [smoothness(s) for s in all_sightings]
+    _, first = np.unique(np.stack([camera, group]), axis=1, return_index=True)
+    first = np.sort(first)
+    lag = joined - offsets[camera] - times[group] if stamped else np.zeros(len(joined))
+    views = make_views(
+        camera[first],
+        group[first],
+        np.concatenate([s.pixels for s in all_sightings])[first],
+        lag[first],
+        tuple(np.array([label for s in all_sightings for label in s.labels])[first].tolist()),
+        np.concatenate([s.covariance_px2 for s in all_sightings])[first],
+    )
+    speed = np.concatenate([speed for _, speed in moves])[first]
+    if not stamped:
+        return Gathered(views, None, speed)
+    smooth = np.concatenate([smooth for smooth, _ in moves])
+    goes_on = np.bincount(group, smooth > 0, len(times)) > 0
+    goes_on &= np.bincount(group, smooth < 0, len(times)) == 0
+    line = timeline(times, linked(times, goes_on, 2.0 * _half_step(keys)))
+    return Gathered(views, line, speed)
+
+
+def _reach(
+    all_sightings: tuple[Sightings, ...], keys: list[Array], frame_rate_hz: float | None
+) -> float:
+    """How far apart two cameras' frames of one moment may be."""
+    stamped = all(np.isfinite(s.stamps_s).all() for s in all_sightings)
+    return 0.5 / frame_rate_hz if stamped and frame_rate_hz else _half_step(keys)
+
+
+def _moments(keys: list[Array], reach: float) -> tuple[np.ndarray, Array]:
+    """Moment of each frame, camera after camera, and each moment's mean time.
+
+    The first camera's frames are moments; another camera's frame joins the nearest moment within
+    reach, or is one of its own.
+    """
+    times = np.zeros(0)
+    group = np.zeros(0, dtype=int)
+    for key in keys:
+        order = np.argsort(times, kind="stable")
+        own = len(times) + np.arange(len(key))
+        if len(times):
+            right = np.clip(np.searchsorted(times[order], key), 1, max(len(times) - 1, 1))
+            beside = order[np.stack([right - 1, np.minimum(right, len(times) - 1)])]
+            nearest = beside[np.abs(times[beside] - key).argmin(axis=0), np.arange(len(key))]
+            own = np.where(np.abs(times[nearest] - key) <= reach, nearest, own)
+        new = np.unique(own[own >= len(times)])
+        renumbered = len(times) + np.searchsorted(new, own)
+        times = np.concatenate([times, key[new - len(times)]])
+        group = np.concatenate([group, np.where(own < len(times) - len(new), own, renumbered)])
+    joined = np.concatenate(keys) if keys else times
+    mean = np.bincount(group, joined, len(times)) / np.bincount(group, minlength=len(times))
+    place = np.empty(len(times), dtype=int)
+    place[np.argsort(mean, kind="stable")] = np.arange(len(times))
+    return place[group], np.sort(mean)
+
+
+def _half_step(keys: list[Array]) -> float:
+    steps = [np.diff(np.sort(key)) for key in keys]
+    joined = np.concatenate(steps) if steps else np.zeros(0)
+    return 0.45 * float(joined[joined > 0.0].min()) if (joined > 0.0).any() else 0.45

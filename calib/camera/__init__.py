@@ -1,0 +1,1 @@
+"""One camera: its lens, where it stands, its file."""

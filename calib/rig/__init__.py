@@ -1,0 +1,1 @@
+"""All cameras together: views, bundle adjustment and its start."""

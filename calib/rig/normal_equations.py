@@ -1,0 +1,181 @@
+"""Normal equations of a rig, and their solution with every board pose eliminated block by block.
+
+The equations of cameras, warp and base points (shared, p of them) and of n board motions are an
+arrow; eliminating the b x b blocks leaves a dense p x p system (Schur complement, Triggs et al.
+2000, "Bundle Adjustment", sec. 6.1).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from freeswing.calib.camera.lens_models import Array
+from freeswing.calib.rig.reprojection import (
+    WARP,
+    Scene,
+    camera_slices,
+    fixed_jacobians,
+    kernel_board,
+    kernel_cameras,
+)
+from freeswing.calib.rig.reprojection_kernels import add_views
+from freeswing.calib.rig.views import FixedPoints, Views
+
+# share of normal errors within Huber's knee; for single corners the knee is at 3 sigma
+WITHIN_KNEE = 1.0 - np.exp(-4.5)
+_RANK_TOLERANCE = 1e-13
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """Data and choices of one adjustment.
+
+    Attributes:
+        board_points_m: the board's corners, (n_points, 3).
+        views: sightings of the board, ordered by camera, one per camera and moment.
+        fixed: surveyed points, None without.
+        free: which shared unknowns may move, in the order of `calib.rig.reprojection`, bool (p,).
+    """
+
+    board_points_m: Array
+    views: Views
+    fixed: FixedPoints | None
+    free: np.ndarray
+
+
+@dataclass(frozen=True, slots=True)
+class Normal:
+    """Blocks of the normal equations, J'WJ and J'Wr of shared unknowns and boards; and the cost."""
+
+    shared: Array  # (p, p)
+    cross: Array  # (n_pieces, p, b)
+    boards: Array  # (n_pieces, b, b)
+    shared_slope: Array  # (p,)
+    board_slopes: Array  # (n_pieces, b)
+    cost: float
+
+
+@cache
+def length_with_share(share: float, size: int) -> float:
+    """Length that a share of `size` unit normal numbers stays within."""
+    from scipy.special import gammaincinv
+
+    return float(np.sqrt(2.0 * gammaincinv(size / 2.0, share)))
+
+
+def normal_equations(scene: Scene, problem: Problem, sigma: Array) -> Normal:
+    """Normal equations at `scene`, robust weights included; `sigma` is each camera's noise, px."""
+    end = camera_slices(scene.cameras)[-1].stop
+    p, n, b = len(problem.free), len(scene.T_base_boards), scene.board_unknowns
+    views = problem.views
+    blocks = (np.zeros((p, p)), np.zeros((n, p, b)), np.zeros((n, b, b)))
+    slopes = (np.zeros(p), np.zeros((n, b)))
+    cost = add_views(
+        views.camera,
+        views.piece,
+        views.pixels,
+        views.lag_s,
+        views.whitening,
+        sigma,
+        length_with_share(WITHIN_KNEE, 2 * views.group_size),
+        *kernel_cameras(scene.cameras),
+        *kernel_board(scene, problem.board_points_m),
+        end,
+        (*blocks, *slopes),
+    )
+    if problem.fixed is not None:
+        cost += _add_fixed(scene, problem.fixed, sigma, blocks[0], slopes[0])
+    return Normal(*blocks, *slopes, cost)
+
+
+def _add_fixed(
+    scene: Scene, fixed: FixedPoints, sigma: Array, shared: Array, slope: Array
+) -> float:
+    """Add the fixed points' sightings and their survey to the shared block; their cost."""
+    slices = camera_slices(scene.cameras)
+    first = slices[-1].stop + WARP
+    knee = length_with_share(WITHIN_KNEE, 2)
+    cost = 0.0
+    for index, own in enumerate(slices):
+        some = fixed.select(fixed.camera == index)
+        if not len(some.point):
+            continue
+        residuals, d_camera, d_point = fixed_jacobians(scene, some, index)
+        noise = sigma[index] * some.std_scale
+        error = np.hypot(residuals[:, 0], residuals[:, 1]) / noise
+        cost += float(np.where(error < knee, 0.5 * error**2, knee * error - 0.5 * knee**2).sum())
+        scale = (np.sqrt(np.minimum(1.0, knee / np.maximum(error, 1e-12))) / noise)[:, None]
+        rows = np.zeros((len(some.point), 2, len(slope)))
+        rows[..., own] = d_camera
+        for axis in range(3):
+            columns = first + 3 * some.point + axis
+            rows[np.arange(len(columns)), :, columns] = d_point[..., axis]
+        rows = (rows * scale[..., None]).reshape(-1, len(slope))
+        shared += rows.T @ rows
+        slope += rows.T @ (residuals * scale).reshape(-1)
+    information = np.repeat(1.0 / fixed.std_m**2, 3)
+    change = (fixed.points_base_m - scene.base_points_m).reshape(-1)
+    diagonal = first + np.arange(information.size)
+    shared[diagonal, diagonal] += information
+    slope[diagonal] += information * change
+    return cost + 0.5 * float(np.sum(information * change**2))
+
+
+def damped_step(normal: Normal, free: np.ndarray, damping: float) -> tuple[Array, Array]:
+    """Levenberg-Marquardt step of shared unknowns (p,) and boards (n, b); NaN when singular."""
+    boards = normal.boards.copy()
+    diagonal = np.einsum("nii->ni", boards)
+    diagonal *= 1.0 + damping
+    diagonal += 1e-12 * np.maximum(1.0, diagonal)
+    cross = normal.cross[:, free]
+    shared = normal.shared[np.ix_(free, free)]
+    scale = np.einsum("ii->i", shared).copy()
+    reduced, weighted = _reduced(shared, cross, boards)
+    reduced[np.diag_indices_from(reduced)] += damping * scale + 1e-14 * np.maximum(scale, 1.0)
+    slope = normal.shared_slope[free] - np.einsum("npi,ni->p", weighted, normal.board_slopes)
+    step = np.zeros(len(free))
+    try:
+        step[free] = np.linalg.solve(reduced, slope)
+    except np.linalg.LinAlgError:
+        step[free] = np.nan
+    rest = normal.board_slopes - np.einsum("npi,p->ni", cross, step[free])
+    return step, np.linalg.solve(boards, rest[..., None])[..., 0]
+
+
+def _reduced(shared: Array, cross: Array, boards: Array) -> tuple[Array, Array]:
+    """Schur complement of the board blocks, and cross @ inverse(boards)."""
+    weighted: Array = cross @ np.linalg.inv(boards).astype(np.float64)
+    p = shared.shape[0]
+    width = boards.shape[0] * boards.shape[1]
+    flat = np.swapaxes(weighted, 0, 1).reshape(p, width)
+    return shared - flat @ np.swapaxes(cross, 0, 1).reshape(p, width).T, weighted
+
+
+def covariances(normal: Normal, free: np.ndarray) -> tuple[Array, Array, int, Array, float]:
+    """Covariances of shared unknowns (p, p) and boards (n, b, b), rank, weakest, condition.
+
+    Directions without rank are left out; `weakest` is the least determined one, a unit vector.
+    """
+    boards = normal.boards + 1e-12 * np.eye(normal.boards.shape[1])
+    if not free.any():
+        nothing = np.zeros(len(free))
+        covariance = np.zeros((len(free), len(free)))
+        return covariance, np.linalg.inv(boards).astype(np.float64), 0, nothing, 1.0
+    cross = normal.cross[:, free]
+    reduced, weighted = _reduced(normal.shared[np.ix_(free, free)], cross, boards)
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(normal.shared)[free], 1e-300))
+    values, vectors = np.linalg.eigh(reduced * scale[:, None] * scale)
+    kept = values > _RANK_TOLERANCE * max(float(values[-1]), 1e-300)
+    half = scale[:, None] * vectors[:, kept] / np.sqrt(values[kept])
+    covariance = np.zeros((len(free), len(free)))
+    covariance[np.ix_(free, free)] = half @ half.T
+    spread = np.swapaxes(weighted, 1, 2) @ half
+    board_covariances = np.linalg.inv(boards) + spread @ np.swapaxes(spread, 1, 2)
+    weakest = np.zeros(len(free))
+    weakest[free] = scale * vectors[:, 0]
+    weakest /= np.linalg.norm(weakest)
+    condition = float(values[-1] / max(values[0], 1e-300))
+    return covariance, board_covariances, int(kept.sum()), weakest, condition

@@ -1,0 +1,319 @@
+"""A rig of cameras from the board's sightings: start, adjust, drop what does not belong."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from freeswing.calib.board.board_motion import Timeline, in_pieces
+from freeswing.calib.camera.camera import Camera
+from freeswing.calib.camera.intrinsics import CameraStart, DroppedView, start_camera
+from freeswing.calib.camera.lens_models import Array
+from freeswing.calib.rig.bundle_adjustment import (
+    MEDIAN_OF_RAYLEIGH,
+    ROUGHLY_CONVERGED,
+    Adjustment,
+    adjust,
+)
+from freeswing.calib.rig.normal_equations import (
+    Problem,
+    covariances,
+    damped_step,
+    length_with_share,
+    normal_equations,
+)
+from freeswing.calib.rig.reprojection import Scene, camera_slices, moved, shape_modes
+from freeswing.calib.rig.reprojection_kernels import CLOCK, POSE, WARP
+from freeswing.calib.rig.rig_start import place_in_base, start_rig
+from freeswing.calib.rig.views import FixedPoints, Views
+
+Progress = Callable[[str, float], None]
+
+VIEW_OUTLIER_SIGMAS = 5.0
+VIEW_OUTLIER_FLOOR_PX = 0.5
+# share of normal errors within the limit of a corner's: 6 sigma for a corner on its own
+CORNER_WITHIN = 1.0 - np.exp(-18.0)
+_LEAST_CORNERS = 4
+LINE_TIME_SIGMAS = 5.0
+SHAPE_SIGMAS = 6.0
+LEAST_SHAPE_M = 2e-5
+LEAST_READOUT_S = 5e-4
+_MOST_SWEEPS = 3
+_SURVEY_ROUNDS = 3
+_SURVEY_PRIOR = 2.0
+LEAST_SURVEY_STD_M = 2e-5
+
+
+@dataclass(frozen=True, slots=True)
+class Rig:
+    """A solved rig.
+
+    Attributes:
+        adjustment: estimate, covariance, noise and residuals.
+        problem: the data kept and the unknowns that were free.
+        reference: camera whose pose is the identity where there is no base frame.
+        dropped: views left out, by name.
+        n_trimmed: single corners left out.
+    """
+
+    adjustment: Adjustment
+    problem: Problem
+    reference: int
+    dropped: tuple[DroppedView, ...]
+    n_trimmed: int
+
+    @property
+    def cameras(self) -> tuple[Camera, ...]:
+        """The calibrated cameras."""
+        return self.adjustment.scene.cameras
+
+
+def start_cameras(
+    names: tuple[str, ...],
+    sizes_px: tuple[tuple[int, int], ...],
+    models: tuple[str, ...],
+    board_points_m: Array,
+    views: Views,
+) -> tuple[CameraStart, ...]:
+    """Every camera on its own."""
+    return tuple(
+        start_camera(name, size, model, board_points_m, views.select(views.camera == index))
+        for index, (name, size, model) in enumerate(zip(names, sizes_px, models, strict=True))
+    )
+
+
+def solve_rig(
+    board_points_m: Array,
+    starts: tuple[CameraStart, ...],
+    offsets_s: Array | None = None,
+    line: Timeline | None = None,
+    straighten: Callable[[Scene, Views], Views] | None = None,
+) -> Rig:
+    """All cameras and board poses at once, in the frame of the reference camera.
+
+    Args:
+        board_points_m: the board's corners, (n_points, 3).
+        starts: every camera on its own; equal moments of two cameras are simultaneous.
+        offsets_s: clock offsets to start from, (n_cameras,).
+        line: times and pieces of the moments when the board moves: clocks are then estimated, and
+            time is the first camera's; None for a board that rests at each moment.
+        straighten: puts the corners right once the rig is nearly known (`calib.tags.tag_bend`).
+
+    Raises:
+        DataError: when the cameras do not share enough views.
+    """
+    views = _joined([start.views for start in starts])
+    poses = np.concatenate([start.T_camera_boards for start in starts])
+    offsets = np.zeros(len(starts)) if offsets_s is None else offsets_s
+    cameras = tuple(
+        replace(start.camera, clock_offset_s=float(offset))
+        for start, offset in zip(starts, offsets, strict=True)
+    )
+    views, moments = views.compacted()
+    start = start_rig(cameras, board_points_m, views, poses)
+    scene, clocks = start.scene, line is not None
+    if line is not None:
+        scene, views = in_pieces(scene, views, Timeline(line.times_s[moments], line.piece[moments]))
+    free = free_unknowns(cameras, held_pose=start.reference, clocks=clocks)
+    dropped = tuple(drop for camera in starts for drop in camera.dropped)
+    problem = Problem(board_points_m, views, None, free)
+    rig = refine(scene, problem, start.reference, dropped, roughly=straighten is not None)
+    if clocks:
+        rig = _without_idle_lines(rig)
+    if straighten is not None:
+        scene = rig.adjustment.scene
+        problem = replace(rig.problem, views=straighten(scene, rig.problem.views))
+        rig = refine(scene, problem, rig.reference, rig.dropped, rig.n_trimmed)
+    return _with_board_shape(rig)
+
+
+def _with_board_shape(rig: Rig) -> Rig:
+    """Let the board bend and its tags grow where the views show it beyond doubt."""
+    end = camera_slices(rig.cameras)[-1].stop
+    free = rig.problem.free.copy()
+    free[end : end + WARP] = np.abs(shape_modes(rig.problem.board_points_m)).max(axis=(0, 1)) > 0
+    problem = replace(rig.problem, free=free)
+    # the rest has converged: one linear step tells what the shape would become
+    normal = normal_equations(rig.adjustment.scene, problem, rig.adjustment.sigma_px)
+    shared, boards = damped_step(normal, free, 0.0)
+    shape = shared[end : end + WARP]
+    std = np.sqrt(np.diag(covariances(normal, free)[0])[end : end + WARP])
+    shown = (np.abs(shape) > SHAPE_SIGMAS * std) & (np.abs(shape) > LEAST_SHAPE_M)
+    if not shown.any():
+        return rig
+    free[end : end + WARP] &= shown
+    scene = moved(rig.adjustment.scene, shared, boards)
+    scene = replace(scene, warp_m=np.where(shown, shape, 0.0))
+    problem = replace(rig.problem, free=free)
+    return refine(scene, problem, rig.reference, rig.dropped, rig.n_trimmed)
+
+
+def _without_idle_lines(rig: Rig) -> Rig:
+    """Hold line times at zero where they do not stand out: most cameras have a global shutter."""
+    free, scene = rig.problem.free.copy(), rig.adjustment.scene
+    cameras = list(scene.cameras)
+    for index, own in enumerate(camera_slices(scene.cameras)):
+        last = own.stop - 1
+        std = float(np.sqrt(rig.adjustment.covariance[last, last]))
+        readout = cameras[index].size_px[1] * abs(cameras[index].line_time_s)
+        stands_out = abs(cameras[index].line_time_s) > LINE_TIME_SIGMAS * std
+        if free[last] and not (stands_out and readout > LEAST_READOUT_S):
+            free[last] = False
+            cameras[index] = replace(cameras[index], line_time_s=0.0)
+    if np.array_equal(free, rig.problem.free):
+        return rig
+    problem = replace(rig.problem, free=free)
+    start = replace(scene, cameras=tuple(cameras))
+    return refine(start, problem, rig.reference, rig.dropped, rig.n_trimmed)
+
+
+def free_unknowns(
+    cameras: tuple[Camera, ...],
+    *,
+    held_pose: int | None = None,
+    n_fixed: int = 0,
+    warp: bool = False,
+    held_lenses: bool = False,
+    clocks: bool = False,
+) -> np.ndarray:
+    """Which shared unknowns move: lenses, poses but one, base points, and warp if asked.
+
+    With `clocks` every line time is free, and every clock offset but the first camera's.
+    """
+    slices = camera_slices(cameras)
+    free = np.ones(slices[-1].stop + WARP + 3 * n_fixed, dtype=bool)
+    for index, (camera, own) in enumerate(zip(cameras, slices, strict=True)):
+        k = len(camera.params)
+        free[own.start : own.start + k] = not held_lenses
+        free[own.start + k : own.start + k + POSE] = index != held_pose
+        free[own.stop - CLOCK : own.stop] = (clocks and index > 0, clocks)
+    free[slices[-1].stop : slices[-1].stop + WARP] = warp
+    return free
+
+
+def refine(
+    scene: Scene,
+    problem: Problem,
+    reference: int,
+    dropped: tuple[DroppedView, ...] = (),
+    n_trimmed: int = 0,
+    *,
+    roughly: bool = False,
+) -> Rig:
+    """Adjust, drop outlying views and corners, and adjust again until none is left.
+
+    `roughly` leaves out the last steps, for a result that is to be refined again.
+    """
+    result = adjust(scene, problem, rounds=1, converged=ROUGHLY_CONVERGED)
+    for _ in range(_MOST_SWEEPS):
+        keep, limits, errors = _views_kept(result, problem)
+        trimmed = _trimmed(result, problem)
+        n_new = int(problem.views.seen.sum() - trimmed.seen.sum())
+        enough = keep & (trimmed.seen.sum(axis=1) >= _LEAST_CORNERS)
+        if enough.all() and n_new == 0:
+            break
+        dropped += tuple(
+            DroppedView(problem.views.label[i], errors[i], limits[i], "px")
+            for i in np.flatnonzero(~enough)
+        )
+        n_trimmed += int(problem.views.seen[enough].sum() - trimmed.seen[enough].sum())
+        enough &= _determined(trimmed.select(enough), result.scene)[trimmed.piece]
+        views, pieces = trimmed.select(enough).compacted()
+        problem = replace(problem, views=views)
+        result = adjust(
+            result.scene.pieces(pieces),
+            problem,
+            result.sigma_px,
+            rounds=1,
+            converged=ROUGHLY_CONVERGED,
+        )
+    if not roughly:
+        result = adjust(result.scene, problem, result.sigma_px, rounds=1)
+    return Rig(result, problem, reference, dropped, n_trimmed)
+
+
+def _views_kept(result: Adjustment, problem: Problem) -> tuple[np.ndarray, Array, Array]:
+    """Views whose error stays near what is usual in their camera; limits and errors, px.
+
+    The error is the median corner's, each axis: one bad corner is trimmed, not the whole view.
+    """
+    lengths = np.linalg.norm(result.residuals_px, axis=-1)
+    errors = np.nanmedian(lengths, axis=1) / MEDIAN_OF_RAYLEIGH
+    limits = np.zeros(len(errors))
+    for index in range(len(result.scene.cameras)):
+        own = problem.views.camera == index
+        if own.any():
+            usual = max(float(np.median(errors[own])), float(result.sigma_px[index]))
+            limits[own] = max(VIEW_OUTLIER_SIGMAS * usual, VIEW_OUTLIER_FLOOR_PX)
+    return errors <= limits, limits, errors
+
+
+def _determined(views: Views, scene: Scene) -> np.ndarray:
+    """Whether a piece still has as many moments as its motion has coefficients, (n_pieces,)."""
+    pairs = np.unique(np.stack([views.piece, views.moment]), axis=1)
+    return np.bincount(pairs[0], minlength=len(scene.motion)) > scene.motion.shape[1]
+
+
+def _trimmed(result: Adjustment, problem: Problem) -> Views:
+    """The views with far-off corners blanked, all that were found together."""
+    views = problem.views
+    white = views.whitened(result.residuals_px)
+    limit = length_with_share(CORNER_WITHIN, white.shape[-1]) * result.sigma_px[views.camera]
+    with np.errstate(invalid="ignore"):
+        far = np.linalg.norm(white, axis=-1) > limit[:, None]
+    far = np.repeat(far, views.group_size, axis=1)
+    return replace(views, pixels=np.where(far[..., None], np.nan, views.pixels))
+
+
+def tie_to_base(rig: Rig, fixed: FixedPoints, *, estimate_survey: bool = True) -> Rig:
+    """The rig in the base frame, surveyed points adjusted with everything else.
+
+    Args:
+        rig: solved in its own frame.
+        fixed: surveyed points and their sightings.
+        estimate_survey: measure the survey's noise from how it fits, instead of taking it as given.
+    """
+    scene = place_in_base(rig.adjustment.scene, fixed)
+    free = np.concatenate([rig.problem.free, np.ones(3 * len(fixed.points_base_m), dtype=bool)])
+    held = scene.cameras[rig.reference]
+    first = camera_slices(scene.cameras)[rig.reference].start + len(held.params)
+    free[first : first + POSE] = True
+    problem = replace(rig.problem, fixed=fixed, free=free)
+    result = adjust(scene, problem, rig.adjustment.sigma_px, rounds=1)
+    for _ in range(_SURVEY_ROUNDS if estimate_survey else 1):
+        if estimate_survey:
+            std = _survey_std(result, fixed)
+            fixed = replace(fixed, std_m=np.full(len(fixed.std_m), std))
+            problem = replace(problem, fixed=fixed)
+        result = adjust(result.scene, problem, result.sigma_px, rounds=1)
+    return Rig(result, problem, rig.reference, rig.dropped, rig.n_trimmed)
+
+
+def _survey_std(result: Adjustment, fixed: FixedPoints) -> float:
+    """Standard deviation of a surveyed coordinate from the corrections the cameras ask for.
+
+    Variance component estimation: squared corrections over the redundancy that carries them
+    (Foerstner and Wrobel 2016, sec. 4.2.4). Few corrections leave the given value nearly alone:
+    it counts as `_SURVEY_PRIOR` corrections of its own.
+    """
+    correction = result.scene.base_points_m - fixed.points_base_m
+    given = float(fixed.std_m.mean())
+    own = slice(len(result.covariance) - correction.size, None)
+    left = np.diag(result.covariance)[own] / given**2
+    redundancy = max(float(correction.size - left.sum()), 0.0)
+    total = float(np.sum(correction**2)) + _SURVEY_PRIOR * given**2
+    return max(np.sqrt(total / (redundancy + _SURVEY_PRIOR)), LEAST_SURVEY_STD_M)
+
+
+def _joined(parts: list[Views]) -> Views:
+    return Views(
+        np.concatenate([part.camera for part in parts]),
+        np.concatenate([part.moment for part in parts]),
+        np.concatenate([part.piece for part in parts]),
+        np.concatenate([part.pixels for part in parts]),
+        np.concatenate([part.lag_s for part in parts]),
+        np.concatenate([part.whitening for part in parts]),
+        tuple(label for part in parts for label in part.label),
+    )

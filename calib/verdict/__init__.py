@@ -1,0 +1,1 @@
+"""May this calibration be used? Checks against surveys, plumb lines and truth."""

@@ -1,0 +1,1 @@
+"""Effects of the cables themselves: they stretch, weigh something, or slip at the winch."""

@@ -1,0 +1,1 @@
+"""Effects that push or pull, gravity's direction among them."""

@@ -1,0 +1,1 @@
+"""Effects of geometry: cable ends, pulleys and lengths that are not as declared."""

@@ -1,0 +1,218 @@
+"""robot.toml to and from `Robot`; every problem of a file is named at once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from freeswing.cdpr.files.documents import (
+    InputError,
+    Problems,
+    Reader,
+    dump_toml,
+    inside,
+    load_toml,
+)
+from freeswing.cdpr.files.mesh import METRES_PER_UNIT, platform_from_mesh
+from freeswing.cdpr.robot import POSE_COORDINATES, STANDARD_GRAVITY_M_S2, Cable, Platform, Robot
+
+Array = NDArray[np.float64]
+
+MOST_CABLES = 8
+AXIS_TOLERANCE = 1e-6
+SWIVEL_KEYS = ("swivel_x", "swivel_y", "swivel_z")
+INERTIA_TOLERANCE = 1e-9
+
+
+def read_robot(path: Path | str) -> Robot:
+    """Read robot.toml; a mesh named in it is read too, from the file's folder or below.
+
+    Raises:
+        InputError: naming every problem of the file with its key.
+    """
+    problems = Problems()
+    reader = Reader(load_toml(path, "robot", problems), problems)
+    name = reader.string("name")
+    gravity = _read_gravity(reader)
+    cables = [_read_cable(table) for table in reader.children("cables")]
+    _check_cables(reader, cables)
+    free = _read_free_coordinates(reader, len(cables))
+    platform = _read_platform(reader.child("platform", required=False), Path(path).parent)
+    reader.finish()
+    problems.raise_if_any(path)
+    return Robot(
+        name=name,
+        cables=tuple(Cable(*values) for values in cables),
+        gravity_m_s2=gravity,
+        free_coordinates=free,
+        platform=platform,
+    )
+
+
+def write_robot(path: Path | str, robot: Robot) -> None:
+    """Write robot.toml; the file is replaced whole."""
+    free = robot.free_coordinates
+    platform = {
+        "mass_kg": robot.platform.mass_kg,
+        "com_m": robot.platform.com_m,
+        "specific_inertia_m2": robot.platform.specific_inertia_m2,
+    }
+    cables = [
+        {
+            "name": cable.name,
+            "entry_m": cable.entry_m,
+            "pulley_radius_m": float(cable.pulley_radius_m),
+            "attachment_m": cable.attachment_m,
+            **{key: getattr(cable, key) for key in SWIVEL_KEYS},
+        }
+        for cable in robot.cables
+    ]
+    table = {
+        "format": "freeswing-robot/1",
+        "name": robot.name,
+        "gravity_m_s2": robot.gravity_m_s2,
+        "free_coordinates": "auto" if free is None else list(free),
+        "platform": platform if any(v is not None for v in platform.values()) else None,
+        "cables": cables,
+    }
+    dump_toml(path, table)
+
+
+CableValues = tuple[str, Array, float, Array, Array, Array, Array]
+
+
+def _read_gravity(reader: Reader) -> Array:
+    gravity = reader.optional_vector("gravity_m_s2", 3)
+    if gravity is None:
+        return np.array([0.0, 0.0, -STANDARD_GRAVITY_M_S2])
+    if np.linalg.norm(gravity) == 0.0:
+        reader.add("gravity_m_s2", "is zero; a suspended platform swings only under gravity")
+    return gravity
+
+
+def _read_cable(reader: Reader) -> CableValues:
+    name = reader.string("name")
+    entry = reader.vector("entry_m", 3)
+    radius = reader.number("pulley_radius_m", minimum=0.0)
+    attachment = reader.vector("attachment_m", 3)
+    axes = _read_swivel(reader, is_eyelet=radius == 0.0)
+    reader.finish()
+    return (name, entry, radius, attachment, *axes)
+
+
+def _read_swivel(reader: Reader, *, is_eyelet: bool) -> tuple[Array, Array, Array]:
+    """The swivel frame; of an eyelet it is not used, so it may be absent or arbitrary."""
+    if is_eyelet:
+        axes = [reader.optional_vector(key, 3) for key in SWIVEL_KEYS]
+        rows = np.array([axis for axis in axes if axis is not None])
+        is_frame = len(rows) == 3 and np.allclose(rows @ rows.T, np.eye(3), atol=AXIS_TOLERANCE)
+        x, y, z = rows if is_frame else np.eye(3)
+        return x, y, z
+    x, y, z = (reader.unit_vector(key, tolerance=AXIS_TOLERANCE) for key in SWIVEL_KEYS)
+    pairs = {
+        "swivel_x, swivel_y": (x, y),
+        "swivel_y, swivel_z": (y, z),
+        "swivel_z, swivel_x": (z, x),
+    }
+    products = {keys: float(a @ b) for keys, (a, b) in pairs.items()}
+    for keys, product in products.items():
+        if abs(product) > AXIS_TOLERANCE:
+            reader.add(
+                keys,
+                f"not perpendicular: their dot product is {product:.3g}, "
+                f"must be 0 within {AXIS_TOLERANCE:g}",
+            )
+    if float(np.cross(x, y) @ z) < -0.5:
+        reader.add(
+            "swivel_z",
+            "x, y, z are left-handed (x cross y = -z); turn the sign of the axis that is wrong",
+        )
+    return x, y, z
+
+
+def _check_cables(reader: Reader, cables: list[CableValues]) -> None:
+    if len(cables) > MOST_CABLES or ("cables" in reader and not cables):
+        reader.add("cables", f"{len(cables)} cables, must be 1 to {MOST_CABLES}")
+        return
+    names = [values[0] for values in cables]
+    for count, name in enumerate(names):
+        if name and name in names[:count]:
+            first = names.index(name) + 1
+            reader.add(f"cables[{count + 1}].name", f"{name!r} is already cables[{first}]'s")
+
+
+def _read_free_coordinates(reader: Reader, n_cables: int) -> tuple[str, ...] | None:
+    n_free = max(6 - n_cables, 0)
+    value = reader.raw("free_coordinates", required=False)
+    if value is None or value == "auto":
+        return None if n_free else ()
+    names = reader.strings("free_coordinates")
+    for name in names:
+        if name not in POSE_COORDINATES:
+            allowed = ", ".join(POSE_COORDINATES)
+            reader.add("free_coordinates", f"{name[:40]!r} is not one of {allowed}")
+    if len(set(names)) < len(names):
+        reader.add("free_coordinates", f"{list(names)} names a coordinate twice")
+    if isinstance(value, list) and n_cables and len(value) != n_free:
+        reader.add(
+            "free_coordinates",
+            f"{len(value)} coordinates, must be 6 - n = {n_free} with {n_cables} cables",
+        )
+    return names
+
+
+def _read_platform(reader: Reader | None, folder: Path) -> Platform:
+    if reader is None:
+        return Platform()
+    mass = reader.optional_number("mass_kg", above=0.0)
+    density = reader.optional_number("density_kg_m3", above=0.0)
+    com = reader.optional_vector("com_m", 3)
+    inertia = reader.optional_vector("specific_inertia_m2", 6)
+    mesh = reader.optional_string("mesh")
+    unit = reader.optional_string("mesh_unit", choices=tuple(METRES_PER_UNIT))
+    reader.finish()
+    if mass is not None and density is not None:
+        reader.add("density_kg_m3", "give mass_kg or density_kg_m3, not both")
+    if mesh is None and (density is not None or unit is not None):
+        reader.add("mesh", "missing; mesh_unit and density_kg_m3 say nothing without it")
+    _check_inertia(reader, com, inertia)
+    needs_mesh = com is None or inertia is None or density is not None
+    if mesh and needs_mesh and not reader.problems:
+        try:
+            solid = platform_from_mesh(
+                inside(folder, mesh), unit or "m", mass_kg=mass, density_kg_m3=density
+            )
+        except InputError as error:
+            reader.add("mesh", str(error))
+        else:
+            mass = solid.mass_kg
+            com = solid.com_m if com is None else com
+            inertia = solid.specific_inertia_m2 if inertia is None else inertia
+            _check_inertia(reader, com, inertia)
+    return Platform() if reader.problems else Platform(mass, com, inertia)
+
+
+def _check_inertia(reader: Reader, com: Array | None, inertia: Array | None) -> None:
+    """Record a specific inertia that no distribution of mass can have.
+
+    The second moments of mass about P, E[p p^T] = tr(I')/2 - I', less those of the centre of mass,
+    are a covariance: positive semi-definite (Wensing, Kim, Slotine 2018).
+    """
+    if inertia is None or not np.isfinite(inertia).all():
+        return
+    xx, yy, zz, xy, xz, yz = inertia
+    tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    moments = 0.5 * np.trace(tensor) * np.eye(3) - tensor
+    about = "P"
+    if com is not None and np.isfinite(com).all():
+        moments, about = moments - np.outer(com, com), "the centre of mass"
+    least = float(np.linalg.eigvalsh(moments)[0])
+    if least < -INERTIA_TOLERANCE * max(1.0, float(np.abs(tensor).max())):
+        reader.add(
+            "specific_inertia_m2",
+            f"no body has it: the least second moment of mass about {about} is {least:.4g} m2, "
+            "must be >= 0 (the tensor is about P, over the mass; check com_m and the order "
+            "xx yy zz xy xz yz)",
+        )

@@ -1,0 +1,253 @@
+"""Marker recordings as C3D (https://www.c3d.org, user guide of 2008): binary, float32 or int16.
+
+Written with ezc3d. Read here: ezc3d ends the process on some damaged files, and a measured file
+from elsewhere must give a message instead.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from freeswing.cdpr.files.documents import InputError, read_bytes, replace_file
+from freeswing.cdpr.files.number_table import LARGEST_NUMBER
+from freeswing.cdpr.measured.marker_recording import MarkerRecording
+
+Array = NDArray[np.float64]
+
+MOST_C3D_BYTES = 512 * 2**20
+BLOCK = 512
+MARK = 0x50
+BYTE_ORDERS = {84: "<", 86: ">"}
+METRES_PER_UNIT = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
+ITEM_TYPES = {-1: "S1", 1: "i1", 2: "i2", 4: "f4"}
+FULL_COUNT = 0xFFFF
+LEAST_RATE_HZ = 0.01
+MOST_RATE_HZ = 1e6
+
+
+def read_c3d(path: Path | str) -> MarkerRecording:
+    """Read the points of a C3D file; a negative residual or NaN is a marker that was not seen.
+
+    Time 0 is frame 1 of the recording, so that a cropped file keeps its times.
+
+    Raises:
+        InputError: for a damaged file, an unknown unit or no points.
+    """
+    data = read_bytes(path, MOST_C3D_BYTES)
+    try:
+        return _read(Path(path), data)
+    except InputError:
+        raise
+    except (IndexError, KeyError, ValueError, OverflowError) as error:
+        raise InputError(f"{path}: a damaged C3D file ({error}); export it again") from error
+
+
+def write_c3d(path: Path | str, recording: MarkerRecording, unit: str = "mm") -> None:
+    """Write a C3D file in `unit` (m, cm or mm), as float32, at a uniform rate.
+
+    Raises:
+        ValueError: for another unit, times that are not uniform from a multiple of the step on, or
+            more frames than the format counts.
+    """
+    import tempfile
+
+    import ezc3d
+
+    if unit not in METRES_PER_UNIT:
+        raise ValueError(f"unit {unit!r} must be one of {', '.join(METRES_PER_UNIT)}")
+    rate, first = _grid(recording.times_s)
+    positions = recording.positions_m / METRES_PER_UNIT[unit]
+    points = np.ones((4, len(recording.names), len(recording.times_s)))
+    points[:3] = positions.transpose(2, 1, 0)
+    file = ezc3d.c3d()
+    file["header"]["points"]["first_frame"] = first
+    file["parameters"]["POINT"]["RATE"]["value"] = [rate]
+    file["parameters"]["POINT"]["LABELS"]["value"] = list(recording.names)
+    file["parameters"]["POINT"]["UNITS"]["value"] = [unit]
+    file["data"]["points"] = points
+    with tempfile.TemporaryDirectory() as folder:
+        draft = Path(folder) / "draft.c3d"
+        file.write(str(draft))
+        replace_file(path, draft.read_bytes())
+
+
+@dataclass(frozen=True, slots=True)
+class _Parameter:
+    kind: int
+    dimensions: tuple[int, ...]
+    data: bytes
+
+    def numbers(self, order: str) -> list[float]:
+        if self.kind not in (1, 2, 4):
+            raise KeyError("a text stands where a number must be")
+        return np.frombuffer(self.data, f"{order}{ITEM_TYPES[self.kind]}").astype(float).tolist()
+
+    def texts(self) -> list[str]:
+        if self.kind != -1 or not self.dimensions:
+            raise KeyError("a number stands where a text must be")
+        width = self.dimensions[0]
+        cells = [self.data[i : i + width] for i in range(0, len(self.data), max(width, 1))]
+        return [cell.decode("utf-8", "replace").strip(" \0") for cell in cells]
+
+
+def _read(path: Path, data: bytes) -> MarkerRecording:
+    if len(data) < 2 * BLOCK or data[1] != MARK or data[0] == 0:
+        raise InputError(f"{path}: not a C3D file (its second byte must be 80)")
+    start = (data[0] - 1) * BLOCK
+    order = BYTE_ORDERS.get(data[start + 3])
+    if order is None:
+        raise InputError(
+            f"{path}: processor type {data[start + 3]} (84 is Intel, 86 MIPS); convert the file to "
+            "Intel numbers"
+        )
+    parameters = _parameters(data, start, order)
+    header = np.frombuffer(data[:BLOCK], f"{order}u2")
+    rate = parameters["POINT", "RATE"].numbers(order)[0]
+    if not LEAST_RATE_HZ <= rate <= MOST_RATE_HZ:
+        raise InputError(
+            f"{path}: POINT:RATE is {rate} Hz, must be {LEAST_RATE_HZ:g} to {MOST_RATE_HZ:g}"
+        )
+    first, n_frames = _frames(header, parameters, order)
+    names = _names(path, parameters, order)
+    positions = _points(path, data, header, parameters, order, n_frames, len(names))
+    scale = _metres_per_unit(path, parameters)
+    times = (first - 1 + np.arange(n_frames)) / rate
+    labelled = [i for i, name in enumerate(names) if name]
+    return MarkerRecording(
+        times, tuple(names[i] for i in labelled), scale * positions[:, labelled], path.name
+    )
+
+
+def _parameters(data: bytes, start: int, order: str) -> dict[tuple[str, str], _Parameter]:
+    """Parameters by (GROUP, NAME)."""
+    groups: dict[int, str] = {}
+    found: dict[tuple[int, str], _Parameter] = {}
+    at = start + 4
+    while at + 2 <= len(data):
+        n_name = abs(int.from_bytes(data[at : at + 1], "little", signed=True))
+        group = int.from_bytes(data[at + 1 : at + 2], "little", signed=True)
+        if n_name == 0 or group == 0:
+            break
+        name = data[at + 2 : at + 2 + n_name].decode("latin-1").upper()
+        field = at + 2 + n_name
+        (step,) = np.frombuffer(data[field : field + 2].ljust(2, b"\0"), f"{order}u2").tolist()
+        if group < 0:
+            groups[-group] = name
+        else:
+            found[group, name] = _parameter(data, field + 2)
+        if step == 0:
+            break
+        at = field + step
+    return {(groups[group], name): p for (group, name), p in found.items() if group in groups}
+
+
+def _parameter(data: bytes, at: int) -> _Parameter:
+    kind = int.from_bytes(data[at : at + 1], "little", signed=True)
+    n_dimensions = data[at + 1]
+    dimensions = tuple(data[at + 2 : at + 2 + n_dimensions])
+    size = abs(kind)
+    for dimension in dimensions:
+        size *= dimension
+    begin = at + 2 + n_dimensions
+    if kind not in ITEM_TYPES or begin + size > len(data):
+        raise KeyError(f"a parameter of type {kind} and {size} bytes at byte {at}")
+    return _Parameter(kind, dimensions, data[begin : begin + size])
+
+
+def _frames(
+    header: NDArray[np.uint16], parameters: dict[tuple[str, str], _Parameter], order: str
+) -> tuple[int, int]:
+    """First frame, counted from 1, and the number of frames."""
+    first, last = int(header[3]), int(header[4])
+    fields = [parameters.get(("TRIAL", f"ACTUAL_{end}_FIELD")) for end in ("START", "END")]
+    if all(field is not None and len(field.data) >= 4 for field in fields):
+        first, last = (_long(field.data, order) for field in fields if field is not None)
+    elif last == FULL_COUNT and ("POINT", "FRAMES") in parameters:
+        count = parameters["POINT", "FRAMES"]
+        last = first - 1 + int(count.numbers(order)[0]) if count.kind == 4 else last
+    if not last - first + 1 >= 1:
+        raise KeyError(f"frames {first} to {last}")
+    return first, last - first + 1
+
+
+def _long(data: bytes, order: str) -> int:
+    low, high = np.frombuffer(data[:4], f"{order}u2").tolist()
+    return low + (high << 16)
+
+
+def _names(
+    path: Path, parameters: dict[tuple[str, str], _Parameter], order: str
+) -> tuple[str, ...]:
+    """Label of every point, empty where it has none."""
+    n_points = int(parameters["POINT", "USED"].numbers(order)[0]) & FULL_COUNT
+    names: list[str] = []
+    for suffix in ("", *map(str, range(2, 10))):
+        if ("POINT", f"LABELS{suffix}") in parameters:
+            names += parameters["POINT", f"LABELS{suffix}"].texts()
+    names = (names + [""] * n_points)[:n_points]
+    twice = sorted({name for name in names if name and names.count(name) > 1})
+    if twice:
+        raise InputError(f"{path}: POINT:LABELS: {twice[0]!r} stands twice; labels must differ")
+    if not any(names):
+        raise InputError(f"{path}: holds no labelled point; label the markers and export again")
+    return tuple(names)
+
+
+def _points(
+    path: Path,
+    data: bytes,
+    header: NDArray[np.uint16],
+    parameters: dict[tuple[str, str], _Parameter],
+    order: str,
+    n_frames: int,
+    n_points: int,
+) -> Array:
+    """Coordinates in the file's unit, NaN where not seen, (n_frames, n_points, 3)."""
+    scale = parameters["POINT", "SCALE"].numbers(order)[0]
+    if not np.isfinite(scale) or scale == 0.0:
+        raise KeyError(f"POINT:SCALE {scale}")
+    item = np.dtype(f"{order}f4" if scale < 0.0 else f"{order}i2")
+    n_items = 4 * n_points + int(header[2])
+    start = (int(header[8]) - 1) * BLOCK
+    size = n_frames * n_items * item.itemsize
+    if start < BLOCK or start + size > len(data):
+        raise InputError(
+            f"{path}: {n_frames} frames of {n_points} points need {size} bytes from byte {start} "
+            f"on, the file has {len(data)}: it is cut short or damaged; export it again"
+        )
+    rows = np.frombuffer(data, item, n_frames * n_items, start).reshape(n_frames, n_items)
+    with np.errstate(invalid="ignore"):  # signalling NaNs of damaged files
+        raw = rows[:, : 4 * n_points].reshape(n_frames, n_points, 4).astype(np.float64)
+    positions = raw[..., :3] * (1.0 if scale < 0.0 else scale)
+    seen = (raw[..., 3] >= 0.0) & np.isfinite(positions).all(axis=2)
+    if np.abs(positions[seen]).max(initial=0.0) > LARGEST_NUMBER:
+        raise InputError(f"{path}: a coordinate is beyond {LARGEST_NUMBER:g}: the file is damaged")
+    return np.where(seen[..., None], positions, np.nan)
+
+
+def _metres_per_unit(path: Path, parameters: dict[tuple[str, str], _Parameter]) -> float:
+    texts = parameters["POINT", "UNITS"].texts()
+    unit = texts[0].lower() if texts else ""
+    if unit not in METRES_PER_UNIT:
+        known = ", ".join(METRES_PER_UNIT)
+        raise InputError(f"{path}: POINT:UNITS is {unit[:20]!r}, must be one of {known}")
+    return METRES_PER_UNIT[unit]
+
+
+def _grid(times_s: Array) -> tuple[float, int]:
+    """Rate and number of the first frame (from 0) of uniform times."""
+    steps = np.diff(times_s)
+    rate = float(1.0 / np.mean(steps)) if len(steps) else 1.0
+    rate = round(rate, 6)
+    first = round(float(times_s[0]) * rate)
+    error = np.abs((first + np.arange(len(times_s))) / rate - times_s).max()
+    if error > 0.01 / rate or first < 0 or first + len(times_s) >= FULL_COUNT:
+        raise ValueError(
+            f"times_s: up to {error:.3g} s off the frames of {rate:g} Hz; C3D holds up to "
+            f"{FULL_COUNT} uniform frames: resample or shorten the recording"
+        )
+    return rate, first

@@ -1,0 +1,54 @@
+"""Trajectories in the TUM form: `t x y z qx qy qz qw`, separated by spaces, # for comments."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from freeswing.cdpr.files.documents import InputError, replace_file
+from freeswing.cdpr.files.number_table import check_times, read_lines, read_numbers
+from freeswing.cdpr.measured.trajectory import Trajectory
+from freeswing.cdpr.rotation import matrix_from_quaternion, quaternion_from_matrix
+
+TUM_COLUMNS = ("t", "x", "y", "z", "qx", "qy", "qz", "qw")
+QUATERNION_TOLERANCE = 0.02
+
+
+def read_tum(path: Path | str) -> Trajectory:
+    """Read platform poses in the base frame; `nan` is a missing number.
+
+    Raises:
+        InputError: naming file, line, column and remedy.
+    """
+    lines = enumerate(read_lines(path), start=1)
+    rows = ((number, line) for number, line in lines if not line.lstrip().startswith("#"))
+    table = read_numbers(path, rows, None, TUM_COLUMNS)
+    check_times(path, table, 0, "t")
+    quaternion = table.values[:, [7, 4, 5, 6]]
+    norm = np.linalg.norm(quaternion, axis=1)
+    wrong = np.flatnonzero(np.abs(norm - 1.0) > QUATERNION_TOLERANCE)
+    if len(wrong):
+        raise InputError(
+            f"{path}: line {table.lines[wrong[0]]}: the quaternion's length is "
+            f"{norm[wrong[0]]:.4g}, must be 1 (order qx qy qz qw)"
+        )
+    return Trajectory.from_poses(
+        table.values[:, 0],
+        table.values[:, 1:4],
+        matrix_from_quaternion(quaternion),
+        provenance=f"{Path(path).name}: measured poses",
+    )
+
+
+def write_tum(path: Path | str, trajectory: Trajectory) -> None:
+    """Write a pose trajectory; missing samples are left out, as readers of the form expect.
+
+    Raises:
+        ValueError: when the trajectory does not hold poses.
+    """
+    known = trajectory.take(trajectory.is_known)
+    quaternion = quaternion_from_matrix(known.rotations())[:, [1, 2, 3, 0]]
+    table = np.concatenate([known.times_s[:, None], known.positions(), quaternion], axis=1)
+    rows = (" ".join(map(repr, row)) for row in table.tolist())
+    replace_file(path, "\n".join(["# t x y z qx qy qz qw", *rows, ""]).encode())

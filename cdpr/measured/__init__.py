@@ -1,0 +1,1 @@
+"""What a platform was measured to do: trajectories, markers, shared errors of poses."""

@@ -1,0 +1,164 @@
+"""What is fixed to the platform: fiducial tags and round markers (target.toml)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from freeswing.cdpr.files.documents import Problems, Reader, dump_toml, load_toml
+from freeswing.cdpr.robot import frozen_array
+from freeswing.cdpr.rotation import matrix_from_quaternion, quaternion_from_matrix, transform
+
+Array = NDArray[np.float64]
+
+QUATERNION_TOLERANCE = 1e-3
+UNIT_CORNERS = 0.5 * np.array([[-1.0, 1, 0, 0], [1, 1, 0, 0], [1, -1, 0, 0], [-1, -1, 0, 0]])
+
+
+@dataclass(frozen=True, slots=True)
+class Tag:
+    """A square fiducial; tag frame: origin at its centre, x right, y up, z out of the print.
+
+    Attributes:
+        family: name of the dictionary, such as `tag36h11`.
+        id: number in the family.
+        size_m: side of the black border.
+        T_platform_tag: tag to platform coordinates, (4, 4).
+    """
+
+    family: str
+    id: int
+    size_m: float
+    T_platform_tag: Array
+
+    def __post_init__(self) -> None:
+        what = f"tag {self.family} {self.id}: T_platform_tag"
+        object.__setattr__(self, "T_platform_tag", frozen_array(self.T_platform_tag, (4, 4), what))
+        if not (np.isfinite(self.size_m) and self.size_m > 0.0):
+            raise ValueError(f"tag {self.family} {self.id}: size_m is {self.size_m}, must be > 0")
+
+    @property
+    def corners_platform_m(self) -> Array:
+        """Border corners TL TR BR BL, seen facing the print, platform frame, (4, 3)."""
+        return self.size_m * UNIT_CORNERS[:, :3] @ self.T_platform_tag[:3, :3].T + self.centre_m
+
+    @property
+    def centre_m(self) -> Array:
+        """Centre of the tag, platform frame, (3,)."""
+        return self.T_platform_tag[:3, 3]
+
+
+@dataclass(frozen=True, slots=True)
+class Marker:
+    """A round (retro-reflective) point.
+
+    Attributes:
+        name: its label in recordings.
+        position_m: its centre, platform frame, (3,).
+        diameter_m: its size, None when unknown.
+    """
+
+    name: str
+    position_m: Array
+    diameter_m: float | None = None
+
+    def __post_init__(self) -> None:
+        position = frozen_array(self.position_m, (3,), f"marker {self.name}: position_m")
+        object.__setattr__(self, "position_m", position)
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """Everything on the platform that can be seen."""
+
+    tags: tuple[Tag, ...] = ()
+    markers: tuple[Marker, ...] = ()
+
+    @property
+    def marker_names(self) -> tuple[str, ...]:
+        """Labels of the markers, in order."""
+        return tuple(marker.name for marker in self.markers)
+
+    @property
+    def marker_positions_m(self) -> Array:
+        """Marker centres, platform frame, (n_markers, 3)."""
+        return np.array([marker.position_m for marker in self.markers]).reshape(-1, 3)
+
+
+def read_target(path: Path | str) -> Target:
+    """Read target.toml.
+
+    Raises:
+        InputError: naming every problem of the file.
+    """
+    problems = Problems()
+    reader = Reader(load_toml(path, "target", problems), problems)
+    tag_readers = reader.children("tags", required=False)
+    marker_readers = reader.children("markers", required=False)
+    if not tag_readers and not marker_readers:
+        problems.add("tags, markers", "none; a target needs at least one tag or marker")
+    tags = [_read_tag_values(table) for table in tag_readers]
+    markers = [_read_marker_values(table) for table in marker_readers]
+    _add_repeats(problems, "tags", [f"{family} {number}" for family, number, *_ in tags])
+    _add_repeats(problems, "markers", [name for name, *_ in markers])
+    reader.finish()
+    problems.raise_if_any(path)
+    return Target(
+        tuple(
+            Tag(family, number, size, transform(matrix_from_quaternion(q), t))
+            for family, number, size, q, t in tags
+        ),
+        tuple(Marker(*values) for values in markers),
+    )
+
+
+def write_target(path: Path | str, target: Target) -> None:
+    """Write target.toml; the file is replaced whole."""
+    tags = [
+        {
+            "family": tag.family,
+            "id": tag.id,
+            "size_m": tag.size_m,
+            "q_platform_tag": quaternion_from_matrix(tag.T_platform_tag[:3, :3]),
+            "t_platform_tag_m": tag.centre_m,
+        }
+        for tag in target.tags
+    ]
+    markers = [
+        {"name": m.name, "position_m": m.position_m, "diameter_m": m.diameter_m}
+        for m in target.markers
+    ]
+    table = {"format": "freeswing-target/1", "tags": tags or None, "markers": markers or None}
+    dump_toml(path, table)
+
+
+def _read_tag_values(reader: Reader) -> tuple[str, int, float, Array, Array]:
+    values = (
+        reader.string("family"),
+        reader.integer("id", minimum=0),
+        reader.number("size_m", above=0.0),
+        reader.unit_vector("q_platform_tag", 4, QUATERNION_TOLERANCE),
+        reader.vector("t_platform_tag_m", 3),
+    )
+    reader.finish()
+    return values
+
+
+def _read_marker_values(reader: Reader) -> tuple[str, Array, float | None]:
+    values = (
+        reader.string("name"),
+        reader.vector("position_m", 3),
+        reader.optional_number("diameter_m", above=0.0),
+    )
+    reader.finish()
+    return values
+
+
+def _add_repeats(problems: Problems, key: str, names: list[str]) -> None:
+    first: dict[str, int] = {}
+    for count, name in enumerate(names, start=1):
+        if first.setdefault(name, count) < count and name:
+            problems.add(f"{key}[{count}]", f"{name!r} is already {key}[{first[name]}]")

@@ -1,0 +1,109 @@
+"""How a free motion answers to its initial state, the inertia and the effects: exact derivatives.
+
+The collocation equations of every segment are linearised at once; one small solve a segment gives
+its transition, and the chain of transitions the whole motion.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from freeswing.cdpr.model.batch import evaluate, with_jacobian
+from freeswing.cdpr.robot import Array
+from freeswing.cdpr.simulation.collocation import interpolation, table
+from freeswing.cdpr.simulation.free_swing import Motion
+
+
+@dataclass(frozen=True, slots=True)
+class Linearised:
+    """Derivatives of a simulated motion by u = [zeta_0; rates_0; inertia; values], 21 + k of them.
+
+    Attributes:
+        motion: the motion.
+        states: of [zeta; rates] at the segment starts, (s, 12, 21 + k).
+        accelerations: of the node accelerations, (s, m, 6, 21 + k).
+    """
+
+    motion: Motion
+    states: Array
+    accelerations: Array
+
+    def at(self, times_s: Array) -> tuple[Array, Array]:
+        """Derivatives of zeta and of the rates at times (n,), each (n, 6, 21 + k)."""
+        motion = self.motion
+        index, fractions = motion.locate(times_s)
+        step = motion.steps_s[index, None, None]
+        _, once, twice = interpolation(motion.accelerations.shape[1], fractions)
+        nodes = self.accelerations.reshape(*self.accelerations.shape[:2], -1)
+        zetas = np.empty((len(index), nodes.shape[-1]))
+        rates = np.empty_like(zetas)
+        for k in np.unique(index):
+            inside = index == k
+            zetas[inside], rates[inside] = twice[inside] @ nodes[k], once[inside] @ nodes[k]
+        start = self.states[index]
+        shape = (len(index), 6, -1)
+        moved = start[:, :6] + step * fractions[:, None, None] * start[:, 6:]
+        return moved + step**2 * zetas.reshape(shape), start[:, 6:] + step * rates.reshape(shape)
+
+
+def linearise(motion: Motion) -> Linearised:
+    """Derivatives of a motion that obeys its equations."""
+    t = table(motion.accelerations.shape[1])
+    step = motion.steps_s[:, None, None]
+    zetas = (
+        motion.zetas[:, None]
+        + step * t.nodes[:, None] * motion.rates[:, None]
+        + step**2 * (t.twice @ motion.accelerations)
+    )
+    rates = motion.rates[:, None] + step * (t.once @ motion.accelerations)
+    times = motion.starts_s[:, None] + motion.steps_s[:, None] * t.nodes
+    function = with_jacobian(motion.model.acceleration, (1, 2, 3, 4))
+    slopes = evaluate(function, times, zetas, rates, motion.inertia, motion.values)[1]
+    changes = _segment_changes(motion, slopes)
+    states = _chained(motion, changes)
+    flat = changes.reshape(len(states), -1, changes.shape[-1])
+    total = flat[..., :12] @ states
+    total[..., 12:] += flat[..., 12:]
+    return Linearised(motion, states, total.reshape(changes.shape))
+
+
+def _segment_changes(motion: Motion, slopes: Array) -> Array:
+    """Derivatives of the node accelerations by [zeta_s; rates_s; inertia; values], (s, m, 6, c)."""
+    s, m = slopes.shape[:2]
+    t = table(m)
+    by_zeta, by_rates, by_rest = slopes[..., :6], slopes[..., 6:12], slopes[..., 12:]
+    step = motion.steps_s[:, None, None, None]
+    drifting = by_rates + by_zeta * step * t.nodes[:, None, None]
+    right = np.concatenate([by_zeta, drifting, by_rest], axis=-1)
+    step = step[..., None]
+    matrix = -(step**2) * (t.twice[:, None, :, None] * by_zeta[:, :, :, None, :])
+    matrix -= step * (t.once[:, None, :, None] * by_rates[:, :, :, None, :])
+    matrix = matrix.reshape(s, 6 * m, 6 * m)
+    matrix[:, np.arange(6 * m), np.arange(6 * m)] += 1.0
+    return np.linalg.solve(matrix, right.reshape(s, 6 * m, -1)).reshape(s, m, 6, -1)
+
+
+def _chained(motion: Motion, changes: Array) -> Array:
+    """Derivatives of the states at the segment starts by the unknowns, (s, 12, c)."""
+    s, m, _, columns = changes.shape
+    t = table(m)
+    step = motion.steps_s[:, None, None]
+    nodes = changes.reshape(s, m, -1)
+    shape = (s, 6, columns)
+    ends = np.concatenate(
+        [
+            step**2 * (t.twice_end @ nodes).reshape(shape),
+            step * (t.once_end @ nodes).reshape(shape),
+        ],
+        axis=1,
+    )
+    ends[:, np.arange(12), np.arange(12)] += 1.0
+    ends[:, np.arange(6), np.arange(6, 12)] += motion.steps_s[:, None]
+    states = np.zeros((s, 12, columns))
+    states[0, np.arange(12), np.arange(12)] = 1.0
+    for k in range(s - 1):
+        states[k + 1] = ends[k, :, :12] @ states[k]
+        states[k + 1, :, 12:] += ends[k, :, 12:]
+    return states

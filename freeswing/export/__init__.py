@@ -1,0 +1,1 @@
+"""Results and cameras in other programs' files."""

@@ -1,0 +1,94 @@
+"""An identified platform for other programs: URDF, MJCF and plain JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
+
+import numpy as np
+
+from freeswing.cdpr.robot import INERTIA_NAMES, Array, Robot
+
+
+@dataclass(frozen=True, slots=True)
+class Inertia:
+    """A platform's inertia in kg and m.
+
+    Attributes:
+        mass_kg: mass.
+        com_m: P to centre of mass, platform frame, (3,).
+        tensor_kg_m2: inertia tensor about the centre of mass, platform axes, (3, 3).
+    """
+
+    mass_kg: float
+    com_m: Array
+    tensor_kg_m2: Array
+
+
+def inertia_from(parameters: Mapping[str, float], mass_kg: float) -> Inertia:
+    """From specific inertia about P (`INERTIA_NAMES`) by Huygens-Steiner."""
+    values = np.array([parameters[name] for name in INERTIA_NAMES])
+    com, (xx, yy, zz, xy, xz, yz) = values[:3], values[3:]
+    about_p = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    about_com = about_p - (com @ com * np.eye(3) - np.outer(com, com))
+    return Inertia(mass_kg, com, mass_kg * about_com)
+
+
+def urdf(robot: Robot, inertia: Inertia) -> str:
+    """One link whose frame is the platform's."""
+    root = Element("robot", name=robot.name)
+    inertial = SubElement(SubElement(root, "link", name="platform"), "inertial")
+    SubElement(inertial, "origin", xyz=_numbers(inertia.com_m), rpy="0 0 0")
+    SubElement(inertial, "mass", value=f"{inertia.mass_kg:.9g}")
+    names = {"ixx": (0, 0), "iyy": (1, 1), "izz": (2, 2), "ixy": (0, 1), "ixz": (0, 2)}
+    entries = {**names, "iyz": (1, 2)}
+    tensor = {name: f"{inertia.tensor_kg_m2[place]:.9g}" for name, place in entries.items()}
+    SubElement(inertial, "inertia", tensor)
+    return _text(root)
+
+
+def mjcf(robot: Robot, inertia: Inertia) -> str:
+    """A free body on spatial tendons from the pulleys' entry points (pulley radii are left out)."""
+    root = Element("mujoco", model=robot.name)
+    SubElement(root, "compiler", angle="radian")
+    SubElement(root, "option", gravity=_numbers(robot.gravity_m_s2))
+    world = SubElement(root, "worldbody")
+    for cable in robot.cables:
+        SubElement(world, "site", name=f"entry {cable.name}", pos=_numbers(cable.entry_m))
+    body = SubElement(world, "body", name="platform")
+    SubElement(body, "freejoint")
+    tensor = inertia.tensor_kg_m2
+    full = [tensor[0, 0], tensor[1, 1], tensor[2, 2], tensor[0, 1], tensor[0, 2], tensor[1, 2]]
+    mass, entries = f"{inertia.mass_kg:.9g}", _numbers(np.array(full))
+    SubElement(body, "inertial", pos=_numbers(inertia.com_m), mass=mass, fullinertia=entries)
+    for cable in robot.cables:
+        place = _numbers(cable.attachment_m)
+        SubElement(body, "site", name=f"attachment {cable.name}", pos=place)
+    tendons = SubElement(root, "tendon")
+    for cable in robot.cables:
+        tendon = SubElement(tendons, "spatial", name=f"cable {cable.name}")
+        SubElement(tendon, "site", site=f"entry {cable.name}")
+        SubElement(tendon, "site", site=f"attachment {cable.name}")
+    return _text(root)
+
+
+def plain(robot: Robot, inertia: Inertia) -> dict[str, Any]:
+    """The same numbers as a document."""
+    return {
+        "format": "freeswing-platform/1",
+        "robot": robot.name,
+        "mass_kg": inertia.mass_kg,
+        "com_m": inertia.com_m,
+        "inertia_about_com_kg_m2": inertia.tensor_kg_m2,
+    }
+
+
+def _numbers(values: Array) -> str:
+    return " ".join(f"{value:.9g}" for value in values)
+
+
+def _text(root: Element) -> str:
+    indent(root)
+    return tostring(root, encoding="unicode") + "\n"

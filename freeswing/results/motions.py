@@ -1,0 +1,44 @@
+"""Measured beside predicted samples of the held-out runs, for the report and for plots."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from freeswing.ident.diagnose.diagnose import Rung
+from freeswing.ident.identify import Identification
+from freeswing.ident.judge.prediction import Prediction
+
+MOST_RUNS = 8
+
+
+def predicted_motions(found: Identification) -> dict[str, Any]:
+    """`motion.json`: the first held-out runs, samples in m and rad."""
+    entries = [_entry(run.prediction) for run in found.validation if run.prediction is not None]
+    return {"format": "freeswing-motion/1", "runs": entries[:MOST_RUNS]}
+
+
+def ladder_motions(ladder: Sequence[Rung]) -> dict[str, Any]:
+    """`diagnosis_motion.json`: the same before the first effect and after the last."""
+    after = {run.run: run.prediction for run in ladder[-1].held_out.runs}
+    entries = []
+    for run in ladder[0].held_out.runs:
+        last = after.get(run.run)
+        if run.prediction is None:
+            continue
+        entry = _entry(run.prediction)
+        if len(ladder) > 1 and last is not None:
+            entry["after"] = last.predicted
+        entries.append(entry)
+    return {"format": "freeswing-motion/1", "runs": entries[:MOST_RUNS]}
+
+
+def _entry(prediction: Prediction) -> dict[str, Any]:
+    return {
+        "run": prediction.run,
+        "role": "validate",
+        "times_s": prediction.times_s.tolist(),
+        "coordinates": list(prediction.coordinates),
+        "measured": prediction.measured,
+        "before": prediction.predicted,
+    }

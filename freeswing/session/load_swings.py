@@ -1,0 +1,98 @@
+"""A session's recorded swings, loaded as what identification works on."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+from freeswing.cdpr.files.documents import DataError, InputError
+from freeswing.cdpr.files.robot_file import read_robot
+from freeswing.cdpr.files.trajectory_files import read_trajectory
+from freeswing.cdpr.measured.pose_errors import PoseErrors, read_pose_errors
+from freeswing.cdpr.measured.target import Target, read_target
+from freeswing.cdpr.measured.trajectory import Trajectory
+from freeswing.cdpr.robot import Robot
+from freeswing.ident.runs import Payload, SwingRun
+from freeswing.session.session_file import Run, Session
+
+
+def load_robot(session: Session) -> Robot:
+    """The session's robot."""
+    return read_robot(session.robot)
+
+
+def load_target(session: Session) -> Target | None:
+    """What is on the platform, None where the session names no target."""
+    return None if session.target is None else read_target(session.target)
+
+
+def trajectory_path(session: Session, run: Run) -> Path:
+    """The file of a run's trajectory: measured, or written by tracking."""
+    return run.trajectory or session.tracks / f"{run.name}.csv"
+
+
+def load_swings(session: Session, robot: Robot, target: Target | None) -> tuple[SwingRun, ...]:
+    """All runs of a session with their trajectories.
+
+    Raises:
+        InputError: naming the run whose file is wrong, or a number of cable lengths that is not
+            the robot's.
+        DataError: where a video has not been tracked yet.
+    """
+    errors = calibration_errors(session)
+    swings = (load_swing(session, run, robot, target) for run in session.runs)
+    return tuple(replace(swing, pose_errors=errors.get(swing.name)) for swing in swings)
+
+
+def calibration_errors(session: Session) -> dict[str, PoseErrors]:
+    """What the cameras' calibration may do to the poses of each tracked run, from tracking.json.
+
+    Raises:
+        InputError: when that file is not what tracking writes.
+    """
+    path = session.results / "tracking.json"
+    filmed = {run.name for run in session.video_runs}
+    if not filmed or not path.is_file():
+        return {}
+    try:
+        runs = json.loads(path.read_text(encoding="utf-8"))["runs"]
+        told = {run["run"]: run.get("calibration_errors") for run in runs}
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        raise InputError(f"{path}: not a tracking result ({error}); track again") from error
+    return {
+        name: read_pose_errors(entry)
+        for name, entry in told.items()
+        if name in filmed and entry is not None
+    }
+
+
+def load_swing(session: Session, run: Run, robot: Robot, target: Target | None) -> SwingRun:
+    """One run with its trajectory; see `load_swings`."""
+    lengths = run.cable_lengths_m
+    if lengths is not None and len(lengths) != robot.n_cables:
+        raise InputError(
+            f"{session.path}: run {run.name}: cable_lengths_m has {len(lengths)} numbers, "
+            f"the robot has {robot.n_cables} cables"
+        )
+    payload = run.payload and Payload(run.payload.mass_kg, run.payload.position_m)
+    return SwingRun(
+        name=run.name,
+        role="identify" if run.role == "identify" else "validate",
+        trajectory=load_trajectory(session, run, robot, target),
+        lengths_m=lengths,
+        lengths_std_m=run.cable_lengths_std_m,
+        window_s=run.window_s,
+        payload=payload,
+    )
+
+
+def load_trajectory(session: Session, run: Run, robot: Robot, target: Target | None) -> Trajectory:
+    """A run's measured or tracked motion."""
+    path = trajectory_path(session, run)
+    if run.trajectory is None and not path.is_file():
+        raise DataError(
+            f"run {run.name}: its video has not been tracked yet; run freeswing track first"
+        )
+    trajectory = read_trajectory(path, robot, target)
+    return replace(trajectory, provenance=trajectory.provenance or path.name)

@@ -1,0 +1,350 @@
+"""session.toml: one recorded session, read with every error at once."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from freeswing.cdpr.files.documents import InputError, Problems, Reader, inside, load_toml
+from freeswing.cdpr.robot import frozen_array
+
+Array = NDArray[np.float64]
+
+ROLES = ("identify", "validate")
+TRAJECTORY_SUFFIXES = (".csv", ".trc", ".c3d")
+BOARD_KEYS = {
+    "charuco": ("squares", "square_m", "marker_m", "dictionary"),
+    "chessboard": ("squares", "square_m"),
+    "aprilgrid": ("tagCols", "tagRows", "tagSize", "tagSpacing"),
+}
+OPTIONAL_BOARD_KEYS = {"charuco": ("legacy",), "chessboard": (), "aprilgrid": ("family",)}
+MOST_RUNS = 10_000
+WRITTEN_FOLDERS = ("tracks", "tracks/.sightings", "print")  # in the results
+
+
+@dataclass(frozen=True, slots=True)
+class BaseTag:
+    """A surveyed tag fixed to the frame; corners TL TR BR BL in the base frame, (4, 3)."""
+
+    family: str
+    id: int
+    corners_base_m: Array
+
+    def __post_init__(self) -> None:
+        corners = frozen_array(self.corners_base_m, (4, 3), "corners_base_m")
+        object.__setattr__(self, "corners_base_m", corners)
+
+
+@dataclass(frozen=True, slots=True)
+class CalibrationSource:
+    """What the cameras can be calibrated from.
+
+    Attributes:
+        recordings: folder with `<camera>.mkv` or `<camera>/*.png`, or None.
+        board: the board's `kind` and its numbers as in the file, or None.
+        base_tags: surveyed tags that tie the cameras to the base frame.
+    """
+
+    recordings: Path | None = None
+    board: Mapping[str, object] | None = None
+    base_tags: tuple[BaseTag, ...] = ()
+
+    @property
+    def plumb_line(self) -> Path | None:
+        """`plumb_line.csv` beside the recordings, None where there is none."""
+        path = None if self.recordings is None else self.recordings / "plumb_line.csv"
+        return path if path is not None and path.is_file() else None
+
+
+@dataclass(frozen=True, slots=True)
+class Payload:
+    """A known mass added for a run, its centre of mass in the platform frame, (3,)."""
+
+    mass_kg: float
+    position_m: Array
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "position_m", frozen_array(self.position_m, (3,), "position_m"))
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """One recorded swing: a video folder or a trajectory file, and what is known of it.
+
+    Attributes:
+        name: label, also the stem of its result files.
+        role: `identify` or `validate`.
+        video: folder with one recording a camera, or None.
+        trajectory: measured trajectory or markers, or None.
+        cable_lengths_m: lengths held by the locked actuators, (n,), or None.
+        cable_lengths_std_m: their standard deviation, or None.
+        window_s: start and end of the free motion, or None: found by the program.
+        payload: a known added mass, or None.
+    """
+
+    name: str
+    role: str
+    video: Path | None = None
+    trajectory: Path | None = None
+    cable_lengths_m: Array | None = None
+    cable_lengths_std_m: float | None = None
+    window_s: tuple[float, float] | None = None
+    payload: Payload | None = None
+
+    def __post_init__(self) -> None:
+        if self.cable_lengths_m is not None:
+            lengths = np.asarray(self.cable_lengths_m, dtype=np.float64)
+            lengths = frozen_array(lengths, lengths.shape, f"run {self.name}: cable_lengths_m")
+            object.__setattr__(self, "cable_lengths_m", lengths)
+
+
+@dataclass(frozen=True, slots=True)
+class Session:
+    """A session.toml whose paths are resolved; nothing they point to has been read yet.
+
+    Attributes:
+        path: the session.toml itself.
+        name: label.
+        robot: robot.toml.
+        target: target.toml, or None.
+        cameras: cameras.toml, which may not be there yet.
+        frame_rate_hz: nominal rate of the recordings, or None.
+        calibration: calibration recordings, or None.
+        runs: the recorded swings.
+        results: folder that takes everything the commands write.
+    """
+
+    path: Path
+    name: str
+    robot: Path
+    results: Path
+    cameras: Path
+    target: Path | None = None
+    frame_rate_hz: float | None = None
+    calibration: CalibrationSource | None = None
+    runs: tuple[Run, ...] = field(default=())
+
+    @property
+    def folder(self) -> Path:
+        """The folder that everything of the session is in."""
+        return self.path.parent
+
+    @property
+    def video_runs(self) -> tuple[Run, ...]:
+        """The runs that have to be tracked."""
+        return tuple(run for run in self.runs if run.video is not None)
+
+    @property
+    def tracks(self) -> Path:
+        """The folder of tracked trajectories."""
+        return self.results / "tracks"
+
+
+def read_session(path: Path | str, results: Path | str | None = None) -> Session:
+    """Read a session's file; `path` is the folder or its session.toml.
+
+    Args:
+        path: the session.
+        results: where results go instead of `results` in the session's folder (for sessions that
+            are read-only). A `cameras.toml` found there goes before the session's own.
+
+    Raises:
+        InputError: naming every problem of the file: missing, unknown and repeated keys, wrong
+            types and lengths, paths that leave the folder, repeated run names.
+    """
+    path = Path(path)
+    path = path / "session.toml" if path.is_dir() else path
+    problems = Problems()
+    reader = Reader(load_toml(path, "session", problems), problems)
+    paths = _Paths(path.parent)
+    name = reader.string("name")
+    robot = paths.required(reader, "robot")
+    target = paths.optional(reader, "target")
+    cameras = paths.optional(reader, "cameras") or path.parent / "cameras.toml"
+    rate = reader.optional_number("frame_rate_hz", above=0.0, maximum=1e6)
+    section = reader.child("calibration", required=False)
+    calibration = None if section is None else _read_calibration(section, paths)
+    tables = reader.children("runs")
+    if len(tables) > MOST_RUNS:
+        raise InputError(f"{path}: {len(tables)} runs, more than the {MOST_RUNS} read here")
+    runs = tuple(_read_run(table, paths) for table in tables)
+    _check_runs(reader, runs)
+    reader.finish()
+    problems.raise_if_any(path)
+    folder = path.parent / "results" if results is None else Path(results)
+    _refuse_ways_out(path.parent if results is None else folder, folder)
+    beside = folder / "cameras.toml"
+    if results is not None and (beside.is_file() or not cameras.is_file()):
+        cameras = beside
+    return Session(path, name, robot, folder, cameras, target, rate, calibration, runs)
+
+
+def _refuse_ways_out(home: Path, results: Path) -> None:
+    """Links that would lead what is written out of the session, or out of `--results`."""
+    places = (results, *(results / part for part in WRITTEN_FOLDERS))
+    for place in places:
+        if place.exists() and not place.resolve().is_relative_to(home.resolve()):
+            raise InputError(
+                f"{place}: a link that leads out of {home}, where nothing is written; "
+                "name another place with --results DIR"
+            )
+
+
+class _Paths:
+    """Paths of a session file; each has to stay in the session's folder."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+
+    def required(self, reader: Reader, key: str) -> Path:
+        return self._inside(reader, key, reader.string(key)) or self._folder
+
+    def optional(self, reader: Reader, key: str) -> Path | None:
+        return self._inside(reader, key, reader.optional_string(key))
+
+    def _inside(self, reader: Reader, key: str, text: str | None) -> Path | None:
+        if not text:
+            return None
+        try:
+            return inside(self._folder, text, key)
+        except InputError as error:
+            reader.add(key, str(error).removeprefix(f"{key}: "))
+            return None
+
+
+def _read_calibration(reader: Reader, paths: _Paths) -> CalibrationSource:
+    recordings = paths.optional(reader, "recordings")
+    table = reader.child("board", required=False)
+    board = None if table is None else _read_board(table)
+    tags = [_read_base_tag(entry) for entry in reader.children("base_tags", required=False)]
+    reader.finish()
+    if (recordings is None) != (board is None):
+        reader.add("recordings, board", "give both or neither: footage of a board and the board")
+    return CalibrationSource(recordings, board, tuple(tag for tag in tags if tag is not None))
+
+
+def _read_board(reader: Reader) -> Mapping[str, object]:
+    kind = reader.string("kind", choices=tuple(BOARD_KEYS))
+    board: dict[str, object] = {"kind": kind}
+    for key in BOARD_KEYS.get(kind, ()):
+        board[key] = _board_value(reader, key)
+    for key in OPTIONAL_BOARD_KEYS.get(kind, ()):
+        if key in reader:
+            board[key] = _board_value(reader, key)
+    if kind in BOARD_KEYS:
+        reader.finish()
+    square, marker = board.get("square_m"), board.get("marker_m")
+    if isinstance(square, float) and isinstance(marker, float) and marker >= square:
+        reader.add("marker_m", f"{marker:g} must be below square_m, which is {square:g}")
+    return MappingProxyType(board)
+
+
+def _board_value(reader: Reader, key: str) -> object:
+    if key == "squares":
+        counts = reader.vector(key, 2)
+        whole = np.isfinite(counts).all() and (counts == np.round(counts)).all()
+        if not whole or (counts < 2).any() or (counts > 200).any():
+            reader.add(key, f"{counts.tolist()} must be two whole numbers from 2 to 200")
+            return (0, 0)
+        return (int(counts[0]), int(counts[1]))
+    if key in ("tagCols", "tagRows"):
+        return reader.integer(key, minimum=1, maximum=200)
+    if key in ("dictionary", "family"):
+        return reader.string(key)
+    if key == "legacy":
+        value = reader.raw(key)
+        if not isinstance(value, bool):
+            reader.add(key, "must be true or false")
+        return bool(value)
+    return reader.number(key, above=0.0)
+
+
+def _read_base_tag(reader: Reader) -> BaseTag | None:
+    family = reader.string("family")
+    number = reader.integer("id", minimum=0)
+    rows = reader.raw("corners_base_m")
+    reader.finish()
+    if rows is None:
+        return None
+    if not isinstance(rows, list) or len(rows) != 4:
+        reader.add("corners_base_m", "must be four points [x, y, z], in the order TL TR BR BL")
+        return None
+    corner = Reader({str(k): row for k, row in enumerate(rows, 1)}, reader.problems, reader.where)
+    points = np.array([corner.vector(str(k), 3) for k in range(1, 5)])
+    if not np.isfinite(points).all():
+        return None
+    sides = np.linalg.norm(points - np.roll(points, -1, axis=0), axis=1)
+    diagonals = np.linalg.norm(points[:2] - points[2:], axis=1)
+    if diagonals.min() <= sides.max():
+        reader.add(
+            "corners_base_m",
+            f"its sides are {np.round(sides, 4).tolist()} m, its diagonals "
+            f"{np.round(diagonals, 4).tolist()} m: no square in the order TL TR BR BL",
+        )
+    return BaseTag(family, number, points)
+
+
+def _read_run(reader: Reader, paths: _Paths) -> Run:
+    name = reader.string("name")
+    role = reader.string("role", choices=ROLES)
+    video = paths.optional(reader, "video")
+    trajectory = paths.optional(reader, "trajectory")
+    lengths = reader.optional_vector("cable_lengths_m", None)
+    lengths_std = reader.optional_number("cable_lengths_std_m", above=0.0)
+    window = reader.optional_vector("window_s", 2)
+    table = reader.child("payload", required=False)
+    payload = None if table is None else _read_payload(table)
+    reader.finish()
+    if name and not _is_file_stem(name):
+        reader.add("name", f"{name[:40]!r} becomes a file name: letters, digits, . _ - only")
+    if (video is None) == (trajectory is None):
+        reader.add("video, trajectory", "give one of them")
+    if trajectory is not None and trajectory.suffix.lower() not in TRAJECTORY_SUFFIXES:
+        allowed = ", ".join(TRAJECTORY_SUFFIXES)
+        reader.add("trajectory", f"{trajectory.suffix!r} is not one of {allowed}")
+    if lengths is not None and (not len(lengths) or (lengths <= 0.0).any()):
+        reader.add("cable_lengths_m", f"{lengths.tolist()} must all be > 0")
+    if window is not None and not window[0] < window[1]:
+        reader.add("window_s", f"{window.tolist()}: its end must follow its start")
+    has_numbers = lengths is not None and np.isfinite(lengths).all()
+    return Run(
+        name,
+        role,
+        video,
+        trajectory,
+        lengths if has_numbers else None,
+        lengths_std,
+        None if window is None else (float(window[0]), float(window[1])),
+        payload,
+    )
+
+
+def _read_payload(reader: Reader) -> Payload | None:
+    mass = reader.number("mass_kg", above=0.0)
+    position = reader.vector("position_m", 3)
+    reader.finish()
+    readable = math.isfinite(mass) and np.isfinite(position).all()
+    return Payload(mass, position) if readable else None
+
+
+def _is_file_stem(name: str) -> bool:
+    plain = all(letter.isalnum() or letter in "._- " for letter in name)
+    return plain and not name.startswith(".") and len(name) <= 100 and name.strip() == name
+
+
+def _check_runs(reader: Reader, runs: tuple[Run, ...]) -> None:
+    if "runs" in reader and not runs:
+        reader.add("runs", "none; a session needs at least one [[runs]]")
+    names = [run.name.casefold() for run in runs]
+    for count, name in enumerate(names):
+        if name and name in names[:count]:
+            first = names.index(name) + 1
+            reader.add(
+                f"runs[{count + 1}].name", f"{runs[count].name!r} is already runs[{first}]'s"
+            )

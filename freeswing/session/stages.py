@@ -1,0 +1,137 @@
+"""The steps from recordings to the report: what each reads, what it writes, when it is due."""
+
+from __future__ import annotations
+
+import importlib
+import tomllib
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from freeswing.cdpr.files.documents import write_json
+from freeswing.console import Console
+from freeswing.session.load_swings import trajectory_path
+from freeswing.session.provenance import is_current, provenance
+from freeswing.session.session_file import Session
+from freeswing.workers.crew import Crew
+
+Documents = list[tuple[str, dict[str, Any]]]
+Make = Callable[[Session, Console, dict[str, Any], Crew], Documents]
+
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """One step that a command of the same name takes.
+
+    Attributes:
+        name: of the command, whose module holds `make(session, console, settings, crew)`:
+            it gives the result documents, by their file's name, the main one first.
+        result: main result file below the results folder.
+        inputs: what it reads.
+        due: whether a session needs it at all.
+        settings: those that `freeswing run` uses.
+    """
+
+    name: str
+    result: str
+    inputs: Callable[[Session], list[Path]]
+    due: Callable[[Session], bool]
+    settings: dict[str, Any] = field(default_factory=dict)
+
+    def is_current(self, session: Session) -> bool:
+        """Whether the result is there and made from what is there now."""
+        result = session.results / self.result
+        return is_current(result, session, self.inputs(session), self.settings)
+
+    def take(
+        self,
+        session: Session,
+        console: Console,
+        settings: dict[str, Any] | None = None,
+        crew: Crew | None = None,
+    ) -> Path:
+        """Make the result from scratch and write it with its provenance.
+
+        The crew (one process a core where None) does not change it.
+        """
+        chosen = self.settings | (settings or {})
+        # Inputs are hashed first: what changes meanwhile makes the result out of date.
+        made_of = provenance(session, self.inputs(session), chosen)
+        make: Make = importlib.import_module(f"freeswing.commands.{self.name}").make
+        documents = make(session, console, chosen, crew or Crew())
+        for name, document in reversed(documents):
+            write_json(session.results / name, {**document, "provenance": made_of})
+        return session.results / self.result
+
+
+def _robot_files(session: Session) -> list[Path]:
+    files = [session.path, session.robot, *([session.target] if session.target else [])]
+    try:
+        platform = tomllib.loads(session.robot.read_text(encoding="utf-8")).get("platform", {})
+        mesh = platform.get("mesh") if isinstance(platform, dict) else None
+    except (OSError, ValueError, RecursionError):
+        return files
+    return [*files, session.robot.parent / mesh] if isinstance(mesh, str) else files
+
+
+def _calibration_files(session: Session) -> list[Path]:
+    source = session.calibration
+    if source is None or source.recordings is None:
+        return [session.path]
+    judged = [] if source.plumb_line is None else [session.robot]  # by its gravity
+    return [session.path, source.recordings, *judged]
+
+
+def _tracking_files(session: Session) -> list[Path]:
+    videos = [run.video for run in session.video_runs if run.video is not None]
+    covariance = session.results / "calibration.json"
+    return [*_robot_files(session), session.cameras, covariance, *videos]
+
+
+def _motion_files(session: Session) -> list[Path]:
+    # Beside the tracks stands what the calibration may do to all of them.
+    tracking = [session.results / "tracking.json"] if session.video_runs else []
+    tracks = (trajectory_path(session, run) for run in session.runs)
+    return [*_robot_files(session), *tracks, *tracking]
+
+
+def _needs_calibration(session: Session) -> bool:
+    """Cameras that came from elsewhere are not calibrated again."""
+    source = session.calibration
+    has_recordings = source is not None and source.recordings is not None
+    is_ours = (session.results / "calibration.json").is_file()
+    return (
+        has_recordings and bool(session.video_runs) and (is_ours or not session.cameras.is_file())
+    )
+
+
+CALIBRATE = Stage(
+    "calibrate",
+    "calibration.json",
+    _calibration_files,
+    _needs_calibration,
+    {"model": "OPENCV"},
+)
+TRACK = Stage(
+    "track",
+    "tracking.json",
+    _tracking_files,
+    lambda session: bool(session.video_runs),
+    {"correct_rig": True, "refine_layout": False},
+)
+IDENTIFY = Stage(
+    "identify",
+    "identification.json",
+    _motion_files,
+    lambda session: True,
+    {"weighting": "published", "likelihood": True},
+)
+DIAGNOSE = Stage(
+    "diagnose",
+    "diagnosis.json",
+    _motion_files,
+    lambda session: any(run.role == "validate" for run in session.runs),
+    {"only": None},
+)
+STAGES = (CALIBRATE, TRACK, IDENTIFY, DIAGNOSE)

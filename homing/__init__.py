@@ -1,0 +1,1 @@
+"""Where an underactuated robot stands when it is switched on, from incremental encoders."""

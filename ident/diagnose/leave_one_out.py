@@ -1,0 +1,96 @@
+"""Linearised evidence of all runs, and what any set of unknowns makes of it.
+
+Each run contributes a triangle over [shared unknowns; residual] from which its own unknowns (start
+state, lengths) are eliminated. With these few numbers a run, every subset of unknowns can be
+solved, scored on runs that were left out, and told apart, without another simulation.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from freeswing.cdpr.robot import Array
+
+
+@dataclass(frozen=True, slots=True)
+class Evidence:
+    """Whitened linear equations, run by run.
+
+    Attributes:
+        runs: names, (r,).
+        triangles: over [unknowns; residual], (r, p + 1, p + 1); the last diagonal element is what
+            no unknown can explain.
+        counts: how many numbers each run measured, less its own unknowns, (r,).
+        prior_rows: weak priors, (q, p + 1).
+    """
+
+    runs: tuple[str, ...]
+    triangles: Array
+    counts: Array
+    prior_rows: Array
+
+    def subset(self, columns: np.ndarray) -> Evidence:
+        """The evidence with only some of the unknowns, the others held."""
+        kept = np.append(columns, self.triangles.shape[-1] - 1)
+        reduced = np.asarray(np.linalg.qr(self.triangles[:, :, kept], mode="r"))
+        prior = self.prior_rows[:, kept]
+        prior = prior[np.abs(prior[:, :-1]).sum(axis=1) > 0]
+        return Evidence(self.runs, reduced, self.counts, prior)
+
+
+@dataclass(frozen=True, slots=True)
+class Score:
+    """What a set of unknowns makes of the evidence.
+
+    Attributes:
+        change: of the unknowns, (p,).
+        std: of that change for white noise, (p,).
+        jackknife_std: from leaving out one run at a time, (p,).
+        cost: sum of squares over all runs after the change.
+        held_out: sum of squares of each run with the change found on the others, (r,).
+        rank: of the joint problem.
+    """
+
+    change: Array
+    std: Array
+    jackknife_std: Array
+    cost: float
+    held_out: Array
+    rank: int
+
+
+def score(evidence: Evidence) -> Score:
+    """Solve for all unknowns of the evidence, and again without each run."""
+    r, size, _ = evidence.triangles.shape
+    p = size - 1
+    scale = _column_scale(evidence)
+    whole = _solve(evidence.triangles.reshape(-1, size), evidence.prior_rows, scale)
+    changes = np.empty((r, p))
+    held_out = np.empty(r)
+    for k in range(r):
+        others = np.delete(evidence.triangles, k, axis=0).reshape(-1, size)
+        changes[k] = _solve(others, evidence.prior_rows, scale)[0]
+        held_out[k] = np.sum((evidence.triangles[k] @ np.append(changes[k], 1.0)) ** 2)
+    spread = changes - changes.mean(axis=0)
+    jackknife = np.sqrt((r - 1) / r * np.sum(spread**2, axis=0))
+    fitted = evidence.triangles.reshape(-1, size) @ np.append(whole[0], 1.0)
+    return Score(whole[0], whole[1], jackknife, float(fitted @ fitted), held_out, whole[2])
+
+
+def _column_scale(evidence: Evidence) -> Array:
+    norms = np.sqrt(np.sum(evidence.triangles[:, :, :-1] ** 2, axis=(0, 1)))
+    return 1.0 / np.where(norms > 0.0, norms, 1.0)
+
+
+def _solve(rows: Array, prior: Array, scale: Array) -> tuple[Array, Array, int]:
+    """Least-squares change, its standard deviations, and the rank."""
+    stacked = np.vstack([rows, prior])
+    matrix = stacked[:, :-1] * scale
+    left, singular, right = np.linalg.svd(matrix, full_matrices=False)
+    kept = singular > 1e-10 * singular.max(initial=0.0)
+    inverse = np.where(kept, 1.0 / np.where(kept, singular, 1.0), 0.0)
+    change = -scale * (right.T @ (inverse * (left.T @ stacked[:, -1])))
+    std = scale * np.sqrt(np.sum((right.T * inverse) ** 2, axis=1))
+    return change, std, int(kept.sum())

@@ -1,0 +1,32 @@
+"""Runs that a model follows far worse than the others, weighed so that they do not decide alone.
+
+Near a singularity a run answers to everything at once. While its cause is not in the model, such a
+run bends the inertia of all the others; what it says of candidates counts again once it is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from freeswing.cdpr.robot import Array
+from freeswing.ident.diagnose.spectrum import residual_powers
+from freeswing.ident.likelihood.likelihood import LikelihoodFit
+from freeswing.ident.likelihood.likelihood_run import Samples
+
+OUTSTANDING = 4.0
+
+
+def tempered(found: LikelihoodFit, noise_scales: Array) -> list[Samples]:
+    """The fit's samples, runs of more than `OUTSTANDING` times the median power held at that.
+
+    Args:
+        found: the fit whose residuals decide.
+        noise_scales: of metres and radians, (2,).
+    """
+    held_back = np.array([samples.temper for samples in found.samples])
+    powers = residual_powers(found, noise_scales) * held_back**2
+    limit = OUTSTANDING * max(1.0, float(np.median(powers)))
+    factors = np.sqrt(np.maximum(1.0, powers / limit))
+    return [replace(s, temper=float(f)) for s, f in zip(found.samples, factors, strict=True)]

@@ -1,0 +1,1 @@
+"""FIDIM as published: total least squares of the internal dynamics, weighted and with payloads."""

@@ -1,0 +1,178 @@
+"""FIDIM on a session's runs: by full poses, by free coordinates, weighted, with the mass."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+
+from freeswing.cdpr.model.equations import Model
+from freeswing.cdpr.model.regressor import regressor
+from freeswing.cdpr.robot import Array
+from freeswing.ident.estimate import Estimate, fidim_entry
+from freeswing.ident.fidim.calibration_share import calibration_share
+from freeswing.ident.fidim.fidim import FidimEstimate, fidim
+from freeswing.ident.fidim.payload_mass import LoadedCentre, MassEstimate, mass_from_payloads
+from freeswing.ident.fidim.weighted_least_squares import (
+    UNEVEN,
+    noisy_regressor,
+    unevenness,
+    weighted_fidim,
+)
+from freeswing.ident.judge.consistency import nearest_possible
+from freeswing.ident.runs import DroppedRun
+from freeswing.ident.signals.motions import lowest_tension
+from freeswing.ident.signals.prepare import (
+    PreparedRun,
+    PreparedRuns,
+    Progress,
+    left_out,
+    motion_of,
+    signals_used,
+    usable,
+    without,
+)
+
+Weighting = Literal["published", "covariance"]
+_THINNED = 10  # samples skipped where only an impression of the regressor's noise is wanted
+
+
+def fidim_estimates(
+    model: Model,
+    prepared: PreparedRuns,
+    weighting: Weighting,
+    progress: Progress | None,
+    consistent: bool = False,
+) -> tuple[PreparedRuns, dict[str, Estimate], dict[str, str]]:
+    """FIDIM by full poses and by free coordinates; slack runs found with its result leave.
+
+    With `consistent` an inertia that no body can have is replaced by the nearest possible one.
+
+    Returns:
+        The runs without the slack ones, `fidim_full` and `fidim_free` as far as they exist, and
+        why the others do not, by name.
+    """
+    found: dict[str, Estimate] = {}
+    failures: dict[str, str] = {}
+    for full in (True, False):
+        name = "fidim_full" if full else "fidim_free"
+        if progress:
+            progress(f"FIDIM by {'full poses' if full else 'free coordinates'}", 0.5 * (not full))
+        unloaded = usable(prepared, full, None)
+        if not unloaded:
+            failures[name] = _unusable_sentence(left_out(prepared, full))
+            continue
+        try:
+            raw = fidim([regressor(model, motion_of(run, full)) for run in unloaded])
+            slack = _slack_runs(model, prepared, raw.values, full)
+            if slack:
+                prepared = without(prepared, slack)
+                unloaded = usable(prepared, full, None)
+                raw = fidim([regressor(model, motion_of(run, full)) for run in unloaded])
+            entry = _completed(model, prepared, unloaded, raw, full, weighting)
+            found[name] = _consistent(entry, consistent)
+        except (ValueError, np.linalg.LinAlgError) as error:
+            failures[name] = str(error)
+    # A full-pose problem is quiet where poses were not measured: that is no failure.
+    if not any(run.full is not None for run in prepared.runs):
+        failures.pop("fidim_full", None)
+    return prepared, found, failures
+
+
+def _completed(
+    model: Model,
+    prepared: PreparedRuns,
+    unloaded: list[PreparedRun],
+    raw: FidimEstimate,
+    full: bool,
+    weighting: Weighting,
+) -> Estimate:
+    """The entry of one FIDIM solution: weighting, noise check, mass."""
+    notes: list[str] = []
+    weighted = None
+    asked = weighting == "covariance"
+    noisy = [
+        noisy_regressor(
+            model, signals_used(run, full), motion_of(run, full), 1 if asked else _THINNED
+        )
+        for run in (unloaded if asked else unloaded[:3])
+    ]
+    if asked:
+        try:
+            weighted = weighted_fidim(noisy, raw.values)
+        except (ValueError, np.linalg.LinAlgError) as error:
+            notes.append(f"as published: the weighted form cannot be had ({error})")
+    elif (ratio := unevenness(noisy)) > UNEVEN:
+        notes.append(
+            f"plain total least squares takes the regressor's columns to be equally noisy; theirs "
+            f"differs up to {ratio:.0f} times, so values and standard deviations may be off; "
+            'weighting = "covariance" gives the weighted form'
+        )
+    mass = _mass(model, prepared, raw, full, notes)
+    share = calibration_share(model, unloaded, full, raw.essential)
+    entry = fidim_entry(raw, left_out(prepared, full), tuple(notes), weighted, share)
+    return replace(entry, mass=mass)
+
+
+def _consistent(entry: Estimate, enforced: bool) -> Estimate:
+    """The entry with a word where no body can have its inertia, or held to one that can."""
+    if enforced and not entry.consistency.is_possible:
+        values = nearest_possible(entry.values, entry.covariance)
+        off = values - entry.values
+        cost = float(off @ np.linalg.solve(entry.covariance, off))
+        entry = replace(entry, values=values, held_cost=cost)
+    said = entry.consistency.sentence()
+    return replace(entry, notes=(*entry.notes, said)) if said else entry
+
+
+def _mass(
+    model: Model, prepared: PreparedRuns, raw: FidimEstimate, full: bool, notes: list[str]
+) -> MassEstimate | None:
+    """Mass from payload runs, each payload identified by itself (eqs. 23, 24)."""
+    payloads = {
+        (run.run.payload.mass_kg, tuple(run.run.payload.position_m)): run.run.payload
+        for run in prepared.runs
+        if run.run.payload is not None and run.run.role == "identify"
+    }
+    loaded: list[LoadedCentre] = []
+    for payload in payloads.values():
+        runs = usable(prepared, full, payload)
+        try:
+            one = fidim([regressor(model, motion_of(run, full)) for run in runs])
+        except (ValueError, np.linalg.LinAlgError) as error:
+            notes.append(f"payload of {payload.mass_kg:g} kg not used: {error}")
+            continue
+        covariance = one.solution.covariance[:3, :3]
+        loaded.append(LoadedCentre(payload, one.values[:3], covariance))
+    if not loaded:
+        return None
+    try:
+        return mass_from_payloads(raw.values[:3], raw.solution.covariance[:3, :3], loaded)
+    except ValueError as error:
+        notes.append(str(error))
+        return None
+
+
+def _slack_runs(model: Model, prepared: PreparedRuns, inertia: Array, full: bool) -> dict[str, str]:
+    """Runs along which a cable pushes, by the estimated inertia: name and sentence."""
+    slack = {}
+    for run in prepared.runs:
+        # Measured poses settle it; free coordinates only where there is nothing better.
+        if not full and run.full is not None:
+            continue
+        motion = run.full if full else run.free
+        if motion is None or run.run.payload is not None:
+            continue
+        lowest, cable = lowest_tension(model, motion, inertia)
+        if lowest < 0.0:
+            slack[run.name] = (
+                f"cable {cable} goes slack: its tension falls to {lowest:.2f} N per kg of platform"
+            )
+    return slack
+
+
+def _unusable_sentence(dropped: tuple[DroppedRun, ...]) -> str:
+    if not dropped:
+        return "no usable run"
+    return f"no usable run; {dropped[-1].run}, for one: {dropped[-1].why}"

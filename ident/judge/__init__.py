@@ -1,0 +1,1 @@
+"""How good a result is: consistency, laws, predictions of runs kept apart."""

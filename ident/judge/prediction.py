@@ -1,0 +1,134 @@
+"""The motion that an estimate predicts for a run: simulated, its initial state fitted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from freeswing.cdpr.model.equations import Model
+from freeswing.cdpr.robot import POSE_COORDINATES, Array, frozen_array
+from freeswing.ident.likelihood.joint_problem import State
+from freeswing.ident.likelihood.likelihood import LikelihoodFit, fit
+from freeswing.ident.likelihood.likelihood_run import Samples, predicted
+from freeswing.ident.likelihood.maximum_likelihood import started
+from freeswing.ident.signals.prepare import PreparedRun
+
+PREDICTED_HZ = 50.0
+_ASTRAY = 0.05  # residual over motion beyond which a fit deserves a second, careful start
+
+
+@dataclass(frozen=True, slots=True)
+class Prediction:
+    """A run's samples beside the predicted motion.
+
+    Attributes:
+        run: its name.
+        times_s: of the samples used, (n,).
+        coordinates: names of the measured coordinates.
+        measured: samples, (n, n_c).
+        predicted: (n, n_c).
+        values: effect values of the motion, those that the run has for itself included, (k,).
+    """
+
+    run: str
+    times_s: Array
+    coordinates: tuple[str, ...]
+    measured: Array
+    predicted: Array
+    values: Array
+
+    @property
+    def rmse_m(self) -> float | None:
+        """Root mean square of the position residuals, a coordinate; None without positions."""
+        return self._rmse(POSE_COORDINATES[:3])
+
+    @property
+    def rmse_rad(self) -> float | None:
+        """Root mean square of the angles' residuals, an angle; None without angles."""
+        return self._rmse(POSE_COORDINATES[3:])
+
+    def _rmse(self, names: tuple[str, ...]) -> float | None:
+        places = [i for i, name in enumerate(self.coordinates) if name in names]
+        if not places:
+            return None
+        residuals = (self.measured - self.predicted)[:, places]
+        return float(np.sqrt(np.mean(residuals**2)))
+
+
+def predict(
+    model: Model,
+    run: PreparedRun,
+    free: tuple[str, ...] | None,
+    inertia: Array,
+    values: Array | None = None,
+) -> Prediction:
+    """Predict a run with its initial state and cable lengths fitted and the inertia held.
+
+    Args:
+        model: the robot.
+        run: the run.
+        free: the coordinates to use of it, or None for full poses.
+        inertia: the nine parameters, (9,).
+        values: effect values, (k,); None for those that leave the declared model as it is.
+
+    Raises:
+        ValueError: when the motion cannot be simulated.
+    """
+    values = model.start_values if values is None else values
+    samples, first = started(model, run, free, inertia)
+    samples = _thinned(samples)
+    state = State(np.array(inertia), values, first[None], np.ones(2))
+    found = _followed(model, samples, state)
+    seen = _seen(found)
+    return Prediction(
+        run.name,
+        frozen_array(samples.times_s, samples.times_s.shape, "times"),
+        samples.coordinates,
+        frozen_array(samples.values, samples.values.shape, "measured"),
+        frozen_array(seen, seen.shape, "predicted"),
+        found.motions[0].values,
+    )
+
+
+def _followed(model: Model, samples: Samples, state: State) -> LikelihoodFit:
+    """The fit of the start over the whole run at once, or grown into it where that is astray.
+
+    A start too far off leaves the simulated swing out of phase, lets no step lower the cost, or
+    cannot be simulated so long.
+    """
+    try:
+        quick = _fitted(model, samples, state, grow=False)
+    except (ValueError, np.linalg.LinAlgError):
+        return _fitted(model, samples, state, grow=True)
+    spread = np.sqrt(np.mean((samples.values - samples.values.mean(axis=0)) ** 2))
+    error = np.sqrt(np.mean((_seen(quick) - samples.values) ** 2))
+    if quick.reason.startswith("converged") and error <= _ASTRAY * spread:
+        return quick
+    careful = _fitted(model, samples, state, grow=True)
+    return min(quick, careful, key=lambda one: one.deviance)
+
+
+def _fitted(model: Model, samples: Samples, state: State, grow: bool) -> LikelihoodFit:
+    return fit(
+        model, [samples], state, free=np.zeros(9 + len(model.parameters), dtype=bool), grow=grow
+    )
+
+
+def _seen(found: LikelihoodFit) -> Array:
+    samples = found.samples[0]
+    return predicted(found.motions[0], samples.times_s)[:, samples.columns]
+
+
+def _thinned(samples: Samples) -> Samples:
+    """Every k-th sample, down to `PREDICTED_HZ`: initial states need no more."""
+    period = float(np.median(np.diff(samples.times_s)))
+    every = max(1, round(1.0 / (PREDICTED_HZ * period)))
+    times = samples.times_s[::every]
+    return replace(
+        samples,
+        times_s=times,
+        values=samples.values[::every],
+        whitener=samples.whitener[::every],
+        span_s=(float(times[0]), float(times[-1])),
+    )

@@ -1,0 +1,1 @@
+"""Maximum likelihood over the free motions themselves."""

@@ -1,0 +1,107 @@
+"""Geometry that is known only so well: cable ends as further unknowns of the likelihood.
+
+Entry points D and attachment points A are estimated with the inertia, their stated standard
+deviations as priors about the declared places. What the swings do not tell of them widens the
+inertia's standard deviations, which a geometry taken as exact makes too small.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from freeswing.cdpr.model.equations import Model, build_model
+from freeswing.cdpr.robot import Array, Robot
+from freeswing.ident.likelihood.likelihood import LikelihoodFit, fit
+
+_ENTRY, _ATTACHMENT = "anchor_offset", "attachment_offset"
+
+
+@dataclass(frozen=True, slots=True)
+class GeometryPriors:
+    """How well the cables' ends are known, every coordinate; None: exactly.
+
+    Attributes:
+        entry_std_m: of D in the base frame.
+        attachment_std_m: of A in the platform frame.
+    """
+
+    entry_std_m: float | None = None
+    attachment_std_m: float | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("entry_std_m", "attachment_std_m"):
+            value = getattr(self, name)
+            if value is not None and not (np.isfinite(value) and 0.0 < value <= 0.1):
+                raise ValueError(
+                    f"{name} is {value}, must be above 0 and at most 0.1 m; leave it out where the "
+                    "places are exact"
+                )
+
+    @property
+    def stds(self) -> dict[str, float]:
+        """By the effect that moves the points, those that are not exact."""
+        known = {_ENTRY: self.entry_std_m, _ATTACHMENT: self.attachment_std_m}
+        return {name: std for name, std in known.items() if std is not None}
+
+    def model(self, robot: Robot) -> Model:
+        """The robot's equations with its cable ends as values of known spread."""
+        stds = self.stds
+        model = build_model(robot, tuple(stds))
+        spread = [stds[name.split(".")[0]] for name in model.names]
+        parameters = tuple(
+            replace(parameter.known(0.0, std), scale=std)
+            for parameter, std in zip(model.parameters, spread, strict=True)
+        )
+        return replace(model, parameters=parameters)
+
+
+def corrected(robot: Robot, model: Model, values: Array) -> Robot:
+    """The robot with its cable ends where a fit has found them."""
+    moves = {name: np.zeros((robot.n_cables, 3)) for name in (_ENTRY, _ATTACHMENT)}
+    for name in model.effects:
+        moves[name] = values[model.place_of(name)].reshape(-1, 3)
+    cables = tuple(
+        replace(cable, entry_m=cable.entry_m + entry, attachment_m=cable.attachment_m + attachment)
+        for cable, entry, attachment in zip(
+            robot.cables, moves[_ENTRY], moves[_ATTACHMENT], strict=True
+        )
+    )
+    return replace(robot, cables=cables)
+
+
+def weighed_against_priors(found: LikelihoodFit, consistent: bool = False) -> LikelihoodFit:
+    """The fit again with samples that count for no more than their coloured residuals are worth.
+
+    A fit enlarges its covariance for colour, the priors' share included: good where priors are
+    but a help. Cable ends would then come out farther from their declared places than their
+    stated deviations allow, and less certain than stated.
+    """
+    if not len(found.values) or found.enlargement == 1.0 or found.rank < int(found.free.sum()):
+        return found
+    start = replace(found.state, scales=found.scales * np.sqrt(found.enlargement))
+    again = fit(
+        found.model,
+        found.samples,
+        start,
+        estimate_scales=False,
+        grow=False,
+        consistent=consistent,
+    )
+    return replace(again, covariance=again.covariance / again.enlargement)
+
+
+def geometry_document(found: LikelihoodFit) -> dict[str, Any]:
+    """`geometry` of an estimate's entry: each coordinate's correction; empty where it was exact."""
+    if not len(found.values):
+        return {}
+    stds = found.std[9 : 9 + len(found.values)]
+    rows = [
+        {"name": name, "value": float(value), "std": float(std), "prior_std": parameter.prior_std}
+        for name, value, std, parameter in zip(
+            found.model.names, found.values, stds, found.model.parameters, strict=True
+        )
+    ]
+    return {"geometry": rows}

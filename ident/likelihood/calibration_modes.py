@@ -1,0 +1,190 @@
+"""The calibration's errors as unknowns of the likelihood, known beforehand to be small.
+
+A calibration that is a little wrong moves all poses of all runs together, by modes of known size
+(`cdpr.measured.pose_errors`). Left out, they end up in the inertia, and no residual says so. Here
+each mode has an amplitude, one for all runs, with a standard normal prior: samples = motion + modes
+a + noise. What the swings themselves tell of the amplitudes is used, and the rest widens the
+covariance. An inertia found so belongs to samples without the errors: `freed` gives those of runs
+that were not fitted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from freeswing.cdpr.measured.pose_errors import TERMS, PoseErrors
+from freeswing.cdpr.robot import Array
+from freeswing.cdpr.rotation import angle_rate_matrix, matrix_from_angles
+from freeswing.cdpr.simulation.free_swing import Motion
+from freeswing.cdpr.simulation.sensitivity import linearise
+from freeswing.ident.likelihood.joint_problem import Problem
+from freeswing.ident.likelihood.likelihood import LikelihoodFit, fit
+from freeswing.ident.likelihood.likelihood_run import Samples, reduce_run
+from freeswing.ident.runs import SwingRun
+
+ROUNDS = 3
+CONVERGED = 0.02  # of a standard deviation of the amplitudes
+UNLIKELY = 4.5
+
+
+@dataclass(frozen=True, slots=True)
+class Calibrated:
+    """A fit with the calibration's errors among its unknowns.
+
+    Attributes:
+        fit: to the samples without the errors found; its covariance holds what is left of them.
+        amplitudes: of the modes, in standard deviations of the calibration, (r,).
+        std: their standard deviations after the fit, (r,).
+    """
+
+    fit: LikelihoodFit
+    amplitudes: Array
+    std: Array
+
+    def document(self) -> dict[str, Any]:
+        """For the estimate's entry in the result file; empty where nothing was known."""
+        if not len(self.amplitudes):
+            return {}
+        modes = {"amplitudes": self.amplitudes.tolist(), "std": self.std.tolist()}
+        return {"calibration_modes": modes}
+
+    def notes(self) -> tuple[str, ...]:
+        """What a reader should know."""
+        largest = float(np.abs(self.amplitudes).max(initial=0.0))
+        if largest <= UNLIKELY:
+            return ()
+        return (
+            f"the swings ask for cameras that are off by {largest:.1f} standard deviations of "
+            f"their calibration (more than {UNLIKELY:g} is unlikely): the base tags' survey, the "
+            "tags' places on the platform or the robot's geometry may be off",
+        )
+
+
+def with_calibration(
+    found: LikelihoodFit, errors: Sequence[PoseErrors | None], consistent: bool = False
+) -> Calibrated:
+    """Goes on from a fit with the amplitudes of the calibration's errors as further unknowns.
+
+    Args:
+        found: converged, without them.
+        errors: of each of its runs, None where a run's poses have none.
+        consistent: hold the inertia to what a body can have.
+
+    Raises:
+        ValueError: when the runs' errors have different numbers of modes, or a refit breaks down.
+    """
+    counts = {len(one.modes) for one in errors if one is not None}
+    if len(counts) > 1:
+        raise ValueError(
+            f"calibration errors with {sorted(counts)} modes: all runs must come from one tracking"
+        )
+    if not counts or found.rank < int(found.free.sum()):
+        return Calibrated(found, np.zeros(0), np.zeros(0))
+    amplitudes = np.zeros(counts.pop())
+    none = PoseErrors(np.zeros(3), np.eye(3), np.zeros((len(amplitudes), 6, TERMS)))
+    known = [none if one is None else one for one in errors]
+    current = found
+    for _ in range(ROUNDS):
+        step, _ = _solved(current, known, amplitudes)
+        amplitudes = amplitudes + step
+        samples = [
+            replace(run, values=run.values - _shifts(motion, run, one)[:, run.columns] @ step)
+            for motion, run, one in zip(current.motions, current.samples, known, strict=True)
+        ]
+        current = fit(
+            current.model,
+            samples,
+            current.state,
+            current.free[: 9 + len(current.values)],
+            grow=False,
+            consistent=consistent,
+        )
+        if np.abs(step).max() < CONVERGED:
+            break
+    _, covariance = _solved(current, known, amplitudes)
+    shared = len(found.free)
+    spread = np.sqrt(np.diag(covariance)[shared:])
+    current = replace(current, covariance=covariance[:shared, :shared])
+    return Calibrated(current, amplitudes, spread)
+
+
+def freed(run: SwingRun, amplitudes: Array) -> SwingRun:
+    """A run without the calibration's errors that a fit of others found.
+
+    The modes are taken at the measured poses and at the slopes between them: errors of a tenth of
+    a millimetre change little with either. A run that states no errors, or whose full poses were
+    not measured, stays as it is.
+
+    Args:
+        run: as recorded.
+        amplitudes: of its modes, `Calibrated.amplitudes`, (r,); (0,) where none were fitted.
+
+    Raises:
+        ValueError: when the run has another number of modes.
+    """
+    errors, trajectory = run.pose_errors, run.trajectory
+    known = trajectory.is_known
+    if errors is None or not len(amplitudes) or not trajectory.is_pose or known.sum() < 2:
+        return run
+    if len(errors.modes) != len(amplitudes):
+        raise ValueError(
+            f"run {run.name}: {len(errors.modes)} calibration errors, {len(amplitudes)} in the "
+            "fitted runs: all runs must come from one tracking; track again"
+        )
+    zetas = trajectory.values[known]
+    rates = np.gradient(zetas, trajectory.times_s[known], axis=0)
+    values = trajectory.values.copy()
+    values[known] -= mode_shifts(zetas, rates, errors) @ amplitudes
+    return replace(run, trajectory=replace(trajectory, values=values))
+
+
+def mode_shifts(zetas: Array, rates: Array, errors: PoseErrors) -> Array:
+    """What one standard deviation of each mode adds to poses (n, 6) with rates, (n, 6, r)."""
+    turn = angle_rate_matrix(zetas[:, 3:])
+    omega = (turn @ rates[:, 3:, None])[..., 0]
+    velocities = np.concatenate([rates[:, :3], omega], axis=1)
+    shifts = errors.at(zetas[:, :3], matrix_from_angles(zetas[:, 3:]), velocities)
+    shifts[:, 3:] = np.linalg.solve(turn, shifts[:, 3:])
+    return shifts
+
+
+def _shifts(motion: Motion, samples: Samples, errors: PoseErrors) -> Array:
+    zetas, rates, _ = motion.at(samples.times_s)
+    return mode_shifts(zetas, rates, errors)
+
+
+def _solved(
+    current: LikelihoodFit, errors: Sequence[PoseErrors], amplitudes: Array
+) -> tuple[Array, Array]:
+    """Change of the amplitudes, and the covariance of shared unknowns and amplitudes together.
+
+    Coloured residuals say less than their number: the samples count by `correlation`.
+    """
+    problem = Problem(current.model, current.samples, current.free)
+    n_modes, n_shared = len(amplitudes), len(current.free)
+    weight = 1.0 / np.sqrt(current.enlargement)
+    rows = []
+    for motion, run, one in zip(current.motions, current.samples, errors, strict=True):
+        shifts = _shifts(motion, run, one)
+        found = reduce_run(linearise(motion), run, current.scales, shifts).rows[:-1]
+        shared = problem.shared_map(len(rows), current.state)
+        by_shared = found[:, : len(shared)] @ shared
+        rows.append(weight * np.hstack([by_shared, found[:, len(shared) :]]))
+    prior = problem.prior_rows(current.state)
+    rows.append(np.hstack([prior[:, :-1], np.zeros((len(prior), n_modes)), prior[:, -1:]]))
+    rows.append(np.hstack([np.zeros((n_modes, n_shared)), np.eye(n_modes), amplitudes[:, None]]))
+    kept = np.concatenate([problem.free, np.ones(n_modes, dtype=bool)])
+    unit = np.concatenate([problem.unit, np.ones(n_modes)])[kept]
+    stacked = np.vstack(rows)
+    matrix, right = stacked[:, :-1][:, kept] * unit, stacked[:, -1]
+    Q, R = np.linalg.qr(matrix)
+    inverse = np.linalg.inv(R) * unit[:, None]
+    covariance = np.zeros((len(kept), len(kept)))
+    covariance[np.ix_(kept, kept)] = inverse @ inverse.T
+    step = np.zeros(len(kept))
+    step[kept] = -inverse @ (Q.T @ right)
+    return step[n_shared:], covariance

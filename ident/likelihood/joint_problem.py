@@ -1,0 +1,261 @@
+"""The joint problem of all runs: cost, Gauss-Newton steps and noise scales."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from freeswing.cdpr.model.equations import Model
+from freeswing.cdpr.model.free_motion import admissible_rates
+from freeswing.cdpr.robot import Array
+from freeswing.cdpr.simulation.free_swing import Motion, simulate
+from freeswing.cdpr.simulation.sensitivity import linearise
+from freeswing.ident.judge.consistency import nearest_possible
+from freeswing.ident.likelihood.likelihood_run import (
+    Samples,
+    lengths_residual,
+    own_prior,
+    reduce_run,
+    residuals,
+)
+from freeswing.ident.likelihood.payload_runs import Loads
+
+TOLERANCE_M = 1e-8
+INERTIA_UNIT = np.array([0.05, 0.05, 0.05, 0.02, 0.02, 0.02, 0.01, 0.01, 0.01])
+RANK_LIMIT = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """Values of all unknowns.
+
+    Attributes:
+        inertia: (9,).
+        values: effect values, (k,).
+        starts: initial [zeta; rates] of each run, (runs, 12).
+        scales: noise scales of metres and radians, (2,).
+        motions: the simulated motions; empty before the first simulation.
+        own_values: of the effect values that each run has for itself, (runs, o); None for those
+            in `values`, which otherwise do not count for them.
+        loads: unknowns that payload runs add (see `ident.likelihood.payload_runs`), (u,); None: to
+            be guessed.
+    """
+
+    inertia: Array
+    values: Array
+    starts: Array
+    scales: Array
+    motions: tuple[Motion, ...] = ()
+    own_values: Array | None = None
+    loads: Array | None = None
+
+    def values_of(self, run: int, own: np.ndarray) -> Array:
+        """All effect values of a run, (k,)."""
+        values = self.values.copy()
+        if self.own_values is not None:
+            values[own] = self.own_values[run]
+        return values
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """A damped Gauss-Newton step.
+
+    Attributes:
+        shared: change of inertia, values and what payload runs add, (9 + k + u,).
+        states: change of each run's initial [zeta; rates], (12,).
+        own: change of each run's own effect values, (o,).
+        triangle: R of the scaled joint problem in the free unknowns.
+        singular_values: of that triangle, descending.
+        rank: how many of them count.
+        decrease: of the cost in the shared unknowns that an undamped linear step would bring.
+    """
+
+    shared: Array
+    states: tuple[Array, ...]
+    own: tuple[Array, ...]
+    triangle: Array
+    singular_values: Array
+    rank: int
+    decrease: float
+
+
+class Problem:
+    """What does not change while the unknowns do.
+
+    Args:
+        model: the equations, with the effects to be estimated.
+        samples: of the runs.
+        free: which of the first 9 + k shared unknowns to estimate; None for all.
+        estimate_scales: whether noise scales follow the residuals.
+        tolerance_m: local error of the simulated motions.
+        consistent: whether the inertia is held to what a body can have; all nine are then free.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        samples: Sequence[Samples],
+        free: np.ndarray | None = None,
+        estimate_scales: bool = True,
+        tolerance_m: float = TOLERANCE_M,
+        consistent: bool = False,
+    ) -> None:
+        parameters = model.parameters
+        self.model = model
+        self.samples = tuple(samples)
+        count = 9 + len(parameters)
+        self.free = np.ones(count, dtype=bool) if free is None else np.array(free[:count])
+        self.free[9 + model.own_values] = False
+        self.loads = Loads.of([run.payload for run in samples])
+        # Where the inertia is held, so is what payloads do to it.
+        self.free = np.append(self.free, np.full(self.loads.count, self.free[:9].any()))
+        self.consistent = consistent
+        self.estimate_scales = estimate_scales
+        self.tolerance_m = tolerance_m
+        self.prior_centre = model.start_values
+        self.prior_std = np.array([p.prior_std for p in parameters])
+        self.unit = np.concatenate([INERTIA_UNIT, [p.scale for p in parameters], self.loads.unit])
+        far = [3.0 * INERTIA_UNIT, [(p.high - p.low) / 3.0 for p in parameters], self.loads.unit]
+        self.farthest = np.concatenate(far)
+
+    def simulated(self, state: State) -> State:
+        """The state with motions from its starts, whose rates are made admissible.
+
+        Raises:
+            ValueError: when one cannot be followed, naming the run.
+        """
+        motions = tuple(
+            self._followed(state, run, start, samples)
+            for run, (start, samples) in enumerate(zip(state.starts, self.samples, strict=True))
+        )
+        starts = np.array([np.concatenate([one.zetas[0], one.rates[0]]) for one in motions])
+        return replace(state, starts=starts, motions=motions)
+
+    def _followed(self, state: State, run: int, start: Array, samples: Samples) -> Motion:
+        zeta, span = start[:6], samples.span_s
+        inertia = self.loads.inertia(run, state.inertia, self.loads_of(state))
+        values = state.values_of(run, self.model.own_values)
+        rates = admissible_rates(self.model, zeta, start[6:], inertia, values, span[0])
+        try:
+            return simulate(self.model, zeta, rates, span, inertia, values, self.tolerance_m)
+        except (ValueError, np.linalg.LinAlgError) as error:
+            raise ValueError(f"run {samples.name}: {error}") from error
+
+    def cost(self, state: State) -> float:
+        """Sum of squared whitened residuals, lengths and priors included."""
+        total = float(np.sum(self.prior(state.values) ** 2))
+        total += float(np.sum((self.loads_of(state) / self.loads.prior_std) ** 2))
+        for motion, samples in zip(state.motions, self.samples, strict=True):
+            total += float(np.sum(residuals(motion, samples, state.scales) ** 2))
+            total += float(np.sum(lengths_residual(motion, samples) ** 2))
+            total += float(np.sum(own_prior(motion) ** 2))
+        return total
+
+    def loads_of(self, state: State) -> Array:
+        """What payload runs add to the unknowns, (u,)."""
+        return self.loads.start() if state.loads is None else state.loads
+
+    def prior(self, values: Array) -> Array:
+        """Distance of the effect values from where they do nothing, over their range, (k,)."""
+        prior = (values - self.prior_centre) / self.prior_std
+        prior[self.model.own_values] = 0.0
+        return prior
+
+    def step(self, state: State, damping: float) -> Step:
+        """A damped Gauss-Newton step at the motions of a state."""
+        reduced = [
+            reduce_run(linearise(motion), samples, state.scales)
+            for motion, samples in zip(state.motions, self.samples, strict=True)
+        ]
+        maps = [self.shared_map(run, state) for run in range(len(reduced))]
+        parts = [
+            np.column_stack([run.rows[:-1, :-1] @ one, run.rows[:-1, -1]])
+            for run, one in zip(reduced, maps, strict=True)
+        ]
+        rows = np.vstack([*parts, self.prior_rows(state)])
+        free = self.free
+        scaled = rows[:, :-1][:, free] * self.unit[free]
+        shared = np.zeros(len(free))
+        n_free = int(free.sum())
+        full = np.asarray(np.linalg.qr(np.column_stack([scaled, rows[:, -1]]), mode="r"))
+        triangle, right = full[:n_free, :n_free], full[:n_free, -1]
+        left, singular, back = np.linalg.svd(triangle)
+        largest = singular.max(initial=0.0)
+        kept = singular > RANK_LIMIT * largest
+        gains = np.where(kept, singular / (singular**2 + damping * largest**2 + 1e-300), 0.0)
+        shared[free] = -self.unit[free] * (back.T @ (gains * (left.T @ right)))
+        if self.consistent:
+            curves = singular**2 + (damping + RANK_LIMIT**2) * largest**2
+            shared += self._held(state.inertia + shared[:9], (back.T / curves) @ back)
+        shared *= min(1.0, 1.0 / max(np.abs(shared / self.farthest).max(initial=0.0), 1e-300))
+        changes = [run.own_change(one @ shared) for run, one in zip(reduced, maps, strict=True)]
+        states, own = (tuple(part) for part in zip(*changes, strict=True))
+        decrease = float(right @ right)
+        return Step(shared, states, own, triangle, singular, int(kept.sum()), decrease)
+
+    def shared_map(self, run: int, state: State) -> Array:
+        """What a run sees, inertia with its payload and values, by the unknowns, (9 + k, p)."""
+        values = len(self.prior_std)
+        found = np.zeros((9 + values, len(self.free)))
+        found[9:, 9 : 9 + values] = np.eye(values)
+        slopes = self.loads.slopes(run, state.inertia, self.loads_of(state))
+        found[:9, :9], found[:9, 9 + values :] = slopes[:, :9], slopes[:, 9:]
+        return found
+
+    def _held(self, inertia: Array, scaled_covariance: Array) -> Array:
+        """Change of the shared unknowns (p,) that makes an inertia aimed at a possible body's."""
+        free = np.flatnonzero(self.free)
+        covariance = scaled_covariance * np.outer(self.unit[free], self.unit[free])
+        change = nearest_possible(inertia, covariance[:9, :9]) - inertia
+        found = np.zeros(len(self.free))
+        found[free] = covariance[:, :9] @ np.linalg.solve(covariance[:9, :9], change)
+        return found
+
+    def prior_rows(self, state: State) -> Array:
+        """Rows of the priors of effect values and payloads, (k + u, p + 1)."""
+        std = np.concatenate([self.prior_std, self.loads.prior_std])
+        rows = np.zeros((len(std), len(self.free) + 1))
+        rows[:, 9:-1] = np.diag(1.0 / std)
+        rows[:, -1] = np.concatenate(
+            [self.prior(state.values), self.loads_of(state) / self.loads.prior_std]
+        )
+        return rows
+
+    def moved(self, state: State, step: Step) -> State | None:
+        """The simulated state after a step, or None where it cannot be simulated."""
+        aimed = replace(
+            state,
+            inertia=state.inertia + step.shared[:9],
+            values=state.values + step.shared[9 : 9 + len(state.values)],
+            starts=state.starts + np.array(step.states),
+            own_values=self._own_of(state) + np.array(step.own),
+            loads=self.loads_of(state) + step.shared[9 + len(state.values) :],
+        )
+        try:
+            return self.simulated(aimed)
+        except ValueError:
+            return None
+
+    def _own_of(self, state: State) -> Array:
+        own = self.model.own_values
+        runs = range(len(self.samples))
+        return np.array([state.values_of(run, own)[own] for run in runs])
+
+    def rescaled(self, state: State) -> State:
+        """The state with noise scales that make the whitened residuals' variance one."""
+        if not self.estimate_scales:
+            return state
+        squares, counts = np.zeros(2), np.zeros(2)
+        for motion, samples in zip(state.motions, self.samples, strict=True):
+            white = residuals(motion, samples, state.scales)
+            for g in (0, 1):
+                squares[g] += np.sum(white[:, samples.groups == g] ** 2)
+                counts[g] += white[:, samples.groups == g].size
+        own = 12 - self.model.robot.n_cables + len(self.model.own_values)
+        share = 1.0 - min(0.9, (own * len(self.samples) + self.free.sum()) / max(counts.sum(), 1.0))
+        factors = np.sqrt(squares / np.maximum(share * counts, 1.0))
+        scales = np.where(counts > 0, state.scales * np.maximum(factors, 1e-6), state.scales)
+        return replace(state, scales=scales)

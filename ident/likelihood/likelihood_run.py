@@ -1,0 +1,251 @@
+"""One run's share of the likelihood: whitened residuals and their derivatives, reduced by QR.
+
+Unknowns of a run are its initial pose and those rates that the cables allow: 12 - n numbers.
+They are eliminated here; what goes on to the joint problem are the rows that are left for the
+shared unknowns (inertia and effects).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from freeswing.cdpr.effects import effect_named
+from freeswing.cdpr.model.batch import evaluate, with_jacobian
+from freeswing.cdpr.model.free_motion import coordinate_indices
+from freeswing.cdpr.robot import POSE_COORDINATES, Array
+from freeswing.cdpr.rotation import angle_rate_matrix
+from freeswing.cdpr.simulation.free_swing import Motion
+from freeswing.cdpr.simulation.sensitivity import Linearised
+from freeswing.ident.runs import Payload
+
+STATE = 12
+
+
+@dataclass(frozen=True, slots=True)
+class Samples:
+    """A run's samples, ready for whitening.
+
+    Attributes:
+        name: of the run.
+        times_s: of the samples in which all coordinates are known, (n,).
+        coordinates: what was measured.
+        values: (n, c).
+        whitener: inverse Cholesky factors of the stated or unit noise covariance, (n, c, c).
+        groups: 0 for metres, 1 for radians, (c,).
+        lengths_m: stated cable lengths, (n_cables,), or None.
+        lengths_std_m: their standard deviation.
+        span_s: start and end of the window.
+        payload: a known mass on the platform, or None.
+        temper: factor on its noise, where the model is known to follow it worse than others.
+    """
+
+    name: str
+    times_s: Array
+    coordinates: tuple[str, ...]
+    values: Array
+    whitener: Array
+    groups: np.ndarray
+    lengths_m: Array | None
+    lengths_std_m: float
+    span_s: tuple[float, float]
+    payload: Payload | None = None
+    temper: float = 1.0
+
+    def until(self, end_s: float) -> Samples:
+        """The samples up to a time."""
+        count = int(np.searchsorted(self.times_s, end_s, side="right"))
+        return replace(
+            self,
+            times_s=self.times_s[:count],
+            values=self.values[:count],
+            whitener=self.whitener[:count],
+            span_s=(self.span_s[0], float(self.times_s[count - 1])),
+        )
+
+    def loosened(self, std_m: float) -> Samples:
+        """The same with lengths known no better than to `std_m`."""
+        return replace(self, lengths_std_m=max(self.lengths_std_m, std_m))
+
+    @property
+    def columns(self) -> list[int]:
+        """Positions of the measured coordinates in the pose."""
+        return coordinate_indices(self.coordinates)
+
+    @property
+    def is_pose(self) -> bool:
+        """Whether full poses were measured."""
+        return self.coordinates == POSE_COORDINATES
+
+
+@dataclass(frozen=True, slots=True)
+class Reduced:
+    """A run's linearised residuals after its own unknowns were eliminated.
+
+    Attributes:
+        rows: triangle over [shared unknowns; residual], (p + 1, p + 1).
+        own: triangle over [own unknowns; shared unknowns; residual]: 12 - n state directions,
+            then the effect values that are the run's own.
+        basis: state change by [state directions; shared; 1], (12, 12 - n + p + 1).
+        own_columns: where the run's own effect values stand among the shared unknowns, (o,).
+    """
+
+    rows: Array
+    own: Array
+    basis: Array
+    own_columns: np.ndarray
+
+    def own_change(self, shared: Array) -> tuple[Array, Array]:
+        """Change of the initial [zeta; rates], and of the run's own effect values.
+
+        Args:
+            shared: change of the shared unknowns, zero where a run has its own, (p,).
+        """
+        n_own = self.own.shape[0]
+        right = -(self.own[:, n_own:-1] @ shared + self.own[:, -1])
+        own = np.linalg.solve(self.own[:, :n_own], right)
+        directions = n_own - len(self.own_columns)
+        everything = shared.copy()
+        everything[self.own_columns] = own[directions:]
+        state = self.basis @ np.concatenate([own[:directions], everything, [1.0]])
+        return state, own[directions:]
+
+
+def predicted(motion: Motion, times_s: Array) -> Array:
+    """What would be measured of the pose at times (n,), all six coordinates, (n, 6)."""
+    zetas, rates, _ = motion.at(times_s)
+    if not _changes_measurement(motion):
+        return zetas
+    arguments = (times_s, zetas, rates, motion.inertia, motion.values)
+    return evaluate(motion.model.measured, *arguments)[0]
+
+
+def residuals(motion: Motion, samples: Samples, scales: Array) -> Array:
+    """Whitened prediction minus measurement, (n, c)."""
+    return _whitened(predicted(motion, samples.times_s), samples, scales)
+
+
+def lengths_residual(motion: Motion, samples: Samples) -> Array:
+    """Predicted minus stated lengths over their standard deviation, (n_cables,) or (0,)."""
+    if samples.lengths_m is None:
+        return np.zeros(0)
+    start = (motion.starts_s[0], motion.zetas[0], motion.rates[0], motion.inertia, motion.values)
+    told = evaluate(motion.model.told, *start)[0]
+    return (told - samples.lengths_m) / samples.lengths_std_m
+
+
+def reduce_run(
+    linear: Linearised, samples: Samples, scales: Array, shifts: Array | None = None
+) -> Reduced:
+    """Linearise one run's residuals at a motion and eliminate its own unknowns.
+
+    Args:
+        linear: the motion's first-order answer.
+        samples: what was measured.
+        scales: noise scale of metres and of radians, (2,).
+        shifts: what further shared unknowns, which come after the others, add to the measured
+            pose, (n, 6, r).
+    """
+    motion = linear.motion
+    matrix = _sample_rows(linear, samples, scales)
+    white = residuals(motion, samples, scales)
+    rows = np.concatenate([matrix.reshape(-1, matrix.shape[-1]), _length_rows(motion, samples)])
+    lengths = lengths_residual(motion, samples)
+    right = np.concatenate([white.reshape(-1), lengths])
+    basis = _allowed_states(motion)
+    directions = STATE - motion.model.robot.n_cables
+    body = rows[:, :STATE] @ basis
+    shared = body[:, directions:-1] + rows[:, STATE:]
+    mine = motion.inertia.size + motion.model.own_values
+    own = np.hstack([body[:, :directions], shared[:, mine]])
+    shared[:, mine] = 0.0
+    n_own = own.shape[1]
+    further = np.zeros((len(rows), 0 if shifts is None else shifts.shape[2]))
+    if shifts is not None:
+        further[: white.size] = _whitened_change(shifts, samples, scales).reshape(white.size, -1)
+    together = np.column_stack([own, shared, further, right + body[:, -1]])
+    together = np.vstack([together, _own_priors(motion, directions, together.shape[1])])
+    triangle = np.linalg.qr(together, mode="r")
+    size = together.shape[1]
+    full = np.zeros((size, size))
+    full[: len(triangle)] = triangle
+    return Reduced(full[n_own:, n_own:], full[:n_own], basis, mine)
+
+
+def own_prior(motion: Motion) -> Array:
+    """A run's own effect values over their plausible size, (o,)."""
+    parameters = motion.model.parameters
+    return np.array([motion.values[k] / parameters[k].prior_std for k in motion.model.own_values])
+
+
+def _own_priors(motion: Motion, directions: int, columns: int) -> Array:
+    """Rows that keep a run's own effect values within their range, (o, columns)."""
+    places = motion.model.own_values
+    rows = np.zeros((len(places), columns))
+    for row, k in enumerate(places):
+        rows[row, directions + row] = 1.0 / motion.model.parameters[k].prior_std
+    rows[:, -1] = own_prior(motion)
+    return rows
+
+
+def _changes_measurement(motion: Motion) -> bool:
+    return any(effect_named(name).changes_measurement for name in motion.model.effects)
+
+
+def _whitened(poses: Array, samples: Samples, scales: Array) -> Array:
+    if samples.is_pose:
+        difference = poses - samples.values
+        turn = angle_rate_matrix(samples.values[:, 3:])
+        difference[:, 3:] = (turn @ difference[:, 3:, None])[..., 0]
+    else:
+        difference = poses[:, samples.columns] - samples.values
+    noise = samples.temper * scales[samples.groups]
+    return (samples.whitener @ difference[..., None])[..., 0] / noise
+
+
+def _sample_rows(linear: Linearised, samples: Samples, scales: Array) -> Array:
+    """Derivatives of the whitened residuals by the unknowns, (n, c, 21 + k)."""
+    motion = linear.motion
+    change, change_rates = linear.at(samples.times_s)
+    if _changes_measurement(motion):
+        zetas, rates, _ = motion.at(samples.times_s)
+        function = with_jacobian(motion.model.measured, (1, 2, 3, 4))
+        arguments = (samples.times_s, zetas, rates, motion.inertia, motion.values)
+        slopes = evaluate(function, *arguments)[1]
+        direct = slopes[:, :, STATE:]
+        change = slopes[:, :, :6] @ change + slopes[:, :, 6:STATE] @ change_rates
+        change[:, :, STATE:] += direct
+    return _whitened_change(change, samples, scales)
+
+
+def _whitened_change(change: Array, samples: Samples, scales: Array) -> Array:
+    """A change of the predicted pose (n, 6, m), as it shows in the whitened residuals."""
+    if samples.is_pose:
+        turn = angle_rate_matrix(samples.values[:, 3:])
+        change = np.concatenate([change[:, :3], turn @ change[:, 3:]], axis=1)
+    else:
+        change = change[:, samples.columns]
+    return samples.whitener @ change / (samples.temper * scales[samples.groups])[:, None]
+
+
+def _length_rows(motion: Motion, samples: Samples) -> Array:
+    columns = STATE + motion.inertia.size + motion.values.size
+    if samples.lengths_m is None:
+        return np.zeros((0, columns))
+    return _start_slopes(motion, motion.model.told)[1] / samples.lengths_std_m
+
+
+def _start_slopes(motion: Motion, function: object) -> tuple[Array, Array]:
+    start = (motion.starts_s[0], motion.zetas[0], motion.rates[0], motion.inertia, motion.values)
+    value, slopes = evaluate(with_jacobian(function, (1, 2, 3, 4)), *start)
+    return value, slopes
+
+
+def _allowed_states(motion: Motion) -> Array:
+    """State changes by [own; shared; 1] that keep the rates within what the cables allow."""
+    slip, slopes = _start_slopes(motion, motion.model.slip)
+    by_state, by_shared = slopes[:, :STATE], slopes[:, STATE:]
+    inverse = np.linalg.pinv(by_state)
+    free = np.linalg.svd(by_state)[2][len(slip) :].T
+    return np.column_stack([free, -inverse @ by_shared, -inverse @ slip])

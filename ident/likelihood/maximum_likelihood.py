@@ -1,0 +1,271 @@
+"""The maximum-likelihood estimates of a session: full poses, and free coordinates alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from freeswing.cdpr.model.equations import Model
+from freeswing.cdpr.robot import Array
+from freeswing.ident.estimate import Estimate
+from freeswing.ident.fidim.fidim import WELL_IDENTIFIED_PERCENT, near_zero
+from freeswing.ident.judge.consistency import consistency, is_possible, nearest_possible
+from freeswing.ident.judge.free_swing_law import (
+    LawlessError,
+    is_lawless,
+    lawless_sentence,
+    unexplained_motion,
+)
+from freeswing.ident.likelihood.cable_ends import geometry_document, weighed_against_priors
+from freeswing.ident.likelihood.calibration_modes import with_calibration
+from freeswing.ident.likelihood.guess_run_start import first_state
+from freeswing.ident.likelihood.joint_problem import State
+from freeswing.ident.likelihood.likelihood import LikelihoodFit, fit
+from freeswing.ident.likelihood.likelihood_run import Samples
+from freeswing.ident.likelihood.payload_runs import Loads, mass_of
+from freeswing.ident.likelihood.raw_samples import prepare
+from freeswing.ident.runs import DroppedRun
+from freeswing.ident.signals.prepare import PreparedRun, Progress
+
+_ASTRAY = 0.5  # a lost swing is out of phase with its samples
+_AS_BAD = 0.95  # times the worst run
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """What a maximum-likelihood estimate is asked for beside the fit itself.
+
+    Attributes:
+        consistent: hold the inertia to what a body can have.
+        mass_kg: a guess of the mass, to start from where runs carry payloads.
+    """
+
+    consistent: bool = False
+    mass_kg: float | None = None
+
+
+def ml_estimate(
+    model: Model,
+    runs: list[PreparedRun],
+    free: tuple[str, ...] | None,
+    inertia: Array,
+    dropped: tuple[DroppedRun, ...] = (),
+    progress: Progress | None = None,
+    asked: Asked | None = None,
+) -> tuple[Estimate, LikelihoodFit]:
+    """Fit the free motions themselves to the samples of some runs.
+
+    Args:
+        model: the robot; values of its effects, if any, are estimated with their priors.
+        runs: those to fit, with and without payloads.
+        free: the coordinates to use of them, or None for full poses.
+        inertia: where to start, (9,): FIDIM's result.
+        dropped: runs left out, for the record.
+        progress: told a label and a fraction.
+        asked: what else is asked for.
+
+    Raises:
+        ValueError: when no run's samples can give a motion, or the fit breaks down.
+    """
+    asked = asked or Asked()
+    kept, samples, states, more = begun(model, runs, free, inertia, asked.mass_kg)
+    loads = Loads.of([run.payload for run in samples]).start(asked.mass_kg)
+    state = State(np.array(inertia), model.start_values, states, np.ones(2), loads=loads)
+    found, cost = fit(model, samples, state, progress=progress), None
+    if asked.consistent and not is_possible(found.inertia):
+        held = _held(found, progress)
+        found, cost = held, held.deviance - found.deviance
+    errors = [run.run.pose_errors for run in kept]
+    if not any(errors):  # which are weighed against coloured residuals by themselves
+        found = weighed_against_priors(found, consistent=cost is not None)
+    told = with_calibration(found, errors, consistent=cost is not None)
+    entry = _entry(told.fit, dropped + more, cost)
+    return replace(
+        entry,
+        notes=entry.notes + told.notes(),
+        calibration=told.amplitudes,
+        extra={**entry.extra, **told.document()},
+    ), told.fit
+
+
+def best_ml_estimate(
+    model: Model,
+    runs: list[PreparedRun],
+    free: tuple[str, ...] | None,
+    starts: list[Array],
+    dropped: tuple[DroppedRun, ...] = (),
+    progress: Progress | None = None,
+    asked: Asked | None = None,
+) -> tuple[Estimate, LikelihoodFit]:
+    """The likeliest fit, without the runs that follow no free swing: they are dropped by name.
+
+    Raises:
+        LawlessError: when no run follows one.
+        ValueError: when no start leads to a fit: what went wrong from the first.
+    """
+    entry, found = _from_starts(model, runs, free, starts, dropped, progress, asked)
+    shares = unexplained_motion(found)
+    lawless = is_lawless(shares, refuted=entry.consistency.is_refuted)
+    if not lawless.any():
+        return entry, found
+    if lawless.all():
+        least = int(np.argmin(shares))
+        raise LawlessError(
+            "no run swings freely by this robot's equations; of "
+            f"{found.samples[least].name}, which comes closest, "
+            f"{lawless_sentence(float(shares[least]))}"
+        )
+    # One bad run may take others with it: those that are off nearly as far as the worst leave.
+    worst = {
+        found.samples[run].name: lawless_sentence(float(shares[run]))
+        for run in np.flatnonzero(lawless & (shares > _AS_BAD * shares.max()))
+    }
+    dropped += tuple(DroppedRun(name, why, lawless=True) for name, why in worst.items())
+    kept = [run for run in runs if run.name not in worst]
+    return best_ml_estimate(model, kept, free, [entry.values, *starts], dropped, progress, asked)
+
+
+def _from_starts(
+    model: Model,
+    runs: list[PreparedRun],
+    free: tuple[str, ...] | None,
+    starts: list[Array],
+    dropped: tuple[DroppedRun, ...],
+    progress: Progress | None,
+    asked: Asked | None,
+) -> tuple[Estimate, LikelihoodFit]:
+    """The first fit from several starts that follows the runs, or else the likeliest of all.
+
+    A fit follows when its residuals are small beside the swings and no body is ruled out by it.
+    """
+    found: list[tuple[Estimate, LikelihoodFit]] = []
+    failure: Exception | None = None
+    for start in starts:
+        try:
+            entry, result = ml_estimate(model, runs, free, start, dropped, progress, asked)
+        except (ValueError, np.linalg.LinAlgError) as error:
+            failure = failure or error
+            continue
+        if not entry.consistency.is_refuted and astray(result) < _ASTRAY:
+            return entry, result
+        found.append((entry, result))
+    if not found:
+        raise ValueError(str(failure)) from failure
+    return min(found, key=lambda pair: pair[1].deviance)
+
+
+def astray(found: LikelihoodFit) -> float:
+    """Largest share of a run's motion that its fit leaves unexplained, root mean square."""
+    return float(unexplained_motion(found).max())
+
+
+def begun(
+    model: Model,
+    runs: list[PreparedRun],
+    free: tuple[str, ...] | None,
+    inertia: Array,
+    mass_kg: float | None = None,
+) -> tuple[list[PreparedRun], list[Samples], Array, tuple[DroppedRun, ...]]:
+    """Runs that can be started, their samples and first states, and the others with reasons.
+
+    Args:
+        model: the robot.
+        runs: with and without payloads.
+        free: the coordinates to use of them, or None for full poses.
+        inertia: where to start, (9,).
+        mass_kg: a guess of the mass, where runs carry payloads.
+
+    Raises:
+        ValueError: when no run without payload can be started.
+    """
+    kept, samples, states, dropped = [], [], [], []
+    for run in runs:
+        load = Loads.of([run.run.payload])
+        guess = load.inertia(0, inertia, load.start(mass_kg))
+        try:
+            one, state = started(model, run, free, guess)
+        except (ValueError, np.linalg.LinAlgError) as error:
+            dropped.append(DroppedRun(run.name, str(error)))
+            continue
+        kept.append(run)
+        samples.append(one)
+        states.append(state)
+    if not any(run.run.payload is None for run in kept):
+        raise ValueError(
+            f"no run without payload can be started; {dropped[0].run}: {dropped[0].why}"
+            if dropped
+            else "no run without payload"
+        )
+    return kept, samples, np.array(states), tuple(dropped)
+
+
+def _held(found: LikelihoodFit, progress: Progress | None) -> LikelihoodFit:
+    """The fit again, its inertia held to what a body can have."""
+    if found.rank < int(found.free.sum()):
+        return found
+    inertia = nearest_possible(found.inertia, found.covariance[:9, :9])
+    start = replace(found.state, inertia=inertia, motions=())
+    return fit(found.model, found.samples, start, progress=progress, consistent=True)
+
+
+def started(
+    model: Model, run: PreparedRun, free: tuple[str, ...] | None, inertia: Array
+) -> tuple[Samples, Array]:
+    """A run's samples and a first state [zeta; rates], (12,).
+
+    Free coordinates alone come with cable lengths: the stated ones, or those of the run's poses.
+
+    Raises:
+        ValueError: when the samples cannot give a state.
+    """
+    seen = run.run
+    if free is not None:
+        trajectory = seen.trajectory.select(free)
+        seen = replace(seen, trajectory=trajectory, lengths_m=run.lengths_m)
+    samples = prepare(seen, run.signals.window_s)
+    return samples, first_state(model, samples, inertia)
+
+
+def _entry(
+    found: LikelihoodFit, dropped: tuple[DroppedRun, ...], held_cost: float | None
+) -> Estimate:
+    covariance = found.covariance[:9, :9]
+    if not np.isfinite(covariance).all():
+        raise ValueError(
+            f"the samples do not determine the inertia: rank {found.rank} of "
+            f"{int(found.free.sum())}; record larger swings in all modes about more equilibria"
+        )
+    std = np.sqrt(np.diag(covariance))
+    weak = 100.0 * std > WELL_IDENTIFIED_PERCENT * np.abs(found.inertia)
+    notes = []
+    if found.enlargement > 1.0:
+        notes.append(
+            f"the residuals are not white (power below 5 Hz is {found.correlation:.3g} times that "
+            "of white noise): the model misses something; standard deviations are enlarged for it"
+        )
+    mass = None
+    if len(found.loads):
+        place = 9 + len(found.values)
+        try:
+            mass = mass_of(found.loads[0], float(found.std[place]))
+        except ValueError as error:
+            notes.append(str(error))
+    if said := consistency(found.inertia, covariance, held_cost).sentence():
+        notes.append(said)
+    noise = {"noise_m": found.noise[0], "noise_rad": found.noise[1]}
+    return Estimate(
+        values=found.inertia,
+        covariance=covariance,
+        essential=~(weak & near_zero(found.inertia)),
+        samples=sum(len(run.times_s) for run in found.samples),
+        dropped=dropped,
+        notes=tuple(notes),
+        mass=mass,
+        held_cost=held_cost,
+        extra={
+            **{key: float(value) for key, value in noise.items() if np.isfinite(value)},
+            "stop_reason": found.reason,
+            **geometry_document(found),
+        },
+    )

@@ -1,0 +1,1 @@
+"""Recorded samples to positions, velocities and accelerations on common stamps."""

@@ -1,0 +1,81 @@
+"""The diagnosis on short sessions whose motions come from an independent integrator."""
+
+import numpy as np
+import pytest
+
+from freeswing.cdpr.files.documents import DataError
+from freeswing.ident.diagnose.diagnose import diagnose
+from freeswing.ident.diagnose.experiments import separating_experiment
+from freeswing.session.load_swings import load_robot, load_swings, load_target
+from freeswing.session.session_file import read_session
+from tests.oracle.sessions import make_session
+
+FEW = ("gravity_tilt", "translational_drag", "constant_force")
+
+
+def told(folder, effects, seed, **options):
+    make_session(folder, seed, "bologna-4", effects, n_runs=6, duration_s=4.0, **options)
+    session = read_session(folder)
+    robot = load_robot(session)
+    return list(load_swings(session, robot, load_target(session))), robot
+
+
+@pytest.fixture(scope="module")
+def tilted(tmp_path_factory):
+    runs, robot = told(tmp_path_factory.mktemp("tilted"), {"gravity_tilt": "large"}, 5)
+    return diagnose(runs, robot, workers=1, candidates=FEW)
+
+
+def test_a_tilted_base_is_named(tilted):
+    assert tilted.final.model.effects == ("gravity_tilt",), tilted.final.model.effects
+
+
+def test_prediction_comes_down_to_the_noise(tilted):
+    document = tilted.document()
+    before, after = document["before"], document["after"]
+    ratio = after["prediction_rmse_m"] / after["noise_floor_m"]
+    assert ratio < 1.2, ratio
+    assert before["prediction_rmse_m"] > 1.5 * after["prediction_rmse_m"], (before, after)
+    assert not document["unexplained"]["present"], document["unexplained"]
+
+
+def test_every_candidate_has_a_verdict_and_a_reason(tilted):
+    document = tilted.document()
+    assert {c["effect"] for c in document["candidates"]} == set(FEW)
+    assert all(c["reason"] for c in document["candidates"]), document["candidates"]
+    assert len(document["ladder"]) == 2, document["ladder"]
+
+
+def test_nothing_is_claimed_on_clean_data(tmp_path):
+    runs, robot = told(tmp_path, {}, 6)
+    found = diagnose(runs, robot, workers=1, candidates=FEW)
+    assert found.final.model.effects == (), found.candidates
+    assert not found.unexplained.present, found.unexplained
+
+
+def test_validation_runs_do_not_enter_the_search(tmp_path):
+    runs, robot = told(tmp_path, {}, 7)
+    found = diagnose(runs, robot, workers=1, candidates=())
+    names = {samples.name for samples in found.final.samples}
+    held = {run.name for run in runs if run.role == "validate"}
+    assert not names & held, names & held
+
+
+def test_too_few_runs_are_refused_in_words(tmp_path):
+    runs, robot = told(tmp_path, {}, 8)
+    fitted = [run for run in runs if run.role == "identify"][:2]
+    checked = [run for run in runs if run.role == "validate"]
+    with pytest.raises(DataError, match="at least 3"):
+        diagnose([*fitted, *checked], robot, workers=1, candidates=())
+
+
+def test_an_experiment_is_advised_for_any_group():
+    for group in (("gravity_tilt", "constant_force"), ("tether", "winch_creep")):
+        assert len(separating_experiment(group)) > 30
+    assert "payload" in separating_experiment(("gravity_tilt", "constant_force"))
+
+
+def test_effect_values_come_with_their_deviations(tilted):
+    entry = tilted.document()["accepted"][0]
+    stds = np.array([p["std"] for p in entry["parameters"]])
+    assert (stds > 0).all(), stds

@@ -1,0 +1,43 @@
+"""A small copy of benchmarks/identify_monte_carlo.py: estimates against the Cramer-Rao bound."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from benchmarks.identify_monte_carlo import (
+    NOISE_M,
+    bound_of,
+    likelihood,
+    runs_of,
+)
+from freeswing.cdpr.model.regressor import regressor
+from freeswing.ident.fidim.fidim import fidim
+from freeswing.ident.signals.derivatives import SignalSettings
+from freeswing.ident.signals.prepare import prepare_runs
+from tests.ident.swings import REGULAR, TRUE_INERTIA, paper_model, tilted_swing
+
+DRAWS = 4
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("length_error_m", [0.0, 5e-4])
+def test_maximum_likelihood_reaches_the_bound_and_fidim_stays_far_off(length_error_m: float):
+    """Thirty-six errors over their bounds: their root mean square is 1 within its own spread."""
+    model = paper_model()
+    motions = [tilted_swing(k) for k in REGULAR[:6]]
+    bound = bound_of(motions, length_error_m)
+    by_ml, by_fidim, covered = [], [], []
+    for draw in range(DRAWS):
+        runs = runs_of(motions, np.random.default_rng([7, draw]), NOISE_M, length_error_m)
+        prepared = prepare_runs(runs, model, SignalSettings())
+        usable = [run.free for run in prepared.runs if run.free is not None]
+        published = fidim([regressor(model, motion) for motion in usable]).values
+        found = likelihood(runs, published)
+        by_ml.append((found.inertia - TRUE_INERTIA) / bound)
+        by_fidim.append((published - TRUE_INERTIA) / bound)
+        covered.append(np.abs(found.inertia - TRUE_INERTIA) < 1.96 * found.std)
+    ml, tls = (float(np.sqrt(np.mean(np.square(errors)))) for errors in (by_ml, by_fidim))
+    assert ml < 1.5, f"rmse over bound: maximum likelihood {ml:.2f}, FIDIM {tls:.1f}"
+    assert tls > 5.0, f"rmse over bound: maximum likelihood {ml:.2f}, FIDIM {tls:.1f}"
+    assert np.mean(covered) > 0.8, f"95 % intervals hold the truth {100 * np.mean(covered):.0f} %"

@@ -1,0 +1,1 @@
+"""Sightings of all cameras to the platform's poses, with covariance."""

@@ -1,0 +1,145 @@
+"""A run's sightings of all cameras, block by block in base time, so that memory stays flat."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from freeswing.cdpr.rotation import invert
+from freeswing.vision.fuse.poses import Poses
+from freeswing.vision.fuse.rolling_shutter import rolling_bias
+from freeswing.vision.fuse.run_views import Block, CameraViews
+from freeswing.vision.look.follow import USED
+from freeswing.vision.look.pieces import Piece
+from freeswing.vision.look.watched_target import Watch
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+INSTANTS_A_BLOCK = 400
+
+
+def blocks(
+    views: Sequence[CameraViews], watch: Watch, instants_s: Array, poses: Poses | None = None
+) -> Iterator[Block]:
+    """All sightings of the platform, each at the instant nearest to its frame.
+
+    With `poses` at these instants, the corners are freed of what rolling shutters did to them.
+    """
+    nearest = [_nearest(v, instants_s) for v in views]
+    for first in range(0, len(instants_s), INSTANTS_A_BLOCK):
+        last = min(first + INSTANTS_A_BLOCK, len(instants_s))
+        block = _block(views, nearest, watch, first, last)
+        if poses is not None and any(v.camera.line_time_s != 0.0 for v in views):
+            block = replace(block, rays=block.rays - rolling_bias(block, views, poses))
+        yield block
+
+
+def _nearest(views: CameraViews, instants_s: Array) -> Ints:
+    """Instant of each frame, -1 when it is farther than 0.6 steps or was not used."""
+    times = views.middle_times()
+    if len(instants_s) == 0:
+        return np.full(len(times), -1, dtype=np.int64)
+    if len(instants_s) == 1:
+        place = np.zeros(len(times), dtype=np.int64)
+        return np.where(views.status == USED, place, -1)
+    step = float(np.median(np.diff(instants_s)))
+    safe = np.where(np.isfinite(times), times, -np.inf)
+    right = np.clip(np.searchsorted(instants_s, safe), 1, len(instants_s) - 1)
+    place = np.where(safe - instants_s[right - 1] < instants_s[right] - safe, right - 1, right)
+    near = np.abs(safe - instants_s[place]) < 0.6 * step
+    return np.where(near & (views.status == USED), place, -1)
+
+
+def _block(
+    views: Sequence[CameraViews], nearest: Sequence[Ints], watch: Watch, first: int, last: int
+) -> Block:
+    parts: list[tuple[NDArray, ...]] = []
+    guesses = np.full((last - first, 4, 4), np.nan)
+    most = np.zeros(last - first)
+    for index, (view, place) in enumerate(zip(views, nearest, strict=True)):
+        frames = np.flatnonzero((place >= first) & (place < last))
+        T_base_camera = invert(view.camera.T_camera_base)
+        for low, first_sighting, piece, mask in view.rows(frames):
+            own = place[low : low + len(mask)] - first
+            _take_guesses(piece, mask, own, T_base_camera, watch, guesses, most)
+            keep = mask[piece.frame_of] & _on_platform(piece.things, watch)
+            frame_of = piece.frame_of[keep]
+            stamps = piece.stamps_s[frame_of] + view.camera.clock_offset_s
+            rows = piece.rows_px[keep]
+            parts.append(
+                (
+                    own[frame_of],
+                    np.full(len(frame_of), index),
+                    piece.things[keep],
+                    piece.rays[keep],
+                    piece.covariances[keep],
+                    stamps[:, None] + view.camera.line_time_s * rows,
+                    rows,
+                    piece.numbers[frame_of],
+                    first_sighting + np.flatnonzero(keep),
+                )
+            )
+    if not parts:
+        parts = [tuple(np.zeros((0, *s)) for s in ((), (), (), (8,), (8, 8), (4,), (4,), (), ()))]
+    columns = [np.concatenate(column) for column in zip(*parts, strict=True)]
+    order = np.lexsort((columns[2], columns[1], columns[0]))
+    instant, camera_of, things, rays, covariances, times, rows, frames, index = (
+        column[order] for column in columns
+    )
+    things = things.astype(np.int64)
+    starts = np.searchsorted(instant, np.arange(last - first + 1))
+    counts = np.where((things >= 0) & (things < watch.first_base), 4, 1)
+    return Block(
+        first,
+        starts.astype(np.int64),
+        camera_of.astype(np.int64),
+        things,
+        counts.astype(np.int64),
+        points_of(things, watch),
+        np.ascontiguousarray(rays),
+        np.ascontiguousarray(covariances),
+        times,
+        rows,
+        frames.astype(np.int64),
+        index.astype(np.int64),
+        guesses,
+    )
+
+
+def points_of(things: Ints, watch: Watch) -> Array:
+    """Platform points of sightings, (n_o, 4, 3); a marker fills the first row only."""
+    points = np.zeros((len(things), 4, 3))
+    tags = (things >= 0) & (things < watch.first_base)
+    points[tags] = watch.tag_corners_m[things[tags]]
+    markers = things >= watch.first_marker
+    points[markers, 0] = watch.marker_positions_m[things[markers] - watch.first_marker]
+    return points
+
+
+def _on_platform(things: Ints, watch: Watch) -> NDArray[np.bool_]:
+    return np.asarray((things < watch.first_base) | (things >= watch.first_marker))
+
+
+def _take_guesses(
+    piece: Piece,
+    mask: NDArray[np.bool_],
+    own: Ints,
+    T_base_camera: Array,
+    watch: Watch,
+    guesses: Array,
+    most: Array,
+) -> None:
+    """Keeps, for each instant, the pose of the camera that sees most of the platform."""
+    seen = np.bincount(
+        piece.frame_of[_on_platform(piece.things, watch)], minlength=len(piece.numbers)
+    )
+    for row in np.flatnonzero(mask & np.isfinite(piece.poses[:, 0])):
+        if seen[row] > most[own[row]]:
+            most[own[row]] = seen[row]
+            pose = np.eye(4)
+            pose[:3, :3], pose[:3, 3] = piece.poses[row, :9].reshape(3, 3), piece.poses[row, 9:]
+            guesses[own[row]] = T_base_camera @ pose

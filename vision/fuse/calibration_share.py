@@ -1,0 +1,188 @@
+"""What the calibration's own uncertainty does to the poses.
+
+Pixel noise scatters the poses; a calibration that is a little wrong shifts them all alike, and no
+residual shows it. The covariance that `calibrate` leaves in calibration.json is carried through
+the solve: dpose = N^-1 J' W (d rays / d calibration) d calibration, at some instants of each run.
+What the runs have in common is kept as modes, each of one standard deviation; `identify` takes
+them as what they are, errors that all poses of the session share.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from freeswing.calib.camera.lens_models import PARAMETER_NAMES
+from freeswing.cdpr.measured.pose_errors import PoseErrors, error_terms, fitted_terms
+from freeswing.vision.fuse.blocks import blocks
+from freeswing.vision.fuse.fuse_cameras import Fit, free_of, whitened
+from freeswing.vision.fuse.linearised_block import linearised
+from freeswing.vision.fuse.poses import Poses
+from freeswing.vision.fuse.run_views import Block, CameraViews
+from freeswing.vision.look.watched_target import Watch
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+_POSE_NAMES = ("tx_m", "ty_m", "tz_m", "rx_rad", "ry_rad", "rz_rad")
+_INSTANTS_A_RUN = 150
+_LEFT_OUT = 1e-4  # of the variance, over all runs
+
+
+@dataclass(frozen=True, slots=True)
+class CalibrationNoise:
+    """Covariance (n, n) of named numbers such as `cam0.fx` and `cam0.rx_rad`."""
+
+    names: tuple[str, ...]
+    matrix: Array
+
+    def roots(self) -> Array:
+        """L with L L' the covariance, one column an independent cause, (n, m)."""
+        values, vectors = np.linalg.eigh(self.matrix)
+        real = values > 1e-14 * max(float(values[-1]), 1e-300)
+        return vectors[:, real] * np.sqrt(values[real])
+
+
+@dataclass(frozen=True, slots=True)
+class RunShare:
+    """The calibration's share of one run's poses.
+
+    Attributes:
+        std: median standard deviations of position and small rotation, (6,).
+        errors: one mode for each independent cause in the calibration.
+        spread: root mean square of each of the errors' terms along the run, (13,).
+    """
+
+    std: Array
+    errors: PoseErrors
+    spread: Array
+
+
+def read_calibration_noise(path: Path) -> CalibrationNoise | None:
+    """From calibration.json; None where there is none, or it tells no covariance."""
+    try:
+        table: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        share = table["covariance"]
+        names = tuple(str(name) for name in share["names"])
+        matrix = np.array(share["matrix"], dtype=np.float64)
+    except (OSError, ValueError, KeyError, TypeError, OverflowError, RecursionError):
+        return None
+    if matrix.shape != (len(names), len(names)) or not np.isfinite(matrix).all():
+        return None
+    return CalibrationNoise(names, matrix)
+
+
+def run_share(
+    poses: Poses, fit: Fit, views: Sequence[CameraViews], watch: Watch, noise: CalibrationNoise
+) -> RunShare | None:
+    """The share of a run's poses, from instants spread over it; None where no pose is known."""
+    known = np.flatnonzero(poses.known)
+    if not len(known):
+        return None
+    chosen = known[:: max(1, len(known) // _INSTANTS_A_RUN)]
+    focal = np.array([v.camera.focal_px.mean() for v in views])
+    roots = noise.roots()
+    found = []
+    for block in blocks(views, watch, poses.times_s, poses):
+        mine = chosen[(chosen >= block.first) & (chosen < block.first + len(block.starts) - 1)]
+        if len(mine):
+            slopes = _pose_slopes(
+                block, poses, views, fit.floor_px / focal, noise.names, mine, free_of(watch)
+            )
+            found.append(slopes @ roots)
+    slopes = np.concatenate(found)
+    about = int(known[len(known) // 2])
+    origin, turn = poses.positions_m[about], poses.rotations[about]
+    terms = error_terms(
+        poses.positions_m[chosen], poses.rotations[chosen], poses.motions[chosen, :6], origin, turn
+    )
+    modes = np.moveaxis(fitted_terms(terms, slopes), 2, 0)
+    return RunShare(
+        np.median(np.sqrt(np.sum(slopes**2, axis=2)), axis=0),
+        PoseErrors(origin, turn, modes),
+        np.sqrt(np.mean(terms**2, axis=0)),
+    )
+
+
+def common_errors(shares: Sequence[RunShare | None]) -> list[PoseErrors | None]:
+    """The runs' errors with the fewest modes that hold all but a trace of their variance.
+
+    A radian counts as much as a metre: cables of a metre or two make them do the same.
+    """
+    seen = [share for share in shares if share is not None]
+    if not seen:
+        return [None] * len(shares)
+    weighted = [
+        np.moveaxis(s.errors.modes * s.spread, 0, 2).reshape(-1, len(s.errors.modes)) for s in seen
+    ]
+    _, sizes, mixes = np.linalg.svd(np.concatenate(weighted), full_matrices=False)
+    left = 1.0 - np.cumsum(sizes**2) / max(float(np.sum(sizes**2)), 1e-300)
+    count = int(np.searchsorted(-left, -_LEFT_OUT)) + 1
+    return [None if share is None else _mixed(share.errors, mixes[:count]) for share in shares]
+
+
+def _mixed(errors: PoseErrors, mixes: Array) -> PoseErrors:
+    modes = np.einsum("jr,rab->jab", mixes, errors.modes)
+    return PoseErrors(errors.about_m, errors.about_rotation, modes)
+
+
+def _pose_slopes(
+    block: Block,
+    poses: Poses,
+    views: Sequence[CameraViews],
+    floors: Array,
+    names: tuple[str, ...],
+    chosen: Ints,
+    free: int,
+) -> Array:
+    """Change of the pose by the calibration at the chosen instants, (n, 6, n_names)."""
+    linear = linearised(block, views, poses)
+    residuals, rates, places = linear.residuals, linear.rates, linear.places
+    white = whitened(block, floors)
+    slopes = np.zeros((len(chosen), 6, len(names)))
+    for row, k in enumerate(chosen - block.first):
+        normal, cross = np.zeros((free, free)), np.zeros((free, len(names)))
+        for o in range(block.starts[k], block.starts[k + 1]):
+            points = int(block.counts[o])
+            m = 2 * points
+            if not np.isfinite(places[o]).all() or (residuals[o, :m] == 0.0).all():
+                continue
+            jacobian = white[o, :m, :m] @ linear.jacobians[o, :m, :free]
+            normal += jacobian.T @ jacobian
+            view = views[block.camera_of[o]]
+            by_time = rates[o, :m].reshape(points, 2)
+            slope = _ray_slopes(view, places[o, :points], by_time, block.rows_px[o], names)
+            cross += jacobian.T @ white[o, :m, :m] @ slope
+        slopes[row, :free] = np.linalg.pinv(normal, hermitian=True) @ cross
+    return slopes
+
+
+def _ray_slopes(
+    view: CameraViews, places: Array, by_time: Array, rows_px: Array, names: tuple[str, ...]
+) -> Array:
+    """How residual rays of points (n, 3) change with the calibration, (2 n, n_names)."""
+    camera = view.camera
+    rays = np.column_stack([places[:, :2] / places[:, 2:], np.ones(len(places))])
+    _, by_point, by_lens = camera.project_jacobian(rays)
+    lens = -np.linalg.solve(by_point[:, :, :2], by_lens)
+    g = np.zeros((len(places), 2, 3))
+    g[:, 0, 0] = g[:, 1, 1] = 1.0
+    g[:, :, 2] = -rays[:, :2]
+    g /= places[:, 2][:, None, None]
+    arms = places - camera.T_camera_base[:3, 3]
+    by_pose = -np.concatenate([g, np.cross(arms[:, None, :], g)], axis=2)
+    clocks = -np.stack([by_time, by_time * rows_px[: len(places), None]], axis=2)
+    parts = np.concatenate([lens, by_pose, clocks], axis=2)
+    entries = (*PARAMETER_NAMES[camera.model], *_POSE_NAMES, "clock_offset_s", "line_time_s")
+    columns = {name: k for k, name in enumerate(names)}
+    slopes = np.zeros((2 * len(places), len(names)))
+    for k, entry in enumerate(entries):
+        if (column := columns.get(f"{camera.name}.{entry}")) is not None:
+            slopes[:, column] = parts[:, :, k].ravel()
+    return slopes

@@ -1,0 +1,261 @@
+"""All cameras' sightings of a run to one trajectory: a robust solve an instant, with covariance.
+
+Cameras take their frames at different times, so each corner is compared with the pose carried to
+its own time by the motion, which is taken from the poses themselves and improved with them. What
+the lenses and the calibration leave (beyond pixel noise) is found from the residuals, camera by
+camera, and counts as noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from freeswing.vision.fuse.blocks import blocks
+from freeswing.vision.fuse.linearised_block import camera_matrices, lags, linearised_at
+from freeswing.vision.fuse.pose_kernels import solve_block
+from freeswing.vision.fuse.poses import Poses, motion_of_poses, unknown_poses
+from freeswing.vision.fuse.run_views import Block, CameraViews
+from freeswing.vision.look.single_pose import whitening
+from freeswing.vision.look.watched_target import Watch
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+START_FLOOR_PX = 0.15
+LEAST_FLOOR_PX = 0.002
+_ROBUST_LIMIT = 9.0
+_REJECT = 16.0
+_MOTION_PASSES = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """How the sightings agree with the poses, per camera.
+
+    Attributes:
+        floor_px: what calibration and lens leave beyond pixel noise, (n_c,).
+        reprojection_px: root mean square residual of the accepted sightings, (n_c,).
+        consistency_m: rms distance at which a camera's mean ray passes the joint pose, (n_c,).
+        used: sightings accepted, (n_c,).
+        rejected: {(camera, thing): (count, first frame, worst px)} of outliers.
+        total: sum of the accepted squared whitened residuals, and their number.
+    """
+
+    floor_px: Array
+    reprojection_px: Array
+    consistency_m: Array
+    used: NDArray[np.int64]
+    rejected: dict[tuple[int, int], tuple[int, int, float]]
+    total: tuple[float, int]
+
+
+def fuse(
+    views: Sequence[CameraViews],
+    watch: Watch,
+    instants_s: Array,
+    floor_px: Array | None = None,
+    start: Poses | None = None,
+    passes: int = _MOTION_PASSES,
+    *,
+    rough: bool = False,
+) -> tuple[Poses, Fit]:
+    """Poses at the instants from all cameras.
+
+    Args:
+        views: the cameras as they are believed to be, with their sightings.
+        watch: what was looked for.
+        instants_s: base times sought, (n,).
+        floor_px: noise beyond the pixels' own, (n_c,); found from the residuals when None.
+        start: poses of an earlier call at the same instants.
+        passes: solves; each improves the motion and the floor for the next.
+        rough: leaves the covariances out (0, 6, 6), more than half of what poses take.
+    """
+    n, n_c = len(instants_s), len(views)
+    floors = np.full(n_c, START_FLOOR_PX) if floor_px is None else floor_px
+    poses = unknown_poses(instants_s) if start is None else start
+    fit = Fit(floors, np.zeros(n_c), np.zeros(n_c), np.zeros(n_c, np.int64), {}, (0.0, 0))
+    for turn in range(passes):
+        positions, rotations = poses.positions_m.copy(), poses.rotations.copy()
+        known = np.zeros(n, dtype=bool)
+        kept = 0 if rough or turn + 1 < passes else n
+        covariances = np.full((kept, 6, 6), np.nan)
+        account = _Account(n_c)
+        for block in blocks(views, watch, instants_s, poses):
+            span = slice(block.first, block.first + len(block.starts) - 1)
+            start_position, start_rotation, can = _starts(
+                block, positions[span], rotations[span], poses.motions[span]
+            )
+            noise = floors / np.array([v.camera.focal_px.mean() for v in views])
+            own = np.full((len(can), 6, 6), np.nan)
+            _solve(
+                block, views, instants_s[span], poses.motions[span], noise, start_position,
+                start_rotation, can, own, account, free_of(watch),
+            )  # fmt: skip
+            if kept:
+                own[~can] = np.nan
+                covariances[span] = own
+            positions[span] = np.where(can[:, None], start_position, np.nan)
+            rotations[span] = np.where(can[:, None, None], start_rotation, np.nan)
+            known[span] = can
+        poses = Poses(
+            instants_s,
+            positions,
+            rotations,
+            covariances,
+            known,
+            motion_of_poses(instants_s, positions, rotations, known),
+        )
+        fit = account.fit(floors)
+        if floor_px is None:
+            floors = account.floors()
+    return poses, fit
+
+
+def free_of(watch: Watch) -> int:
+    """6 where the target gives a pose, 3 where it is a reference point alone."""
+    return 6 if watch.platform_points >= 3 else 3
+
+
+def _starts(
+    block: Block, positions: Array, rotations: Array, motions: Array
+) -> tuple[Array, Array, Mask]:
+    """Where each solve starts: the pose of the pass before, else a single camera's, else a
+    neighbour's.
+    """  # noqa: D205
+    position, rotation = positions.copy(), rotations.copy()
+    known = np.isfinite(position[:, 0])
+    guessed = ~known & np.isfinite(block.guesses[:, 0, 0])
+    position[guessed] = block.guesses[guessed, :3, 3]
+    rotation[guessed] = block.guesses[guessed, :3, :3]
+    can = known | guessed
+    if can.any():
+        have = np.flatnonzero(can)
+        for k in np.flatnonzero(~can):
+            if block.starts[k + 1] > block.starts[k]:
+                near = have[np.argmin(np.abs(have - k))]
+                position[k], rotation[k], can[k] = position[near], rotation[near], True
+    return np.ascontiguousarray(position), np.ascontiguousarray(rotation), can
+
+
+def whitened(block: Block, noise: Array) -> Array:
+    """Whitening of each sighting with the camera's floor (in rays) added, (n_o, 8, 8)."""
+    if not len(block.things):
+        return np.zeros((0, 8, 8))
+    covariances = block.covariances.copy()
+    single = block.counts == 1
+    diagonal = np.arange(8)
+    covariances[single[:, None] & (diagonal >= 2), diagonal[None, :].repeat(len(single), 0)[
+        single[:, None] & (diagonal >= 2)
+    ]] = 1.0  # fmt: skip
+    covariances[:, diagonal, diagonal] += (noise[block.camera_of] ** 2)[:, None]
+    return whitening(covariances)
+
+
+def _solve(
+    block: Block,
+    views: Sequence[CameraViews],
+    instants_s: Array,
+    motions: Array,
+    noise: Array,
+    positions: Array,
+    rotations: Array,
+    known: Mask,
+    covariances: Array,
+    account: _Account,
+    free: int,
+) -> None:
+    late, steady = lags(block, instants_s), np.ascontiguousarray(motions)
+    scores = np.full(len(block.things), -1.0)
+    solve_block(
+        block.starts, rotations, positions, known, steady, free, camera_matrices(views),
+        block.camera_of, block.points, block.rays, whitened(block, noise), late, block.counts,
+        _ROBUST_LIMIT, covariances, scores,
+    )  # fmt: skip
+    found = linearised_at(block, views, rotations, positions, known, steady, late)
+    instant = np.repeat(np.arange(len(instants_s)), np.diff(block.starts))
+    account.add(block, views, scores, known[instant], found.residuals, found.places)
+
+
+class _Account:
+    """Sums over the sightings of a pass."""
+
+    def __init__(self, cameras: int) -> None:
+        self.squares, self.noise = np.zeros(cameras), np.zeros(cameras)
+        self.numbers, self.used = np.zeros(cameras), np.zeros(cameras, dtype=np.int64)
+        self.misses, self.frames = np.zeros(cameras), np.zeros(cameras)
+        self.rejected: dict[tuple[int, int], tuple[int, int, float]] = {}
+        self.total, self.count = 0.0, 0
+        self.samples: list[list[Array]] = [[] for _ in range(cameras)]
+
+    def add(
+        self,
+        block: Block,
+        views: Sequence[CameraViews],
+        scores: Array,
+        known: Mask,
+        residuals: Array,
+        places: Array,
+    ) -> None:
+        good = known & (scores >= 0.0) & (scores < _REJECT)
+        bad = known & ~good
+        focal = np.array([v.camera.focal_px.mean() for v in views])[block.camera_of]
+        pixels = residuals * focal[:, None]
+        own = np.diagonal(block.covariances, axis1=1, axis2=2) * (focal**2)[:, None]
+        two = 2 * block.counts
+        squares = (pixels**2).sum(axis=1)
+        noise = np.where(np.arange(8) < two[:, None], own, 0.0).sum(axis=1)
+        np.add.at(self.squares, block.camera_of[good], squares[good])
+        np.add.at(self.noise, block.camera_of[good], noise[good])
+        np.add.at(self.numbers, block.camera_of[good], two[good])
+        np.add.at(self.used, block.camera_of[good], 1)
+        self.total += float((scores[good] * two[good]).sum())
+        self.count += int(two[good].sum())
+        self._add_misses(block, good, residuals, places)
+        for camera in range(len(views)):
+            mine = known & (scores >= 0.0) & (block.camera_of == camera)
+            excess = (squares[mine] - noise[mine]) / two[mine]
+            self.samples[camera].append(excess[:: max(1, len(excess) // 500)])
+        for o in np.flatnonzero(bad):
+            key = (int(block.camera_of[o]), int(block.things[o]))
+            count, first, worst = self.rejected.get(key, (0, int(block.frames[o]), 0.0))
+            size = float(np.sqrt(squares[o] / block.counts[o]))
+            self.rejected[key] = (count + 1, min(first, int(block.frames[o])), max(worst, size))
+
+    def _add_misses(self, block: Block, good: Mask, residuals: Array, places: Array) -> None:
+        """How far each frame's mean ray passes the joint pose, in metres at its distance."""
+        if not good.any():
+            return
+        instant = np.repeat(np.arange(len(block.starts) - 1), np.diff(block.starts))
+        group = instant[good] * len(self.used) + block.camera_of[good]
+        names, inverse = np.unique(group, return_inverse=True)
+        points = np.bincount(inverse, weights=block.counts[good])
+        miss2 = np.zeros(len(names))
+        for axis in range(2):
+            metres = (residuals[good][:, axis::2] * places[good][:, :, 2]).sum(axis=1)
+            miss2 += (np.bincount(inverse, weights=metres) / points) ** 2
+        np.add.at(self.misses, names % len(self.used), miss2)
+        np.add.at(self.frames, names % len(self.used), 1)
+
+    def floors(self) -> Array:
+        """Noise beyond the pixels', by camera: the median excess, safe against outliers."""
+        floors = np.full(len(self.used), LEAST_FLOOR_PX)
+        for camera, parts in enumerate(self.samples):
+            excess = np.concatenate([np.zeros(0), *parts])
+            if len(excess):
+                # The median of a mean of eight squares lies near 0.92 of its mean.
+                floors[camera] = np.sqrt(max(np.median(excess) / 0.92, LEAST_FLOOR_PX**2))
+        return floors
+
+    def fit(self, floors: Array) -> Fit:
+        return Fit(
+            floors,
+            np.sqrt(self.squares / np.maximum(self.numbers, 1)),
+            np.sqrt(self.misses / np.maximum(self.frames, 1)),
+            self.used,
+            dict(sorted(self.rejected.items())),
+            (self.total, self.count),
+        )

@@ -1,0 +1,1 @@
+"""Images to sightings: tags and markers found and followed in one camera's frames."""

@@ -1,0 +1,1 @@
+"""What is wrong with the rig during a run: late clocks, moved cameras, rolling shutters."""

@@ -1,0 +1,229 @@
+"""Corrects the rig for one run: decides which effects are real, and with what they are put right.
+
+Clocks are found only against each other: their common part is set so that most cameras keep the
+clock they were calibrated with. A change below its threshold, or below six standard deviations,
+is not made.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from freeswing.cdpr.rotation import log_rotation
+from freeswing.vision.fuse.fuse_cameras import Fit, fuse
+from freeswing.vision.fuse.poses import Poses
+from freeswing.vision.fuse.run_views import CameraViews, instants_of
+from freeswing.vision.look.label import label_markers
+from freeswing.vision.look.watched_target import Watch
+from freeswing.vision.rig.rig_effects import (
+    LEAST_CLOCK_S,
+    LEAST_LINE_S,
+    Finding,
+    RigStep,
+    applied,
+    moved_cameras,
+    repose_by_base_tags,
+    rig_step,
+)
+from freeswing.vision.rig.rig_kernels import CLOCK, LINE, PER_CAMERA, POSE
+
+Array = NDArray[np.float64]
+
+_SIGMAS = 6.0
+_STEPS = 3
+_LEAST_KNOWN = 20
+
+
+@dataclass(frozen=True, slots=True)
+class Corrected:
+    """A run's poses with the rig as it really was.
+
+    Attributes:
+        views: cameras, corrected.
+        poses: the platform.
+        before: agreement with the cameras as calibrated.
+        after: agreement with the corrected ones.
+        findings: the effects found.
+    """
+
+    views: tuple[CameraViews, ...]
+    poses: Poses
+    before: Fit
+    after: Fit
+    findings: tuple[Finding, ...]
+
+
+def correct_rig(
+    views: Sequence[CameraViews], watch: Watch, survey_std_m: float, *, look: bool = True
+) -> Corrected:
+    """Poses of a run, with the effects of the cameras found and removed.
+
+    Args:
+        views: cameras as calibrated, with their sightings.
+        watch: what was looked for.
+        survey_std_m: of the base tags' corners.
+        look: False leaves the cameras as calibrated.
+    """
+    instants = instants_of(views)
+    start = None
+    if watch.markers and len(instants):
+        views, start = label_markers(views, watch, instants)
+    poses, before = fuse(views, watch, instants, start=start)
+    if not look or int(poses.known.sum()) < _LEAST_KNOWN:
+        return Corrected(tuple(views), poses, before, before, ())
+    moved = moved_cameras(views, watch)
+    current = list(views)
+    for index in moved:
+        current[index] = views[index].believed(
+            repose_by_base_tags(views[index], watch, survey_std_m)
+        )
+    clocks, lines, last = _estimate(current, watch, instants, moved, survey_std_m, poses)
+    if not (moved or clocks.any() or lines.any()):
+        return Corrected(tuple(views), poses, before, before, ())
+    final = [
+        _decided(view, calibrated, clock, line)
+        for view, calibrated, clock, line in zip(current, views, clocks, lines, strict=True)
+    ]
+    poses, after = fuse(final, watch, instants_of(final), start=_restarted(final, watch, start))
+    findings = _findings(views, final, moved, clocks, lines, last)
+    return Corrected(tuple(final), poses, before, after, findings)
+
+
+def _estimate(
+    current: list[CameraViews],
+    watch: Watch,
+    instants: Array,
+    moved: dict[int, float],
+    survey_std_m: float,
+    poses: Poses,
+) -> tuple[Array, Array, RigStep]:
+    """Changes of clock and line time that are real, (n_c,) each; moved cameras in place."""
+    n_c = len(current)
+    clock_free = np.arange(n_c) != _reference(current)
+    free = np.zeros((n_c, PER_CAMERA), dtype=bool)
+    free[list(moved), POSE:] = True
+    free[:, CLOCK] = clock_free
+    total = np.zeros((n_c, PER_CAMERA))
+    poses, fit = fuse(current, watch, instants, start=poses if not moved else None, rough=True)
+    step = _iterate(current, watch, poses, fit, free, total, survey_std_m)
+    with_lines = free.copy()
+    with_lines[:, LINE] = True
+    poses, fit = fuse(current, watch, instants, start=poses, passes=2, rough=True)
+    trial = rig_step(current, watch, poses, fit, with_lines, survey_std_m)
+    lines = trial.changes[:, LINE]
+    real = np.abs(lines) > np.maximum(LEAST_LINE_S, _SIGMAS * trial.deviations[:, LINE])
+    real &= np.abs(lines) < _longest_lines(current)
+    if real.any():
+        free[:, LINE] = real
+        step = _iterate(current, watch, poses, fit, free, total, survey_std_m)
+    clocks = total[:, CLOCK] - (np.median(total[:, CLOCK]) if n_c > 2 else 0.0)
+    deviation = np.where(clock_free, step.deviations[:, CLOCK], step.deviations[:, CLOCK].max())
+    sure = np.abs(clocks) > np.maximum(LEAST_CLOCK_S, _SIGMAS * deviation)
+    return np.where(sure, clocks, 0.0), np.where(real, total[:, LINE], 0.0), step
+
+
+def _iterate(
+    current: list[CameraViews],
+    watch: Watch,
+    poses: Poses,
+    fit: Fit,
+    free: NDArray[np.bool_],
+    total: Array,
+    survey_std_m: float,
+) -> RigStep:
+    """Gauss-Newton over rig and poses in turn; `current` and `total` are brought up to date."""
+    step = rig_step(current, watch, poses, fit, free, survey_std_m)
+    for k in range(_STEPS):
+        for index, change in enumerate(step.changes):
+            current[index] = applied(current[index], change)
+        total += step.changes
+        if k + 1 == _STEPS:
+            break
+        poses, fit = fuse(current, watch, poses.times_s, start=poses, passes=2, rough=True)
+        step = rig_step(current, watch, poses, fit, free, survey_std_m)
+    return step
+
+
+def _longest_lines(views: Sequence[CameraViews]) -> Array:
+    """No image takes longer to read than the time to the next one, (n_c,) in s a row."""
+    steps = [np.diff(v.stamps_s[np.isfinite(v.stamps_s)]) for v in views]
+    return np.array(
+        [
+            float(np.median(step)) / v.camera.size_px[1] if len(step) else 0.0
+            for step, v in zip(steps, views, strict=True)
+        ]
+    )
+
+
+def _restarted(views: Sequence[CameraViews], watch: Watch, start: Poses | None) -> Poses | None:
+    """Rough poses at the instants of the corrected clocks, where markers alone gave them."""
+    return None if start is None else label_markers(views, watch, instants_of(views))[1]
+
+
+def _reference(views: Sequence[CameraViews]) -> int:
+    return int(np.argmax([len(v.numbers) for v in views]))
+
+
+def _decided(view: CameraViews, calibrated: CameraViews, clock: float, line: float) -> CameraViews:
+    """The pose that was found, with clock and line time changed only as decided."""
+    from dataclasses import replace
+
+    camera = replace(
+        view.camera,
+        clock_offset_s=calibrated.camera.clock_offset_s + float(clock),
+        line_time_s=calibrated.camera.line_time_s + float(line),
+    )
+    return view.believed(camera)
+
+
+def _findings(
+    views: Sequence[CameraViews],
+    final: Sequence[CameraViews],
+    moved: dict[int, float],
+    clocks: Array,
+    lines: Array,
+    step: RigStep,
+) -> tuple[Finding, ...]:
+    findings: list[Finding] = []
+    deviations = step.deviations
+    clock_std = np.where(deviations[:, CLOCK] > 0.0, deviations[:, CLOCK], deviations.max(0)[CLOCK])
+    for index, (view, now) in enumerate(zip(views, final, strict=True)):
+        name = view.camera.name
+        if clocks[index]:
+            numbers = (("offset_s", float(clocks[index]), float(clock_std[index])),)
+            findings.append(Finding("clock_offset", name, numbers))
+        if lines[index]:
+            numbers = (("line_time_s", float(lines[index]), float(deviations[index, LINE])),)
+            findings.append(Finding("rolling_shutter", name, numbers))
+        if index in moved:
+            old, new = view.camera.T_camera_base, now.camera.T_camera_base
+            turn = log_rotation(new[:3, :3] @ old[:3, :3].T)
+            shift = now.camera.position_base_m - view.camera.position_base_m
+            std = deviations[index]
+            angle = float(np.linalg.norm(turn))
+            along = turn / max(angle, 1e-12)
+            angle_std = float(np.sqrt((along**2) @ (std[POSE + 3 :] ** 2)))
+            names = ("rotation_x_rad", "rotation_y_rad", "rotation_z_rad")
+            places = ("shift_x_m", "shift_y_m", "shift_z_m")
+            findings.append(
+                Finding(
+                    "camera_moved",
+                    name,
+                    (
+                        ("rotation_rad", angle, angle_std),
+                        *_triples(names, turn, std[POSE + 3 :]),
+                        *_triples(places, shift, std[POSE : POSE + 3]),
+                    ),
+                )
+            )
+    return tuple(findings)
+
+
+def _triples(
+    names: tuple[str, ...], values: Array, deviations: Array
+) -> list[tuple[str, float, float]]:
+    return [(n, float(v), float(s)) for n, v, s in zip(names, values, deviations, strict=True)]

@@ -1,0 +1,194 @@
+"""Finds what the calibration did not say: late clocks, rolling shutters, cameras that moved.
+
+A camera has moved when the tags that stand in the base are not where its calibration puts them.
+Clocks and line times follow from the platform's own swing: a camera that is late sees it where it
+was. All are estimated together, the platform's poses eliminated, and applied to the cameras.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from freeswing.calib.camera.camera import Camera
+from freeswing.cdpr.rotation import exp_rotation
+from freeswing.vision.fuse.blocks import blocks
+from freeswing.vision.fuse.fuse_cameras import Fit, whitened
+from freeswing.vision.fuse.linearised_block import linearised
+from freeswing.vision.fuse.poses import Poses
+from freeswing.vision.fuse.run_views import CameraViews
+from freeswing.vision.look.watched_target import Watch
+from freeswing.vision.rig.rig_kernels import CLOCK, LINE, PER_CAMERA, POSE, add_rig_equations
+from freeswing.vision.settings import SURVEY_STD_M
+
+Array = NDArray[np.float64]
+
+MOVED_PX = 0.4
+LEAST_CLOCK_S = 5e-5
+LEAST_LINE_S = 3e-7
+_SIGMAS = 6.0
+_KEEP_SCORE = 400.0
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One camera's effect.
+
+    Attributes:
+        effect: `clock_offset`, `rolling_shutter` or `camera_moved`.
+        camera: its name.
+        parameters: (name, value, standard deviation).
+    """
+
+    effect: str
+    camera: str
+    parameters: tuple[tuple[str, float, float], ...]
+
+
+def base_tag_misses(views: CameraViews, watch: Watch) -> tuple[Array, Array, Array]:
+    """Mean base-tag corners against their calibrated places.
+
+    Returns:
+        Residual rays (n, 8), their number of frames (n,) and base corners (n, 4, 3).
+    """
+    sums: dict[int, Array] = {}
+    counts: dict[int, int] = {}
+    for _, piece in views.pieces():
+        mine = (piece.things >= watch.first_base) & (piece.things < watch.first_marker)
+        for thing, rays in zip(piece.things[mine], piece.rays[mine], strict=True):
+            sums[int(thing)] = sums.get(int(thing), np.zeros(8)) + rays
+            counts[int(thing)] = counts.get(int(thing), 0) + 1
+    things = sorted(sums)
+    corners = watch.base_corners_m[[t - watch.first_base for t in things]].reshape(-1, 4, 3)
+    seen = views.camera.to_camera(corners)
+    predicted = (seen[..., :2] / seen[..., 2:]).reshape(-1, 8)
+    measured = np.array([sums[t] / counts[t] for t in things]).reshape(-1, 8)
+    return measured - predicted, np.array([counts[t] for t in things]), corners
+
+
+def moved_cameras(views: Sequence[CameraViews], watch: Watch) -> dict[int, float]:
+    """Cameras whose base tags lie more than `MOVED_PX` off, with the median miss in pixels."""
+    moved = {}
+    for index, view in enumerate(views):
+        misses, counts, _ = base_tag_misses(view, watch)
+        if not len(counts):
+            continue
+        sizes = np.linalg.norm(misses.reshape(-1, 2), axis=1) * view.camera.focal_px.mean()
+        if np.median(sizes) > MOVED_PX:
+            moved[index] = float(np.median(sizes))
+    return moved
+
+
+def repose_by_base_tags(view: CameraViews, watch: Watch, survey_std_m: float) -> Camera:
+    """The camera's pose by its base tags alone: a start, good to some milliradians."""
+    camera = view.camera
+    for _ in range(10):
+        normal, right = base_equations(view.believed(camera), watch, survey_std_m)
+        normal = normal + np.diag([1e2**2] * 3 + [1e-6] * 3)  # a knock turns more than it shifts
+        step = np.asarray(np.linalg.solve(normal, right), dtype=np.float64)
+        camera = moved_by(camera, step)
+        if np.abs(step).max() < 1e-9:
+            break
+    return camera
+
+
+def base_equations(view: CameraViews, watch: Watch, survey_std_m: float) -> tuple[Array, Array]:
+    """Normal matrix (6, 6) and right side (6,) of a camera's pose change by its base tags."""
+    misses, _, corners = base_tag_misses(view, watch)
+    focal = view.camera.focal_px.mean()
+    normal, right = np.zeros((6, 6)), np.zeros(6)
+    offset = view.camera.T_camera_base[:3, 3]
+    for miss, corner in zip(misses, corners, strict=True):
+        seen = view.camera.to_camera(corner)
+        sizes = np.linalg.norm(miss.reshape(4, 2), axis=1) * focal
+        if np.median(sizes) > 200.0:
+            continue
+        for k, place in enumerate(seen):
+            x, y = place[:2] / place[2]
+            g = np.array([[1.0, 0.0, -x], [0.0, 1.0, -y]]) / place[2]
+            arm = place - offset
+            jacobian = np.hstack([g, np.cross(arm, g)])
+            std = np.hypot(survey_std_m / place[2], 0.02 / focal)
+            normal += jacobian.T @ jacobian / std**2
+            right += jacobian.T @ miss[2 * k : 2 * k + 2] / std**2
+    return normal, right
+
+
+def moved_by(camera: Camera, step: Array) -> Camera:
+    """The camera after a change of pose (dt, dr)."""
+    pose = camera.T_camera_base.copy()
+    pose[:3, :3] = exp_rotation(step[3:]) @ pose[:3, :3]
+    pose[:3, 3] = pose[:3, 3] + step[:3]
+    return replace(camera, T_camera_base=pose)
+
+
+@dataclass(frozen=True, slots=True)
+class RigStep:
+    """One Gauss-Newton step of the rig: changes (n_c, 8) and their standard deviations."""
+
+    changes: Array
+    deviations: Array
+    covariance: Array
+
+
+def rig_step(
+    views: Sequence[CameraViews],
+    watch: Watch,
+    poses: Poses,
+    fit: Fit,
+    free: NDArray[np.bool_],
+    survey_std_m: float = SURVEY_STD_M,
+) -> RigStep:
+    """Solves for the rig's numbers marked in `free` (n_c, 8), the poses eliminated."""
+    n_c = len(views)
+    size = PER_CAMERA * n_c
+    normal, right = np.zeros((size, size)), np.zeros(size)
+    focal = np.array([v.camera.focal_px.mean() for v in views])
+    offsets = np.array([v.camera.T_camera_base[:3, 3] for v in views])
+    for block in blocks(views, watch, poses.times_s, poses):
+        span = slice(block.first, block.first + len(block.starts) - 1)
+        known = poses.known[span] & (np.abs(poses.motions[span]).sum(axis=1) > 0.0)
+        instant = np.repeat(np.arange(len(known)), np.diff(block.starts))
+        linear = linearised(block, views, poses)
+        white = whitened(block, fit.floor_px / focal)
+        scores = (np.einsum("oij,oj->oi", white, linear.residuals) ** 2).sum(axis=1) / (
+            2 * block.counts
+        )
+        weights = np.where(known[instant], 1.0 / np.maximum(1.0, scores / _KEEP_SCORE) ** 2, 0.0)
+        add_rig_equations(
+            block.starts, known, block.camera_of, block.counts, linear.residuals,
+            linear.jacobians, linear.rates, linear.places, offsets, block.rows_px, white, weights,
+            normal, right,
+        )  # fmt: skip
+    for index, view in enumerate(views):
+        more, also = base_equations(view, watch, survey_std_m)
+        span = slice(PER_CAMERA * index + POSE, PER_CAMERA * (index + 1))
+        normal[span, span] += more
+        right[span] += also
+    mask = free.ravel()
+    changes, deviations = np.zeros(size), np.zeros(size)
+    whole = np.zeros((size, size))
+    if mask.any():
+        part = normal[np.ix_(mask, mask)]
+        scale = np.sqrt(np.maximum(np.diag(part), 1e-300))
+        inverse = np.linalg.pinv(part / np.outer(scale, scale), rcond=1e-10, hermitian=True)
+        inverse = inverse / np.outer(scale, scale)
+        changes[mask] = inverse @ right[mask]
+        excess = max(fit.total[0] / max(fit.total[1], 1), 1.0)
+        whole[np.ix_(mask, mask)] = inverse * excess
+        deviations[mask] = np.sqrt(np.diag(inverse) * excess)
+    return RigStep(changes.reshape(n_c, PER_CAMERA), deviations.reshape(n_c, PER_CAMERA), whole)
+
+
+def applied(view: CameraViews, change: Array) -> CameraViews:
+    """The camera with its eight numbers changed."""
+    camera = moved_by(view.camera, change[POSE:])
+    camera = replace(
+        camera,
+        clock_offset_s=camera.clock_offset_s + float(change[CLOCK]),
+        line_time_s=camera.line_time_s + float(change[LINE]),
+    )
+    return view.believed(camera)

@@ -1,0 +1,1 @@
+"""What tracking saw, shown: overlay videos and a viewer."""

@@ -1,0 +1,164 @@
+"""One run, from its cameras' sightings to its trajectory file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from freeswing.calib.camera.camera import Camera
+from freeswing.cdpr.files.trajectory_files import write_csv
+from freeswing.cdpr.measured.trajectory import Trajectory
+from freeswing.vision.fuse.calibration_share import CalibrationNoise, RunShare, run_share
+from freeswing.vision.fuse.fuse_cameras import Fit, free_of
+from freeswing.vision.fuse.poses import Poses
+from freeswing.vision.fuse.run_views import CameraViews
+from freeswing.vision.fuse.tag_layout import LayoutSums, layout_sums
+from freeswing.vision.look.follow import STATUS_NAMES, USED
+from freeswing.vision.look.watched_target import Watch
+from freeswing.vision.rig.correct_rig import correct_rig
+from freeswing.vision.rig.rig_effects import Finding
+from freeswing.vision.settings import Settings
+
+Array = NDArray[np.float64]
+
+PROVENANCE = "cameras"
+
+
+@dataclass(frozen=True, slots=True)
+class CameraCount:
+    """One camera's frames in a run: seen, used, and rejected by reason."""
+
+    name: str
+    frames: int
+    used: int
+    rejected: dict[str, int]
+    dropped: int
+
+
+@dataclass(frozen=True, slots=True)
+class RunTrack:
+    """What became of a run; the trajectory itself is in its file."""
+
+    name: str
+    samples: int
+    known: int
+    rate_hz: float
+    std_m: float
+    std_rad: float
+    calibration: RunShare | None
+    cameras: tuple[CameraCount, ...]
+    before: Fit
+    after: Fit
+    findings: tuple[Finding, ...]
+    problems: tuple[str, ...]
+    layout: LayoutSums
+
+
+def track_run(
+    name: str,
+    sources: Sequence[tuple[Camera, Sequence[Path]]],
+    watch: Watch,
+    csv: Path,
+    settings: Settings,
+    noise: CalibrationNoise | None = None,
+) -> RunTrack:
+    """Fuses a run's sightings, corrects the rig, and writes the trajectory when there is one.
+
+    The trajectory's covariances are those of its scatter. What the calibration's own uncertainty
+    adds is common to the whole run and stated apart, where `noise` tells it.
+    """
+    views = [CameraViews(camera, paths) for camera, paths in sources]
+    counts = tuple(_count(view) for view in views)
+    corrected = correct_rig(views, watch, settings.survey_std_m, look=settings.correct_rig)
+    poses = corrected.poses
+    known = int(poses.known.sum())
+    share = None
+    if noise is not None:
+        share = run_share(poses, corrected.after, corrected.views, watch, noise)
+    if known:
+        write_csv(csv, trajectory_of(poses, watch))
+    deviations = np.sqrt(np.diagonal(poses.covariances, axis1=1, axis2=2))
+    steps = np.diff(poses.times_s)
+    return RunTrack(
+        name,
+        len(poses.times_s),
+        known,
+        float(1.0 / np.median(steps)) if len(steps) else float("nan"),
+        _median(deviations[poses.known, :3]),
+        _median(deviations[poses.known, 3:]),
+        share,
+        counts,
+        corrected.before,
+        corrected.after,
+        corrected.findings,
+        tuple(_problems(counts, corrected.after, watch)),
+        layout_sums(poses, corrected.after, corrected.views, watch),
+    )
+
+
+def trajectory_of(poses: Poses, watch: Watch) -> Trajectory:
+    """The run's trajectory from its first to its last known pose, NaN in between.
+
+    A target of one or two points gives the reference point alone: x, y, z.
+    """
+    have = np.flatnonzero(poses.known)
+    span = slice(int(have[0]), int(have[-1]) + 1)
+    if free_of(watch) == 3:
+        return Trajectory(
+            poses.times_s[span],
+            ("x", "y", "z"),
+            poses.positions_m[span],
+            poses.covariances[span, :3, :3],
+            PROVENANCE,
+        )
+    return Trajectory.from_poses(
+        poses.times_s[span],
+        poses.positions_m[span],
+        poses.rotations[span],
+        poses.covariances[span],
+        PROVENANCE,
+    )
+
+
+def _median(values: Array) -> float:
+    return float(np.median(values)) if values.size else float("nan")
+
+
+def _count(view: CameraViews) -> CameraCount:
+    status = view.status
+    rejected = {
+        STATUS_NAMES[code]: int(np.sum(status == code))
+        for code in range(len(STATUS_NAMES))
+        if code != USED and np.any(status == code)
+    }
+    stamps = view.stamps_s[np.isfinite(view.stamps_s)]
+    dropped = 0
+    if len(stamps) > 2:
+        steps = np.diff(stamps)
+        step = float(np.median(steps))
+        dropped = int(np.sum(np.maximum(np.round(steps / step) - 1, 0))) if step > 0.0 else 0
+    return CameraCount(
+        view.camera.name, len(status), int(np.sum(status == USED)), rejected, dropped
+    )
+
+
+def _problems(counts: Sequence[CameraCount], fit: Fit, watch: Watch) -> list[str]:
+    """What a reader should know, in words."""
+    said = []
+    for count in counts:
+        for reason, number in count.rejected.items():
+            if number > 0.02 * max(count.frames, 1):
+                said.append(f"{count.name}: {number} of {count.frames} frames: {reason}")
+        if count.dropped:
+            said.append(f"{count.name}: {count.dropped} frames missing between the stamps")
+    for (camera, thing), (number, first, worst) in fit.rejected.items():
+        if number >= 3:
+            said.append(
+                f"{counts[camera].name}: {watch.name(thing)} left out {number} times, first in "
+                f"frame {first}, up to {worst:.2f} px from where the other sightings put it"
+            )
+    return said

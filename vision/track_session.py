@@ -1,0 +1,185 @@
+"""Recorded runs to trajectories: every camera followed, all fused, results written.
+
+The call that the command line makes:
+
+    document = track_session(session.video_runs, read_cameras(session.cameras),
+                             read_target(session.target), base_tags=..., results=session.results,
+                             frame_rate_hz=session.frame_rate_hz, workers=0,
+                             progress=console.progress)
+
+`results/calibration.json`, where there is one, tells how far the calibration may shift the poses.
+The call writes `results/tracks/<run>.csv` and `results/tracking.json`, and keeps each camera's
+sightings under `results/tracks/.sightings`, from where a run that was killed goes on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import Executor
+from pathlib import Path
+from typing import Any, Protocol
+
+from freeswing.calib.board.recordings import Recording, find_recordings
+from freeswing.calib.camera.camera import Camera
+from freeswing.calib.tags.base_tags import SurveyedTag
+from freeswing.cdpr.files.documents import DataError, InputError, write_json
+from freeswing.cdpr.measured.target import Target
+from freeswing.vision.fuse.calibration_share import read_calibration_noise
+from freeswing.vision.fuse.tag_layout import layout_change, with_layout
+from freeswing.vision.jobs import Job, run_jobs
+from freeswing.vision.look.sightings import collect_sightings
+from freeswing.vision.look.watched_target import Watch
+from freeswing.vision.settings import Settings
+from freeswing.vision.track_run import RunTrack, track_run
+from freeswing.vision.tracking_report import tracking_document
+
+Progress = Callable[[str, float], None]
+
+_LAYOUT_ROUNDS = 3
+_FOLLOWING = 0.85  # share of the time that goes into the images
+
+
+class RecordedRun(Protocol):
+    """What a run has to have: a name and the folder with one recording a camera."""
+
+    @property
+    def name(self) -> str: ...  # noqa: D102
+    @property
+    def video(self) -> Path | None: ...  # noqa: D102
+
+
+def track_session(
+    runs: Sequence[RecordedRun],
+    cameras: Sequence[Camera],
+    target: Target,
+    *,
+    results: Path,
+    base_tags: Iterable[SurveyedTag] = (),
+    frame_rate_hz: float | None = None,
+    settings: Settings | None = None,
+    workers: int = 0,
+    executor: Executor | None = None,
+    progress: Progress | None = None,
+) -> dict[str, Any]:
+    """Tracks all runs and writes their trajectories and `tracking.json`.
+
+    Args:
+        runs: with `name` and `video`; those without a video are left out.
+        cameras: as calibrated.
+        target: what is on the platform.
+        results: the session's results folder.
+        base_tags: surveyed tags in the base, with `family`, `id`, `corners_base_m`.
+        frame_rate_hz: serves recordings without time stamps.
+        settings: see `Settings`.
+        workers: processes; 0 = one a core.
+        executor: follows the recordings instead of them, such as a cluster's; it has to see the
+            same files under the same names.
+        progress: told a label and the fraction done.
+
+    Returns:
+        The document written to `tracking.json`.
+
+    Raises:
+        InputError: a recording is missing, unreadable or of another size than its camera.
+        DataError: in a run the platform was not seen.
+    """
+    settings = settings or Settings()
+    watch = Watch.of(target, base_tags)
+    filmed = [run for run in runs if run.video is not None]
+    if not filmed:
+        raise InputError("no run of the session has a video; there is nothing to track")
+    pairs = [(run.name, run_recordings(run, cameras)) for run in filmed]
+    jobs = [
+        Job(
+            f"{name} {camera.name}",
+            collect_sightings,
+            (sightings_folder(results, name), camera, watch, recording, frame_rate_hz),
+        )
+        for name, found in pairs
+        for camera, recording in found
+    ]
+    paths = run_jobs(jobs, workers, _scaled(progress, 0.0, _FOLLOWING), executor)
+    sources = _by_run(pairs, paths)
+    told = _scaled(progress, _FOLLOWING, 1.0)
+    tracks = _fuse(sources, watch, results, settings, workers, told)
+    change = layout_change([track.layout for track in tracks], watch)
+    if settings.refine_layout:
+        for _ in range(_LAYOUT_ROUNDS):
+            refined = layout_change([track.layout for track in tracks], watch)
+            watch = with_layout(watch, refined.corners_m)
+            tracks = _fuse(sources, watch, results, settings, workers, told)
+    document = tracking_document(tracks, watch, change, refined=settings.refine_layout)
+    write_json(results / "tracking.json", document)
+    _refuse_empty(tracks)
+    return document
+
+
+def sightings_folder(results: Path, run: str) -> Path:
+    """Where the sightings of a run's cameras are kept."""
+    return results / "tracks" / ".sightings" / run
+
+
+def run_recordings(run: RecordedRun, cameras: Sequence[Camera]) -> list[tuple[Camera, Recording]]:
+    """The recordings of a run with their cameras.
+
+    Raises:
+        InputError: where none is named as a camera.
+    """
+    by_name = {camera.name: camera for camera in cameras}
+    found = {r.name: r for r in find_recordings(run.video or Path())}
+    known = [name for name in by_name if name in found]
+    if not known:
+        raise InputError(
+            f"{run.video}: recordings of {', '.join(found)}, but cameras.toml knows "
+            f"{', '.join(by_name)}: name the files as the cameras are named"
+        )
+    return [(by_name[name], found[name]) for name in known]
+
+
+def _by_run(
+    pairs: Sequence[tuple[str, list[tuple[Camera, Recording]]]], paths: Sequence[list[Path]]
+) -> list[tuple[str, tuple[tuple[Camera, tuple[Path, ...]], ...]]]:
+    """Each run's cameras with their pieces."""
+    sources, start = [], 0
+    for name, found in pairs:
+        mine = paths[start : start + len(found)]
+        start += len(found)
+        views = tuple((camera, tuple(p)) for (camera, _), p in zip(found, mine, strict=True))
+        sources.append((name, views))
+    return sources
+
+
+def _fuse(
+    sources: Sequence[tuple[str, tuple[tuple[Camera, tuple[Path, ...]], ...]]],
+    watch: Watch,
+    results: Path,
+    settings: Settings,
+    workers: int,
+    progress: Progress | None,
+) -> list[RunTrack]:
+    noise = read_calibration_noise(results / "calibration.json")
+    jobs = [
+        Job(
+            f"{name} fused",
+            track_run,
+            (name, views, watch, results / "tracks" / f"{name}.csv", settings, noise),
+        )
+        for name, views in sources
+    ]
+    return run_jobs(jobs, workers, progress)
+
+
+def _scaled(progress: Progress | None, low: float, high: float) -> Progress | None:
+    if progress is None:
+        return None
+    return lambda label, share: progress(label, low + (high - low) * share)
+
+
+def _refuse_empty(tracks: Sequence[RunTrack]) -> None:
+    empty = [track for track in tracks if track.known == 0]
+    if empty:
+        why = empty[0].problems[0] if empty[0].problems else "the platform was not seen"
+        raise DataError(
+            f"run {empty[0].name}: no pose in {empty[0].samples} frames: {why}. "
+            "Check target.toml (family, ids, sizes), the light and the focus"
+        )

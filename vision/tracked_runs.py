@@ -1,0 +1,115 @@
+"""Tracked runs as they stand on disk: cameras as found, trajectory, sightings and recordings."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from freeswing.calib.board.recordings import Recording
+from freeswing.calib.camera.camera import Camera
+from freeswing.calib.tags.base_tags import SurveyedTag
+from freeswing.cdpr.files.documents import DataError
+from freeswing.cdpr.files.trajectory_files import read_trajectory
+from freeswing.cdpr.measured.target import Target
+from freeswing.cdpr.measured.trajectory import Trajectory
+from freeswing.cdpr.rotation import exp_rotation
+from freeswing.vision.fuse.tag_layout import with_layout
+from freeswing.vision.look.pieces import Piece, load_piece
+from freeswing.vision.look.sightings import collect_sightings
+from freeswing.vision.look.watched_target import Watch
+from freeswing.vision.track_session import RecordedRun, run_recordings, sightings_folder
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class TrackedCamera:
+    """One camera of a run.
+
+    Attributes:
+        camera: with its clock, line time and pose as tracking found them.
+        recording: its frames.
+        pieces: its sightings.
+    """
+
+    camera: Camera
+    recording: Recording
+    pieces: tuple[Path, ...]
+
+    def frames(self) -> Iterator[tuple[Piece, int]]:
+        """The piece and the row in it of every frame, in order."""
+        for path in self.pieces:
+            piece = load_piece(path)
+            for row in range(len(piece.numbers)):
+                yield piece, row
+
+
+@dataclass(frozen=True, slots=True)
+class TrackedRun:
+    """A run: what was looked for, the trajectory, and the cameras."""
+
+    name: str
+    watch: Watch
+    trajectory: Trajectory
+    cameras: tuple[TrackedCamera, ...]
+
+
+def tracked_run(
+    run: RecordedRun,
+    cameras: Sequence[Camera],
+    target: Target,
+    *,
+    results: Path,
+    base_tags: Iterable[SurveyedTag] = (),
+    frame_rate_hz: float | None = None,
+) -> TrackedRun:
+    """A run after `track_session` with the same arguments.
+
+    Raises:
+        DataError: where it has not been tracked.
+    """
+    csv, told = results / "tracks" / f"{run.name}.csv", results / "tracking.json"
+    if not csv.is_file() or not told.is_file():
+        raise DataError(f"run {run.name}: {csv} is not there; run freeswing track first")
+    document = json.loads(told.read_text(encoding="utf-8"))
+    watch = Watch.of(target, base_tags)
+    seen = []
+    for camera, recording in run_recordings(run, cameras):
+        folder = sightings_folder(results, run.name)
+        paths = collect_sightings(folder, camera, watch, recording, frame_rate_hz)
+        effects = [
+            effect
+            for effect in document["effects"]
+            if (effect["run"], effect["camera"]) == (run.name, camera.name)
+        ]
+        seen.append(TrackedCamera(as_found(camera, effects), recording, tuple(paths)))
+    if document["layout"]["refined"]:
+        corners = [tag["corners_platform_m"] for tag in document["layout"]["tags"]]
+        watch = with_layout(watch, np.array(corners, dtype=np.float64))
+    return TrackedRun(run.name, watch, read_trajectory(csv), tuple(seen))
+
+
+def as_found(camera: Camera, effects: Sequence[dict[str, Any]]) -> Camera:
+    """A calibrated camera with the effects of tracking.json that were found on it."""
+    for effect in effects:
+        told = {entry["name"]: float(entry["value"]) for entry in effect["parameters"]}
+        if effect["effect"] == "clock_offset":
+            offset = camera.clock_offset_s + told["offset_s"]
+            camera = replace(camera, clock_offset_s=offset)
+        elif effect["effect"] == "rolling_shutter":
+            camera = replace(camera, line_time_s=camera.line_time_s + told["line_time_s"])
+        elif effect["effect"] == "camera_moved":
+            turn = np.array([told[f"rotation_{axis}_rad"] for axis in "xyz"])
+            shift = np.array([told[f"shift_{axis}_m"] for axis in "xyz"])
+            pose = camera.T_camera_base.copy()
+            place = camera.position_base_m + shift
+            pose[:3, :3] = exp_rotation(turn) @ pose[:3, :3]
+            pose[:3, 3] = -pose[:3, :3] @ place
+            camera = replace(camera, T_camera_base=pose)
+    return camera
