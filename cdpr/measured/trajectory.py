@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from freeswing.cdpr.files.problems import DataError
+from freeswing.cdpr.measured.slow_errors import SlowErrors
 from freeswing.cdpr.robot import POSE_COORDINATES
 from freeswing.cdpr.rotation import angle_rate_matrix, angles_from_matrix, matrix_from_angles
 
@@ -30,6 +31,7 @@ class Trajectory:
             present their entries are those of the small rotation vector in the base frame
             (R_true = exp(delta) R); otherwise those of the angles themselves.
         provenance: one line: where the numbers come from.
+        slow: how far all samples err together (markers that sit elsewhere or drift), None: unknown.
     """
 
     times_s: Array
@@ -37,6 +39,7 @@ class Trajectory:
     values: Array
     covariances: Array | None = None
     provenance: str = ""
+    slow: SlowErrors | None = None
 
     def __post_init__(self) -> None:
         coordinates = tuple(self.coordinates)
@@ -156,6 +159,7 @@ class Trajectory:
         rotations: ArrayLike,
         covariances: ArrayLike | None = None,
         provenance: str = "",
+        slow: SlowErrors | None = None,
     ) -> Trajectory:
         """From positions (n_t, 3) and rotations (n_t, 3, 3), NaN where missing.
 
@@ -165,7 +169,7 @@ class Trajectory:
         values = np.concatenate([np.asarray(positions_m, dtype=np.float64), angles], axis=1)
         known = None if covariances is None else np.asarray(covariances, dtype=np.float64)
         return Trajectory(
-            np.asarray(times_s, dtype=np.float64), POSE_COORDINATES, values, known, provenance
+            np.asarray(times_s, dtype=np.float64), POSE_COORDINATES, values, known, provenance, slow
         )
 
     def _columns(self, names: Sequence[str]) -> NDArray[np.intp]:
