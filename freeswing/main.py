@@ -24,6 +24,7 @@ COMMANDS = (
     "convert",
     "export",
     "simulate",
+    "effects",
     "board",
     "home",
     "excite",

@@ -1,24 +1,48 @@
 """The catalogue of effects: every module below this folder that defines `EFFECT` is one.
 
 Adding an effect is adding a file; the simulator, the fits and the diagnosis read it from here.
+The file may lie elsewhere: `FREESWING_EFFECTS` names folders of further ones.
 """
 
 from __future__ import annotations
 
+import os
 from functools import cache
 from importlib import import_module
 from pkgutil import walk_packages
 
-from freeswing.cdpr.effects.base import Effect, Instant, Parameter
+from freeswing.cdpr.effects.base import Clues, Effect, Experiment, Instant, Parameter, Recorded
+from freeswing.cdpr.effects.own_folders import effects_in
 
-__all__ = ["Effect", "Instant", "Parameter", "catalogue", "effect_named"]
+__all__ = [
+    "Clues",
+    "Effect",
+    "Experiment",
+    "Instant",
+    "Parameter",
+    "Recorded",
+    "catalogue",
+    "effect_named",
+]
+FOLDERS = "FREESWING_EFFECTS"
+
+
+def catalogue() -> dict[str, Effect]:
+    """Every effect by name, in alphabetical order.
+
+    Raises:
+        InputError: for a folder in FREESWING_EFFECTS that is none, or a file there that defines
+            no effect, a broken one, or one whose name is taken.
+    """
+    return _catalogue(os.environ.get(FOLDERS, ""))
 
 
 @cache
-def catalogue() -> dict[str, Effect]:
-    """Every effect by name, in alphabetical order."""
+def _catalogue(folders: str) -> dict[str, Effect]:
     modules = (import_module(info.name) for info in walk_packages(__path__, f"{__name__}."))
-    effects = (module.EFFECT for module in modules if hasattr(module, "EFFECT"))
+    effects = [module.EFFECT for module in modules if hasattr(module, "EFFECT")]
+    for folder in filter(None, folders.split(os.pathsep)):
+        effects += effects_in(folder, {effect.name for effect in effects})
     return {effect.name: effect for effect in sorted(effects, key=lambda e: e.name)}
 
 

@@ -8,12 +8,13 @@ mass (m/s^2), torques likewise (m^2/s^2): free motion cannot tell the mass.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import casadi as ca
 
 from freeswing.cdpr.model.body import Expression, along
 from freeswing.cdpr.model.pulley import CableState, Geometry
-from freeswing.cdpr.robot import Robot
+from freeswing.cdpr.robot import Array, Robot
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,12 +105,70 @@ class Instant:
         return -ca.jacobian(quantity, self.zeta).T * effort
 
 
+@dataclass(frozen=True, slots=True)
+class Experiment:
+    """What to record so that effects which it sets apart no longer look alike.
+
+    Attributes:
+        advice: what to do and why it helps, as a clause.
+        rank: where several would serve, those of lower rank are told first.
+    """
+
+    advice: str
+    rank: int
+
+
+AMPLITUDES = Experiment(
+    "record swings of clearly different amplitude and let them die away for at least three "
+    "times as long: dry friction, linear and quadratic drag decay differently",
+    1,
+)
+PAYLOAD = Experiment(
+    "repeat some swings with a known payload: what scales with weight and what does not part ways",
+    2,
+)
+EQUILIBRIA = Experiment(
+    "record equilibria spread over the whole workspace, with large tilts of the platform, and "
+    "state the cable lengths of each run",
+    3,
+)
+LONG_RUN = Experiment("record one run several times as long with the winches locked", 4)
+
+
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    """What a session holds, as far as effects ask.
+
+    Attributes:
+        lengths: whether any run states its cable lengths.
+    """
+
+    lengths: bool = True
+
+
+class Clues(Protocol):
+    """What a residual tells an effect about where its shape parameters start."""
+
+    def common_frequency_hz(self) -> float:
+        """The frequency at which all runs' residuals stand out of their surroundings most."""
+        ...
+
+
 class Effect:
-    """An effect that leaves everything as it is; subclasses override what they change."""
+    """An effect that leaves everything as it is; subclasses override what they change.
+
+    Attributes:
+        name: as in files and flags.
+        summary: what the robot or the recording then has, as a phrase.
+        needs_tension: whether its hooks use `Instant.tensions`.
+        stage: "kinematics", "base" (gravity), "force" or "measurement".
+        separated_by: experiments that set it apart from others which they set apart.
+    """
 
     name: str = ""
     summary: str = ""
     needs_tension: bool = False
+    separated_by: tuple[Experiment, ...] = ()
     stage: str = "force"  # "kinematics", "base" (gravity), "force" or "measurement"
 
     @property
@@ -152,6 +211,22 @@ class Effect:
     def measured(self, instant: Instant, values: Expression) -> Expression | None:
         """Change of the measured pose: translation and small base-frame rotation, (6,)."""
         return None
+
+    def cannot_show(self, robot: Robot, recorded: Recorded) -> str:
+        """Why this robot or these recordings could not show it, or "" where they could."""
+        return "" if self.parameters(robot) else "this robot has no part that could show it"
+
+    def length_pattern(self, times_s: Array, lengths_m: Array, tensions: Array) -> Array | None:
+        """How lengths vary along a run with locked winches where it is at work, (n_t, n, k).
+
+        Geometry that is fitted to constant lengths has it as a rival; it is itself left to the
+        dynamics. One column an unknown, for lengths (n_t, n) and specific tensions (n_t, n).
+        """
+        return None
+
+    def shape_guess(self, clues: Clues) -> dict[str, float]:
+        """Where shape parameters start on a residual, by name; others at their `start`."""
+        return {}
 
 
 def each(robot: Robot, stem: str, unit: str, low: float, high: float, scale: float):

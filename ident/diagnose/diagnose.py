@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from freeswing.cdpr.effects import catalogue
+from freeswing.cdpr.effects import Recorded, catalogue
 from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.model.equations import build_model
 from freeswing.cdpr.robot import INERTIA_NAMES, POSE_COORDINATES, Array, Robot
@@ -207,13 +207,9 @@ def _noise_scales(runs: list[PreparedRun], free: tuple[str, ...] | None) -> Arra
 
 def _barred(runs: list[PreparedRun], robot: Robot) -> dict[str, str]:
     """Effects that these data cannot show, and why."""
-    barred = {}
-    if all(run.run.lengths_m is None for run in runs):
-        barred["cable_length_bias"] = "no cable lengths are stated: nothing to be biased"
-    for name, effect in catalogue().items():
-        if not effect.parameters(robot):
-            barred[name] = "this robot has no part that could show it"
-    return barred
+    recorded = Recorded(lengths=any(run.run.lengths_m is not None for run in runs))
+    why = {name: effect.cannot_show(robot, recorded) for name, effect in catalogue().items()}
+    return {name: words for name, words in why.items() if words}
 
 
 def _with_own_noise(found: LikelihoodFit, runs: list[PreparedRun]) -> LikelihoodFit:

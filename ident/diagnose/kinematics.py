@@ -1,9 +1,9 @@
 """Geometry without dynamics: along a run with locked winches every cable keeps its length.
 
 Poses, moved and displaced as a candidate would have them, give cable lengths; what varies beyond
-the poses' noise is geometry, whatever forces act. Stretch and creep vary lengths too and compete,
-but are left to the dynamics. A point that is settled here is known to the rest of the search with
-the standard deviation that leaving out runs gives it.
+the poses' noise is geometry, whatever forces act. Effects that make lengths vary (stretch, creep)
+compete, but are left to the dynamics. A point that is settled here is known to the rest of the
+search with the standard deviation that leaving out runs gives it.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
-from freeswing.cdpr.effects import Parameter
+from freeswing.cdpr.effects import Parameter, catalogue
 from freeswing.cdpr.model.batch import evaluate, with_jacobian
 from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.robot import Array
@@ -36,7 +36,6 @@ LEAST_EXCESS = 0.1
 LEAST_SHARE = 0.5
 LEAST_LEAD = 0.02
 MOST_FOUND = 3
-CREEP, STRETCH = "winch_creep", "cable_elasticity"
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +80,7 @@ class _Lengths:
     columns: dict[str, np.ndarray]
     rows: tuple[tuple[Array, Array], ...]
     sigma_m: float
+    rivals: frozenset[str]
 
 
 def displacements(
@@ -138,7 +138,7 @@ def _best(lengths: _Lengths, known: np.ndarray) -> Displacement | None:
     if any(effect_of(k) != effect_of(leader) for k in near):
         return None
     key = min(near, key=lambda k: len(lengths.columns[k]))
-    if effect_of(key) in (CREEP, STRETCH):
+    if effect_of(key) in lengths.rivals:
         return None
     return _sure(lengths, known, key, before, possible[key], colour, len(scores))
 
@@ -188,7 +188,7 @@ def _parameters(lengths: _Lengths, key: str) -> tuple[Parameter, ...]:
 
 
 def _is_plausible(lengths: _Lengths, key: str, one: Score) -> bool:
-    if effect_of(key) in (CREEP, STRETCH):
+    if effect_of(key) in lengths.rivals:
         return True
     count = len(lengths.columns[key])
     return all(
@@ -208,23 +208,29 @@ def _colour(lengths: _Lengths, columns: np.ndarray, one: Score) -> float:
 
 
 def _lengths(fit: LikelihoodFit, keys: Sequence[str], noise_scales: Array) -> _Lengths:
-    names = dict.fromkeys(map(effect_of, keys))
-    model = extended(fit.model, [n for n in names if n not in (CREEP, STRETCH)])
-    n_values, n = len(model.parameters), model.robot.n_cables
+    n = fit.model.robot.n_cables
+    patterns = [
+        _patterns(motion, run) for motion, run in zip(fit.motions, fit.samples, strict=True)
+    ]
+    rivals = frozenset(patterns[0])
+    keys = [key for key in keys if effect_of(key) not in rivals]
+    model = extended(fit.model, list(dict.fromkeys(map(effect_of, keys))))
     triangles, all_rows, sigmas = [], [], []
-    for motion, samples in zip(fit.motions, fit.samples, strict=True):
-        rows, sigma = _rows(model, motion, samples, noise_scales)
+    for motion, samples, pattern in zip(fit.motions, fit.samples, patterns, strict=True):
+        rows, sigma = _rows(model, motion, samples, noise_scales, pattern)
         own = rows[..., :n].reshape(-1, n)
         rest = rows[..., n:].reshape(len(own), -1)
         rest = rest - own @ np.linalg.lstsq(own, rest, rcond=None)[0]
         triangles.append(np.linalg.qr(rest, mode="r"))
         all_rows.append((rest.reshape(len(rows), n, -1), samples.times_s))
         sigmas.append(sigma)
-    columns = {CREEP: n_values + np.arange(n), STRETCH: np.array([n_values + n])}
+    columns, used = {}, len(model.parameters)
+    for name, pattern in patterns[0].items():
+        columns[name] = used + np.arange(pattern.shape[-1])
+        used += pattern.shape[-1]
     for key in keys:
-        if effect_of(key) not in (CREEP, STRETCH):
-            where = model.place_of(effect_of(key))
-            columns[key] = where.start + np.flatnonzero(inside(model.robot, key))
+        where = model.place_of(effect_of(key))
+        columns[key] = where.start + np.flatnonzero(inside(model.robot, key))
     triangles = np.array(triangles)
     seen = np.abs(triangles[:, :, :-1]).max(axis=(0, 1)) > 0.0
     visible = {key: where for key, where in columns.items() if seen[where].all()}
@@ -235,7 +241,16 @@ def _lengths(fit: LikelihoodFit, keys: Sequence[str], noise_scales: Array) -> _L
         np.array(counts),
         _priors(model, triangles.shape[-1]),
     )
-    return _Lengths(model, evidence, visible, tuple(all_rows), float(np.mean(sigmas)))
+    return _Lengths(model, evidence, visible, tuple(all_rows), float(np.mean(sigmas)), rivals)
+
+
+def _patterns(motion: Motion, samples: Samples) -> dict[str, Array]:
+    """How each effect that makes lengths vary would do it along a run, (n_t, n, k) by name."""
+    times, values = samples.times_s, motion.values
+    lengths = evaluate(motion.model.lengths, samples.values, values)[0]
+    tensions = motion.tensions(times)
+    found = {n: e.length_pattern(times, lengths, tensions) for n, e in catalogue().items()}
+    return {name: pattern for name, pattern in found.items() if pattern is not None}
 
 
 def _priors(model: Model, size: int) -> Array:
@@ -246,9 +261,13 @@ def _priors(model: Model, size: int) -> Array:
 
 
 def _rows(
-    model: Model, motion: Motion, samples: Samples, noise_scales: Array
+    model: Model,
+    motion: Motion,
+    samples: Samples,
+    noise_scales: Array,
+    patterns: dict[str, Array],
 ) -> tuple[Array, float]:
-    """Whitened [lengths kept; values; creep; stretch; lengths] (n, cables, .), noise in metres."""
+    """Whitened [lengths kept; values; rivals; lengths] (n, cables, .), and the noise in metres."""
     zetas, times = samples.values, samples.times_s
     values = model.start_values
     n = model.robot.n_cables
@@ -264,14 +283,11 @@ def _rows(
     covariance = noise @ np.swapaxes(noise, 1, 2)
     whitener = np.linalg.inv(np.linalg.cholesky(covariance))
     kept = np.broadcast_to(np.eye(n), (len(times), n, n))
-    since = times - times.mean()
-    stretch = lengths * motion.tensions(times)
     everything = np.concatenate(
         [
             kept,
             by_values - by_pose @ shown,
-            kept * since[:, None, None],
-            stretch[..., None],
+            *patterns.values(),
             (lengths - lengths.mean(axis=0))[..., None],
         ],
         axis=2,

@@ -38,7 +38,7 @@ from freeswing.ident.diagnose.refit import (
 )
 from freeswing.ident.diagnose.removal import is_no_worse, superfluous
 from freeswing.ident.diagnose.screen import BASE, Screen, screen
-from freeswing.ident.diagnose.spectrum import common_frequency, too_small
+from freeswing.ident.diagnose.spectrum import Residual, too_small
 from freeswing.ident.diagnose.variants import effect_of, inside, variants
 from freeswing.ident.likelihood.likelihood import LikelihoodFit
 
@@ -166,10 +166,9 @@ class Search:
         Those that need tensions stand apart because they cost more, those with values for each
         run because they are eliminated with the runs' states.
         """
-        shapes = {}
-        if "harmonic_force" in keys:
-            frequency = common_frequency(found, self.noise_scales)
-            shapes["harmonic_force"] = {"frequency_hz": frequency}
+        clues = Residual(found, self.noise_scales)
+        guesses = {n: effect_named(n).shape_guess(clues) for n in map(effect_of, keys)}
+        shapes = {name: guess for name, guess in guesses.items() if guess}
         screens: dict[str, Screen] = {}
         robot = found.model.robot
         for kind in ((False, False), (True, False), (False, True)):

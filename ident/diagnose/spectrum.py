@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from freeswing.cdpr.robot import Array
@@ -49,6 +51,23 @@ def common_frequency(fit: LikelihoodFit, noise_scales: Array) -> float:
     around = np.median(np.lib.stride_tricks.sliding_window_view(padded, width), axis=-1)
     prominence = np.log(power) - around
     return float(frequencies[int(np.argmax(prominence))])
+
+
+@dataclass(frozen=True, slots=True)
+class Residual:
+    """What effects may ask of a residual (`cdpr.effects.Clues`).
+
+    Attributes:
+        fit: whose residual it is.
+        noise_scales: of metres and radians, (2,).
+    """
+
+    fit: LikelihoodFit
+    noise_scales: Array
+
+    def common_frequency_hz(self) -> float:
+        """The frequency at which all runs' residuals stand out of their surroundings most."""
+        return common_frequency(self.fit, self.noise_scales)
 
 
 def too_small(fit: LikelihoodFit) -> bool:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import casadi as ca
 
-from freeswing.cdpr.effects.base import Effect, Instant, Parameter
+from freeswing.cdpr.effects.base import LONG_RUN, PAYLOAD, Effect, Instant, Parameter
 from freeswing.cdpr.model.body import Expression
-from freeswing.cdpr.robot import Robot
+from freeswing.cdpr.robot import Array, Robot
 
 
 class CableElasticity(Effect):
@@ -20,6 +20,7 @@ class CableElasticity(Effect):
 
     name = "cable_elasticity"
     summary = "axial stretch of the cables and its damping"
+    separated_by = (PAYLOAD, LONG_RUN)
     needs_tension = True
 
     def parameters(self, robot: Robot) -> tuple[Parameter, ...]:
@@ -37,6 +38,10 @@ class CableElasticity(Effect):
     def length_lag(self, robot: Robot, instant: Instant, values: Expression) -> Expression:
         """By how much the stretch stays behind its tension."""
         return -values[1] * _lengths(instant) * instant.tensions
+
+    def length_pattern(self, times_s: Array, lengths_m: Array, tensions: Array) -> Array:
+        """The stretch of every cable for a compliance of one."""
+        return (lengths_m * tensions)[..., None]
 
 
 def _lengths(instant: Instant) -> Expression:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from freeswing.cdpr.effects.base import Effect, Instant, Parameter
+from freeswing.cdpr.effects.base import PAYLOAD, Effect, Instant, Parameter
 from freeswing.cdpr.model.body import Expression
 from freeswing.cdpr.robot import Robot
 
@@ -16,6 +16,7 @@ class CableMass(Effect):
 
     name = "cable_mass"
     summary = "weight and inertia of the cables"
+    separated_by = (PAYLOAD,)
 
     def parameters(self, robot: Robot) -> tuple[Parameter, ...]:
         """Cable mass per metre over the platform's mass, the same for all cables."""

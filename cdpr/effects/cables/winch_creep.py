@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from freeswing.cdpr.effects.base import Effect, Instant, Parameter, each
+import numpy as np
+
+from freeswing.cdpr.effects.base import LONG_RUN, Effect, Instant, Parameter, each
 from freeswing.cdpr.model.body import Expression
-from freeswing.cdpr.robot import Robot
+from freeswing.cdpr.robot import Array, Robot
 
 
 class WinchCreep(Effect):
@@ -12,6 +14,7 @@ class WinchCreep(Effect):
 
     name = "winch_creep"
     summary = "cables that slowly run out"
+    separated_by = (LONG_RUN,)
     stage = "kinematics"
 
     def parameters(self, robot: Robot) -> tuple[Parameter, ...]:
@@ -21,6 +24,11 @@ class WinchCreep(Effect):
     def length_change(self, robot: Robot, instant: Instant, values: Expression) -> Expression:
         """Rate times time."""
         return values * instant.time_s
+
+    def length_pattern(self, times_s: Array, lengths_m: Array, tensions: Array) -> Array:
+        """Time since the middle, each cable for itself."""
+        since = times_s - times_s.mean()
+        return np.multiply.outer(since, np.eye(lengths_m.shape[1]))
 
 
 EFFECT = WinchCreep()

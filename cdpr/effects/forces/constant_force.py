@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from freeswing.cdpr.effects.base import Effect, Instant, Parameter
+from freeswing.cdpr.effects.base import PAYLOAD, Effect, Instant, Parameter
 from freeswing.cdpr.model.body import Expression
 from freeswing.cdpr.robot import Robot
 
@@ -12,6 +12,7 @@ class ConstantForce(Effect):
 
     name = "constant_force"
     summary = "a constant force"
+    separated_by = (PAYLOAD,)
 
     def parameters(self, robot: Robot) -> tuple[Parameter, ...]:
         """Three components."""

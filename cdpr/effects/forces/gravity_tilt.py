@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import casadi as ca
 
-from freeswing.cdpr.effects.base import Effect, Parameter
+from freeswing.cdpr.effects.base import EQUILIBRIA, PAYLOAD, Effect, Parameter
 from freeswing.cdpr.model.body import Expression, small_rotation
 from freeswing.cdpr.model.pulley import Geometry
 from freeswing.cdpr.robot import Robot
@@ -17,6 +17,7 @@ class GravityTilt(Effect):
 
     name = "gravity_tilt"
     summary = "the base frame is not level"
+    separated_by = (PAYLOAD, EQUILIBRIA)
     stage = "base"
 
     def parameters(self, robot: Robot) -> tuple[Parameter, ...]:

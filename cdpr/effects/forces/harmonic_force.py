@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import casadi as ca
 
-from freeswing.cdpr.effects.base import Effect, Instant, Parameter
+from freeswing.cdpr.effects.base import LONG_RUN, Clues, Effect, Instant, Parameter
 from freeswing.cdpr.model.body import Expression
 from freeswing.cdpr.robot import Robot
 
@@ -18,6 +18,7 @@ class HarmonicForce(Effect):
 
     name = "harmonic_force"
     summary = "a force at one frequency"
+    separated_by = (LONG_RUN,)
 
     def parameters(self, robot: Robot) -> tuple[Parameter, ...]:
         """Six amplitudes and a frequency."""
@@ -33,6 +34,10 @@ class HarmonicForce(Effect):
         phase = 2 * ca.pi * values[6] * instant.time_s
         force = values[0:3] * ca.cos(phase) + values[3:6] * ca.sin(phase)
         return instant.force_at(0 * force, force)
+
+    def shape_guess(self, clues: Clues) -> dict[str, float]:
+        """The line that all residuals share: a fan's, while modes differ from run to run."""
+        return {"frequency_hz": clues.common_frequency_hz()}
 
 
 EFFECT = HarmonicForce()

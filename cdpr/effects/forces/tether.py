@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import casadi as ca
 
-from freeswing.cdpr.effects.base import Effect, Instant, Parameter
+from freeswing.cdpr.effects.base import PAYLOAD, Effect, Instant, Parameter
 from freeswing.cdpr.model.body import Expression
 from freeswing.cdpr.robot import Robot
 
@@ -23,6 +23,7 @@ class Tether(Effect):
 
     name = "tether"
     summary = "a soft spring that ties the platform to the frame"
+    separated_by = (PAYLOAD,)
 
     def parameters(self, robot: Robot) -> tuple[Parameter, ...]:
         """Specific stiffness, the pull at `place`, the unstretched share, and where it is tied."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import casadi as ca
 
-from freeswing.cdpr.effects.base import Effect, Instant, Parameter
+from freeswing.cdpr.effects.base import PAYLOAD, Effect, Instant, Parameter
 from freeswing.cdpr.model.body import Expression
 from freeswing.cdpr.robot import Robot
 
@@ -18,6 +18,7 @@ class TorsionSpring(Effect):
 
     name = "torsion_spring"
     summary = "a torsional spring in yaw"
+    separated_by = (PAYLOAD,)
 
     def parameters(self, robot: Robot) -> tuple[Parameter, ...]:
         """Specific stiffness, and the torque at zero yaw."""

@@ -2,7 +2,15 @@
 
 from __future__ import annotations
 
-from freeswing.cdpr.effects.base import Effect, Instant, Parameter, each
+from freeswing.cdpr.effects.base import (
+    EQUILIBRIA,
+    LONG_RUN,
+    Effect,
+    Instant,
+    Parameter,
+    Recorded,
+    each,
+)
 from freeswing.cdpr.model.body import Expression
 from freeswing.cdpr.robot import Robot
 
@@ -12,6 +20,7 @@ class CableLengthBias(Effect):
 
     name = "cable_length_bias"
     summary = "the told cable lengths are biased"
+    separated_by = (EQUILIBRIA, LONG_RUN)
     stage = "kinematics"
 
     def parameters(self, robot: Robot) -> tuple[Parameter, ...]:
@@ -21,6 +30,12 @@ class CableLengthBias(Effect):
     def length_change(self, robot: Robot, instant: Instant, values: Expression) -> Expression:
         """The biases."""
         return values
+
+    def cannot_show(self, robot: Robot, recorded: Recorded) -> str:
+        """A bias of what nobody stated means nothing."""
+        if not recorded.lengths:
+            return "no cable lengths are stated: nothing to be biased"
+        return super().cannot_show(robot, recorded)
 
 
 EFFECT = CableLengthBias()

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import casadi as ca
 
-from freeswing.cdpr.effects.base import Effect, Parameter
+from freeswing.cdpr.effects.base import EQUILIBRIA, Effect, Parameter
 from freeswing.cdpr.model.body import Expression, small_rotation
 from freeswing.cdpr.model.pulley import Geometry
 from freeswing.cdpr.robot import Robot
@@ -17,6 +17,7 @@ class PulleyAxis(Effect):
 
     name = "pulley_axis"
     summary = "swivel axes that do not point as declared"
+    separated_by = (EQUILIBRIA,)
     stage = "kinematics"
 
     def parameters(self, robot: Robot) -> tuple[Parameter, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from freeswing.cdpr.effects.base import Effect, Parameter
+from freeswing.cdpr.effects.base import EQUILIBRIA, Effect, Parameter
 from freeswing.cdpr.model.body import Expression
 from freeswing.cdpr.model.pulley import Geometry
 from freeswing.cdpr.robot import Robot
@@ -15,6 +15,7 @@ class PulleyRadius(Effect):
 
     name = "pulley_radius"
     summary = "pulley radii that are not as declared"
+    separated_by = (EQUILIBRIA,)
     stage = "kinematics"
 
     def parameters(self, robot: Robot) -> tuple[Parameter, ...]:

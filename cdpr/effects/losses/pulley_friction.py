@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import casadi as ca
 
-from freeswing.cdpr.effects.base import Effect, Instant, Parameter
+from freeswing.cdpr.effects.base import AMPLITUDES, Effect, Instant, Parameter
 from freeswing.cdpr.model.body import Expression
 from freeswing.cdpr.robot import Robot
 
@@ -16,6 +16,7 @@ class PulleyFriction(Effect):
 
     name = "pulley_friction"
     summary = "friction of the cables on the pulleys"
+    separated_by = (AMPLITUDES,)
     needs_tension = True
 
     def parameters(self, robot: Robot) -> tuple[Parameter, ...]:

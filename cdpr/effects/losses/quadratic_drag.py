@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import casadi as ca
 
-from freeswing.cdpr.effects.base import Effect, Instant, Parameter
+from freeswing.cdpr.effects.base import AMPLITUDES, Effect, Instant, Parameter
 from freeswing.cdpr.model.body import Expression
 from freeswing.cdpr.robot import Robot
 
@@ -14,6 +14,7 @@ class QuadraticDrag(Effect):
 
     name = "quadratic_drag"
     summary = "quadratic drag on translation"
+    separated_by = (AMPLITUDES,)
 
     def parameters(self, robot: Robot) -> tuple[Parameter, ...]:
         """Drag area times density over twice the mass, and the point of application."""

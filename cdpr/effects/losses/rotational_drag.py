@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from freeswing.cdpr.effects.base import Effect, Instant, Parameter
+from freeswing.cdpr.effects.base import AMPLITUDES, Effect, Instant, Parameter
 from freeswing.cdpr.model.body import Expression
 from freeswing.cdpr.robot import Robot
 
@@ -12,6 +12,7 @@ class RotationalDrag(Effect):
 
     name = "rotational_drag"
     summary = "linear drag on rotation"
+    separated_by = (AMPLITUDES,)
 
     def parameters(self, robot: Robot) -> tuple[Parameter, ...]:
         """Specific drag torque for each rad/s."""

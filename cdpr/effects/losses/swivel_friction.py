@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import casadi as ca
 
-from freeswing.cdpr.effects.base import Effect, Instant, Parameter
+from freeswing.cdpr.effects.base import AMPLITUDES, Effect, Instant, Parameter
 from freeswing.cdpr.model.body import Expression
 from freeswing.cdpr.robot import Robot
 
@@ -16,6 +16,7 @@ class SwivelFriction(Effect):
 
     name = "swivel_friction"
     summary = "dry friction in the swivel bearings"
+    separated_by = (AMPLITUDES,)
 
     def parameters(self, robot: Robot) -> tuple[Parameter, ...]:
         """Friction torque over the platform's mass, the same for all pulleys."""

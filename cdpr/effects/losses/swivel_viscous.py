@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import casadi as ca
 
-from freeswing.cdpr.effects.base import Effect, Instant, Parameter
+from freeswing.cdpr.effects.base import AMPLITUDES, Effect, Instant, Parameter
 from freeswing.cdpr.model.body import Expression
 from freeswing.cdpr.robot import Robot
 
@@ -14,6 +14,7 @@ class SwivelViscous(Effect):
 
     name = "swivel_viscous"
     summary = "viscous friction in the swivel bearings"
+    separated_by = (AMPLITUDES,)
 
     def parameters(self, robot: Robot) -> tuple[Parameter, ...]:
         """Specific torque for each rad/s, the same for all pulleys."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import casadi as ca
 
-from freeswing.cdpr.effects.base import Effect, Instant, Parameter
+from freeswing.cdpr.effects.base import AMPLITUDES, Effect, Instant, Parameter
 from freeswing.cdpr.model.body import Expression
 from freeswing.cdpr.robot import Robot
 
@@ -18,6 +18,7 @@ class TranslationalDrag(Effect):
 
     name = "translational_drag"
     summary = "linear drag on translation"
+    separated_by = (AMPLITUDES,)
 
     def parameters(self, robot: Robot) -> tuple[Parameter, ...]:
         """Drag rate and where on the line from P to the centre of mass it acts."""
