@@ -1,0 +1,1 @@
+"""What the user writes and what the commands leave: weights, tasks, wrenches, controllers."""

@@ -1,0 +1,1 @@
+"""Controllers from plants and weights: H-infinity by two Riccati equations, and their judgement."""
