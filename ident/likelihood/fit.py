@@ -1,0 +1,289 @@
+"""One fit for every kind of unknown: Levenberg-Marquardt over named blocks.
+
+Unknowns that each run has for itself are eliminated run by run through QR; what is left goes into
+one small triangle (Bjoerck, Numerical Methods for Least Squares Problems, 1996, sec. 6.3).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from freeswing.cdpr.robot import Array
+from freeswing.ident.likelihood.unknowns import Unknown, Unknowns
+
+RANK_LIMIT = 1e-9  # singular values of the scaled triangle below so much of the largest are none
+FIRST_DAMPING = 1e-4  # of a column's own curvature, where a full step has failed
+LARGEST_DAMPING = 1e8  # from here on a step is too small to lower anything
+
+
+class Swing(Protocol):
+    """A run as the fit sees it."""
+
+    @property
+    def name(self) -> str:
+        """Of the run, for messages."""
+
+    def residuals(self, values: Mapping[str, Array]) -> Array:
+        """Whitened residuals (m,) at the values of the blocks; ValueError: no motion there."""
+
+    def linearised(self, values: Mapping[str, Array]) -> tuple[Array, dict[str, Array]]:
+        """The same with their slopes (m, size) by block; a block left out has none."""
+
+
+@dataclass(frozen=True, slots=True)
+class How:
+    """How to fit.
+
+    Attributes:
+        steps: at most so many.
+        tolerance: converged when a full step lowers the cost by less (a cost of 1 is one standard
+            deviation of one number).
+        farthest: longest step, in scales of the unknowns.
+    """
+
+    steps: int = 40
+    tolerance: float = 1e-3
+    farthest: float = 5.0
+
+
+@dataclass(frozen=True, slots=True)
+class Solution:
+    """What a fit gave.
+
+    Attributes:
+        unknowns: at the minimum.
+        covariance: of all shared unknowns in the order of their blocks, zero where held, infinite
+            on the diagonal where the rank does not suffice.
+        cost: sum of the squared whitened residuals and prior distances.
+        residuals: of each run, whitened.
+        singular_values: of the scaled triangle in the estimated shared unknowns, descending.
+        rank: how many of them count.
+        steps: taken.
+        reason: why it stopped, a sentence.
+        converged: whether it is because nothing could be gained any more.
+    """
+
+    unknowns: Unknowns
+    covariance: Array
+    cost: float
+    residuals: tuple[Array, ...]
+    singular_values: Array
+    rank: int
+    steps: int
+    reason: str
+    converged: bool
+
+    def place(self, name: str) -> slice:
+        """Where a shared block stands in the covariance."""
+        first = 0
+        for block in self.unknowns.shared:
+            if block.name == name:
+                return slice(first, first + block.size)
+            first += block.size
+        raise ValueError(f"no shared unknown is called {name!r}")
+
+    def value(self, name: str) -> Array:
+        """Values of a block."""
+        return self.unknowns.block(name).value
+
+    def covariance_of(self, *names: str) -> Array:
+        """Joint covariance of some shared blocks."""
+        places = np.concatenate([np.r_[self.place(name)] for name in names])
+        return self.covariance[np.ix_(places, places)]
+
+    def std(self, name: str) -> Array:
+        """Standard deviations of a shared block."""
+        return np.sqrt(np.diag(self.covariance_of(name)))
+
+
+@dataclass(frozen=True, slots=True)
+class _Step:
+    shared: dict[str, Array]
+    own: dict[str, Array]
+    triangle: Array
+    singular_values: Array
+    gain: float
+
+
+def fit(swings: Sequence[Swing], unknowns: Unknowns, how: How | None = None) -> Solution:
+    """Minimise the sum of squares of all runs' residuals and the unknowns' prior distances.
+
+    Args:
+        swings: the runs.
+        unknowns: where to start; blocks of each run have one row a swing.
+        how: settings.
+
+    Raises:
+        ValueError: without a run, or when the start itself has no residuals, naming the run.
+    """
+    how = how or How()
+    if not swings:
+        raise ValueError("no run to fit")
+    cost, damping, taken = _cost(swings, unknowns), 0.0, 0
+    reason, converged = f"stopped after {how.steps} steps", False
+    parts = _linearised(swings, unknowns)
+    while taken < how.steps:
+        taken += 1
+        step = _step(parts, unknowns, damping)
+        if damping == 0.0 and step.gain < how.tolerance:
+            reason, converged = f"converged: a step would gain {step.gain:.2g}", True
+            break
+        trial = _moved(unknowns, step, how.farthest)
+        lower = _cost_or_infinite(swings, trial)
+        if lower > cost * (1.0 + 1e-12):
+            damping = max(FIRST_DAMPING, 10.0 * damping)
+            if damping > LARGEST_DAMPING:
+                reason = "stopped: no step lowers the cost"
+                break
+            continue
+        gained, unknowns, cost = cost - lower, trial, lower
+        parts = _linearised(swings, unknowns)
+        damping = 0.0 if damping < 2.0 * FIRST_DAMPING else damping / 10.0
+        if gained < how.tolerance and damping == 0.0:
+            reason, converged = f"converged: the last step gained {gained:.2g}", True
+            break
+    return _packed(parts, unknowns, cost, taken, reason, converged)
+
+
+def _cost(swings: Sequence[Swing], unknowns: Unknowns) -> float:
+    total = sum(float(np.sum(block.pull(block.value)[0] ** 2)) for block in unknowns.blocks)
+    for run, swing in enumerate(swings):
+        total += float(np.sum(swing.residuals(unknowns.of_run(run)) ** 2))
+    return total
+
+
+def _cost_or_infinite(swings: Sequence[Swing], unknowns: Unknowns) -> float:
+    try:
+        return _cost(swings, unknowns)
+    except (ValueError, np.linalg.LinAlgError):
+        return np.inf
+
+
+Part = tuple[Array, Array, Array]  # residuals, slopes by own unknowns, slopes by shared ones
+
+
+def _linearised(swings: Sequence[Swing], unknowns: Unknowns) -> list[Part]:
+    """Residuals and slopes of every run in scaled unknowns, the priors of its own included."""
+    found = []
+    for run, swing in enumerate(swings):
+        residuals, slopes = swing.linearised(unknowns.of_run(run))
+        sides = []
+        for blocks in (unknowns.own, unknowns.shared):
+            columns = [_columns(block, slopes, len(residuals)) for block in blocks]
+            sides.append(np.hstack([np.zeros((len(residuals), 0)), *columns]))
+        pulls = [block.pull(block.value[run]) for block in unknowns.own]
+        scales = _joined([block.scale for block in unknowns.own])
+        prior = np.diag(_joined([pull[1] for pull in pulls]) * scales)
+        residuals = np.concatenate([residuals, *[pull[0] for pull in pulls]])
+        own = np.vstack([sides[0], prior])
+        shared = np.vstack([sides[1], np.zeros((len(prior), sides[1].shape[1]))])
+        found.append((residuals, own, shared))
+    return found
+
+
+def _columns(block: Unknown, slopes: Mapping[str, Array], rows: int) -> Array:
+    if block.name not in slopes:
+        return np.zeros((rows, block.size))
+    return np.asarray(slopes[block.name] * np.where(block.estimated, block.scale, 0.0))
+
+
+def _step(parts: list[Part], unknowns: Unknowns, damping: float) -> _Step:
+    """A damped Gauss-Newton step."""
+    n_own = sum(block.size for block in unknowns.own)
+    held = np.where(_joined([block.estimated for block in unknowns.own]), 0.0, 1.0)
+    reduced, triangles = [], []
+    curvature = _shared_priors(unknowns)[:, :-1].diagonal() ** 2
+    for residuals, own, shared in parts:
+        rows = np.column_stack([own, shared, residuals])
+        more = np.zeros((2 * n_own, rows.shape[1]))
+        more[:n_own, :n_own] = np.diag(np.sqrt(damping) * np.linalg.norm(own, axis=0))
+        more[n_own:, :n_own] = np.diag(held)
+        curvature = curvature + np.sum(shared**2, axis=0)
+        triangle = np.linalg.qr(np.vstack([rows, more]), mode="r")
+        triangles.append(triangle[:n_own])
+        reduced.append(triangle[n_own:, n_own:])
+    damped = np.zeros((len(curvature), len(curvature) + 1))
+    damped[:, :-1] = np.diag(np.sqrt(damping * curvature))
+    rows = np.vstack([*reduced, _shared_priors(unknowns), damped])
+    free = _joined([block.estimated for block in unknowns.shared]).astype(bool)
+    kept = np.append(free, True)
+    full = np.linalg.qr(np.vstack([rows[:, kept], np.zeros((kept.sum(), kept.sum()))]), mode="r")
+    count = int(free.sum())
+    triangle, right = full[:count, :count], full[:count, -1]
+    left, singular, back = np.linalg.svd(triangle)
+    counts = singular > RANK_LIMIT * singular.max(initial=0.0)
+    gains = np.where(counts, 1.0 / np.where(counts, singular, 1.0), 0.0)
+    change = np.zeros(len(free))
+    change[free] = -(back.T @ (gains * (left.T @ right)))
+    own_changes = [
+        -_solved(one[:, :n_own], one[:, n_own:-1] @ change + one[:, -1]) for one in triangles
+    ]
+    gain = float(right @ right) + sum(float(one[:, -1] @ one[:, -1]) for one in triangles)
+    return _Step(
+        _by_block(unknowns.shared, change),
+        _by_block(unknowns.own, np.array(own_changes)),
+        triangle,
+        singular,
+        gain,
+    )
+
+
+def _solved(triangle: Array, right: Array) -> Array:
+    return np.asarray(np.linalg.lstsq(triangle, right, rcond=RANK_LIMIT)[0])
+
+
+def _shared_priors(unknowns: Unknowns) -> Array:
+    pulls = [block.pull(block.value) for block in unknowns.shared]
+    scales = _joined([block.scale for block in unknowns.shared])
+    slopes = np.diag(_joined([pull[1] for pull in pulls]) * scales)
+    return np.column_stack([slopes, _joined([pull[0] for pull in pulls])])
+
+
+def _by_block(blocks: Sequence[Unknown], scaled: Array) -> dict[str, Array]:
+    """Scaled changes (.., all sizes) as changes by block."""
+    found, first = {}, 0
+    for block in blocks:
+        found[block.name] = scaled[..., first : first + block.size]
+        first += block.size
+    return found
+
+
+def _moved(unknowns: Unknowns, step: _Step, farthest: float) -> Unknowns:
+    changes = {**step.shared, **step.own}
+    longest = max(np.abs(change).max(initial=0.0) for change in changes.values())
+    share = min(1.0, farthest / max(longest, 1e-300))
+    moves = {}
+    for name, change in changes.items():
+        block = unknowns.block(name)
+        moves[name] = block.value + share * block.scale * change
+    return unknowns.moved(moves)
+
+
+def _packed(
+    parts: list[Part], unknowns: Unknowns, cost: float, taken: int, reason: str, converged: bool
+) -> Solution:
+    step = _step(parts, unknowns, 0.0)
+    free = _joined([block.estimated for block in unknowns.shared]).astype(bool)
+    scales = _joined([block.scale for block in unknowns.shared])
+    covariance = np.zeros((len(free), len(free)))
+    kept = step.singular_values > RANK_LIMIT * step.singular_values.max(initial=0.0)
+    places = np.flatnonzero(free)
+    if not kept.all():
+        covariance[places, places] = np.inf
+    elif len(places):
+        inverse = np.linalg.inv(step.triangle) * scales[free][:, None]
+        covariance[np.ix_(places, places)] = inverse @ inverse.T
+    n_own = sum(block.size for block in unknowns.own)
+    white = tuple(residuals[: len(residuals) - n_own] for residuals, _, _ in parts)
+    rank = int(kept.sum())
+    return Solution(
+        unknowns, covariance, cost, white, step.singular_values, rank, taken, reason, converged
+    )
+
+
+def _joined(parts: Sequence[Array]) -> Array:
+    return np.concatenate([np.zeros(0), *parts])

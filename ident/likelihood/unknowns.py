@@ -1,0 +1,178 @@
+"""What a fit looks for: named blocks of unknowns, shared by all runs or one each.
+
+No index arithmetic outside this file: a block is asked for by its name.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from freeswing.cdpr.robot import Array
+
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class Gaussian:
+    """What was known of a block before: independent normal entries.
+
+    Attributes:
+        mean: (size,).
+        std: > 0, infinite where nothing was known, (size,).
+        source: who says so, a few words for people.
+    """
+
+    mean: Array
+    std: Array
+    source: str
+
+    def __post_init__(self) -> None:
+        mean, std = _frozen(self.mean), _frozen(self.std)
+        if mean.shape != std.shape or not (std > 0.0).all():
+            raise ValueError(f"prior by {self.source}: mean {mean} and std {std} (all > 0) differ")
+        object.__setattr__(self, "mean", mean)
+        object.__setattr__(self, "std", std)
+
+
+@dataclass(frozen=True, slots=True)
+class Unknown:
+    """One block of unknowns.
+
+    Attributes:
+        name: of the block.
+        value: (size,), or (runs, size) where each run has its own.
+        scale: typical size of a change, > 0, (size,).
+        prior: None where nothing is known.
+        estimated: whether the block is fitted, or held at its value, (size,).
+        each_run: whether each run has values of its own.
+        low: bounds that a step does not cross, (size,); None: none.
+        high: likewise.
+    """
+
+    name: str
+    value: Array
+    scale: Array
+    prior: Gaussian | None = None
+    estimated: Mask | None = None
+    each_run: bool = False
+    low: Array | None = None
+    high: Array | None = None
+
+    def __post_init__(self) -> None:
+        value = _frozen(self.value)
+        if value.ndim != 1 + self.each_run or not np.isfinite(value).all():
+            raise ValueError(f"unknown {self.name}: value {value} has a wrong shape or no number")
+        size = value.shape[-1]
+        scale = _frozen(np.broadcast_to(self.scale, (size,)))
+        if not (scale > 0.0).all():
+            raise ValueError(f"unknown {self.name}: scale {scale}, must be > 0")
+        mask = np.ones(size, dtype=bool) if self.estimated is None else self.estimated
+        mask = np.array(np.broadcast_to(mask, (size,)), dtype=bool)
+        mask.flags.writeable = False
+        for key, bound in (("low", -np.inf), ("high", np.inf)):
+            given = getattr(self, key)
+            given = np.full(size, bound) if given is None else np.broadcast_to(given, (size,))
+            object.__setattr__(self, key, _frozen(given))
+        if self.prior is not None and self.prior.mean.shape != (size,):
+            raise ValueError(f"unknown {self.name}: {size} values, {self.prior.mean.size} in prior")
+        object.__setattr__(self, "value", value)
+        object.__setattr__(self, "scale", scale)
+        object.__setattr__(self, "estimated", mask)
+
+    @property
+    def size(self) -> int:
+        """How many numbers (a run)."""
+        return int(self.value.shape[-1])
+
+    def pull(self, value: Array) -> tuple[Array, Array]:
+        """Whitened distance from the prior, (size,), and its slope; zero without a prior."""
+        if self.prior is None:
+            return np.zeros(self.size), np.zeros(self.size)
+        return (value - self.prior.mean) / self.prior.std, 1.0 / self.prior.std
+
+
+@dataclass(frozen=True, slots=True)
+class Unknowns:
+    """All blocks of a fit, their names all different."""
+
+    blocks: tuple[Unknown, ...]
+
+    def __post_init__(self) -> None:
+        names = [block.name for block in self.blocks]
+        if len(set(names)) < len(names):
+            raise ValueError(f"unknowns: a name is there twice in {names}")
+
+    def __contains__(self, name: object) -> bool:
+        return any(block.name == name for block in self.blocks)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the blocks, in their order."""
+        return tuple(block.name for block in self.blocks)
+
+    @property
+    def shared(self) -> tuple[Unknown, ...]:
+        """Blocks that all runs have in common."""
+        return tuple(block for block in self.blocks if not block.each_run)
+
+    @property
+    def own(self) -> tuple[Unknown, ...]:
+        """Blocks of which each run has its own."""
+        return tuple(block for block in self.blocks if block.each_run)
+
+    def block(self, name: str) -> Unknown:
+        """The block of that name.
+
+        Raises:
+            ValueError: when there is none.
+        """
+        for block in self.blocks:
+            if block.name == name:
+                return block
+        raise ValueError(f"no unknown is called {name!r}; there are {', '.join(self.names)}")
+
+    def joined(self, *more: Unknown) -> Unknowns:
+        """These and further blocks."""
+        return Unknowns((*self.blocks, *more))
+
+    def without(self, *names: str) -> Unknowns:
+        """The same without some blocks."""
+        for name in names:
+            self.block(name)
+        return Unknowns(tuple(block for block in self.blocks if block.name not in names))
+
+    def held(self, *names: str) -> Unknowns:
+        """The same with some blocks held at their values."""
+        changed = {name: replace(self.block(name), estimated=np.False_) for name in names}
+        return self._changed(changed)
+
+    def known(self, name: str, prior: Gaussian | None) -> Unknowns:
+        """The same with another prior of a block."""
+        return self._changed({name: replace(self.block(name), prior=prior)})
+
+    def moved(self, values: Mapping[str, Array]) -> Unknowns:
+        """The same with other values of some blocks, led back inside their bounds."""
+        changed = {}
+        for name, value in values.items():
+            block = self.block(name)
+            changed[name] = replace(block, value=np.clip(value, block.low, block.high))
+        return self._changed(changed)
+
+    def of_run(self, run: int) -> dict[str, Array]:
+        """The values that a run sees, by block."""
+        return {
+            block.name: block.value[run] if block.each_run else block.value for block in self.blocks
+        }
+
+    def _changed(self, changed: Mapping[str, Unknown]) -> Unknowns:
+        return Unknowns(tuple(changed.get(block.name, block) for block in self.blocks))
+
+
+def _frozen(values: object) -> Array:
+    array = np.array(values, dtype=np.float64)
+    array.flags.writeable = False
+    return array

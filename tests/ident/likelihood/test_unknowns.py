@@ -1,0 +1,112 @@
+"""Named blocks of unknowns and the one fit over them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from freeswing.ident.likelihood.fit import How, fit
+from freeswing.ident.likelihood.unknowns import Gaussian, Unknown, Unknowns
+
+RATE, STD = 0.7, 0.01
+
+
+@dataclass(frozen=True)
+class Decay:
+    """An amplitude of its own that decays at a rate that all share."""
+
+    name: str
+    times: np.ndarray
+    values: np.ndarray
+
+    def residuals(self, values: Mapping[str, np.ndarray]) -> np.ndarray:
+        told = values["amplitude"][0] * np.exp(-values["rate"][0] * self.times)
+        return (told - self.values) / STD
+
+    def linearised(
+        self, values: Mapping[str, np.ndarray]
+    ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+        shape = np.exp(-values["rate"][0] * self.times)
+        slope = -values["amplitude"][0] * self.times * shape
+        by = {"amplitude": shape[:, None] / STD, "rate": slope[:, None] / STD}
+        return self.residuals(values), by
+
+
+def decays(noise: float, seed: int = 0) -> list[Decay]:
+    generator, times = np.random.default_rng(seed), np.linspace(0.0, 3.0, 40)
+    return [
+        Decay(f"run {k}", times, a * np.exp(-RATE * times) + generator.normal(0.0, noise, 40))
+        for k, a in enumerate((1.0, 2.5, 0.4))
+    ]
+
+
+def start(prior: Gaussian | None = None) -> Unknowns:
+    return Unknowns(
+        (
+            Unknown("rate", np.array([0.2]), np.array([0.1]), prior),
+            Unknown("amplitude", np.full((3, 1), 1.0), np.array([0.5]), each_run=True),
+        )
+    )
+
+
+def test_shared_and_own_unknowns_are_found_exactly() -> None:
+    found = fit(decays(0.0), start(), How(tolerance=1e-20))
+    assert found.converged, found.reason
+    np.testing.assert_allclose(found.value("rate"), RATE, rtol=1e-9)
+    np.testing.assert_allclose(found.value("amplitude")[:, 0], [1.0, 2.5, 0.4], rtol=1e-9)
+
+
+def test_the_deviation_is_that_of_many_repetitions() -> None:
+    fits = [fit(decays(STD, seed), start()) for seed in range(200)]
+    spread = np.std([one.value("rate")[0] for one in fits])
+    assert spread == pytest.approx(fits[0].std("rate")[0], rel=0.15), spread
+
+
+def test_the_covariance_is_that_of_all_unknowns_together() -> None:
+    """Elimination run by run gives what one large matrix gives."""
+    runs, blocks = decays(STD), start(Gaussian(np.array([0.5]), np.array([0.01]), "a guess"))
+    found = fit(runs, blocks, How(tolerance=1e-12))
+    whole = np.zeros((3 * 40 + 1, 4))
+    for k, run in enumerate(runs):
+        slopes = run.linearised(found.unknowns.of_run(k))[1]
+        whole[40 * k : 40 * k + 40, 0] = slopes["rate"][:, 0]
+        whole[40 * k : 40 * k + 40, 1 + k] = slopes["amplitude"][:, 0]
+    whole[-1, 0] = 1.0 / 0.01
+    expected = np.linalg.inv(whole.T @ whole)[0, 0]
+    assert found.covariance[0, 0] == pytest.approx(expected, rel=1e-9)
+
+
+def test_a_held_block_stays_and_one_nothing_depends_on_loses_rank() -> None:
+    held = fit(decays(STD), start().held("rate"))
+    assert held.value("rate")[0] == 0.2
+    assert held.std("rate")[0] == 0.0
+    idle = Unknown("idle", np.zeros(2), np.ones(2))
+    lost = fit(decays(STD), start().joined(idle))
+    assert lost.rank == 1, lost.singular_values
+    assert np.isinf(lost.std("idle")).all()
+    known = start().joined(idle).known("idle", Gaussian(np.ones(2), np.full(2, 3.0), "a guess"))
+    found = fit(decays(STD), known)
+    np.testing.assert_allclose(found.value("idle"), 1.0, atol=1e-6)
+    np.testing.assert_allclose(found.std("idle"), 3.0, rtol=1e-9)
+
+
+def test_a_bound_holds() -> None:
+    blocks = start()
+    low = Unknown("rate", np.array([0.9]), np.array([0.1]), low=np.array([0.8]))
+    found = fit(decays(0.0), blocks.without("rate").joined(low))
+    assert found.value("rate")[0] == 0.8
+
+
+def test_blocks_are_asked_for_by_name() -> None:
+    blocks = start()
+    assert blocks.without("rate").names == ("amplitude",)
+    assert "rate" in blocks
+    with pytest.raises(ValueError, match=r"no unknown is called 'mass'; there are rate, amplitude"):
+        blocks.block("mass")
+    with pytest.raises(ValueError, match=r"twice"):
+        blocks.joined(blocks.block("rate"))
+    with pytest.raises(ValueError, match=r"no run to fit"):
+        fit([], blocks)
