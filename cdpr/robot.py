@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from freeswing.cdpr.driven.drive import Drive
 
 POSE_COORDINATES = ("x", "y", "z", "phi", "theta", "chi")
 INERTIA_NAMES = (
@@ -118,6 +121,7 @@ class Robot:
         free_coordinates: 6 - n names out of x y z phi theta chi; None lets the program choose.
         platform: nominal inertia.
         cables: the n cables.
+        drive: how motors move the cables; None where they hold them.
     """
 
     name: str
@@ -127,6 +131,7 @@ class Robot:
     )
     free_coordinates: tuple[str, ...] | None = None
     platform: Platform = field(default_factory=Platform)
+    drive: Drive | None = None
 
     def __post_init__(self) -> None:
         gravity = frozen_array(self.gravity_m_s2, (3,), "gravity_m_s2")

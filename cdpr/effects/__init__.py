@@ -22,18 +22,32 @@ __all__ = [
     "Parameter",
     "Recorded",
     "catalogue",
+    "driven_catalogue",
     "effect_named",
 ]
 FOLDERS = "FREESWING_EFFECTS"
 
 
 def catalogue() -> dict[str, Effect]:
-    """Every effect by name, in alphabetical order.
+    """The effects that a free swing may have, by name in alphabetical order.
 
     Raises:
         InputError: for a folder in FREESWING_EFFECTS that is none, or a file there that defines
             no effect, a broken one, or one whose name is taken.
     """
+    return {name: effect for name, effect in _known().items() if effect.on_free}
+
+
+def driven_catalogue() -> dict[str, Effect]:
+    """The effects that a robot moved by motors may have, by name in alphabetical order.
+
+    Raises:
+        InputError: as `catalogue`.
+    """
+    return {name: effect for name, effect in _known().items() if effect.on_driven}
+
+
+def _known() -> dict[str, Effect]:
     return _catalogue(os.environ.get(FOLDERS, ""))
 
 
@@ -47,12 +61,12 @@ def _catalogue(folders: str) -> dict[str, Effect]:
 
 
 def effect_named(name: str) -> Effect:
-    """The effect of that name.
+    """The effect of that name, of free swings or of driven robots.
 
     Raises:
         ValueError: when there is none, naming those that there are.
     """
-    known = catalogue()
+    known = _known()
     if name not in known:
         raise ValueError(f"no effect is called {name!r}; there are {', '.join(known)}")
     return known[name]

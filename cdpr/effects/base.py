@@ -8,13 +8,16 @@ mass (m/s^2), torques likewise (m^2/s^2): free motion cannot tell the mass.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import casadi as ca
 
 from freeswing.cdpr.model.body import Expression, along
 from freeswing.cdpr.model.pulley import CableState, Geometry
 from freeswing.cdpr.robot import Array, Robot
+
+if TYPE_CHECKING:
+    from freeswing.cdpr.driven.parameters import MotorTerms
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,7 +164,9 @@ class Effect:
         name: as in files and flags.
         summary: what the robot or the recording then has, as a phrase.
         needs_tension: whether its hooks use `Instant.tensions`.
-        stage: "kinematics", "base" (gravity), "force" or "measurement".
+        stage: "kinematics", "base" (gravity), "drive", "force" or "measurement".
+        on_driven: whether robots moved by motors may have it.
+        on_free: whether free swings may have it.
         separated_by: experiments that set it apart from others which they set apart.
     """
 
@@ -169,7 +174,9 @@ class Effect:
     summary: str = ""
     needs_tension: bool = False
     separated_by: tuple[Experiment, ...] = ()
-    stage: str = "force"  # "kinematics", "base" (gravity), "force" or "measurement"
+    stage: str = "force"  # "kinematics", "base" (gravity), "drive", "force" or "measurement"
+    on_driven: bool = False
+    on_free: bool = True
 
     @property
     def changes_measurement(self) -> bool:
@@ -183,6 +190,14 @@ class Effect:
     def geometry(self, geometry: Geometry, values: Expression) -> Geometry:
         """Displaced geometry or gravity."""
         return geometry
+
+    def motors(self, motors: MotorTerms, values: Expression) -> MotorTerms:
+        """Changed constants of the motors of a driven robot."""
+        return motors
+
+    def payloads(self, values: Expression) -> list[tuple[Expression, Expression]]:
+        """Point masses fixed to a driven platform: (mass in kg, place in its frame) each."""
+        return []
 
     def length_change(
         self, robot: Robot, instant: Instant, values: Expression
@@ -232,7 +247,7 @@ class Effect:
 def each(robot: Robot, stem: str, unit: str, low: float, high: float, scale: float):
     """One parameter a cable, named stem_<cable>_unit."""
     return tuple(
-        Parameter(f"{stem}_{cable.name}_{unit}", low, high, scale, part=cable.name)
+        Parameter(f"{stem}_{cable.name}_{unit}".rstrip("_"), low, high, scale, part=cable.name)
         for cable in robot.cables
     )
 

@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from freeswing.cdpr.driven.drive import Drive
+from freeswing.cdpr.driven.formula import Formula
 from freeswing.cdpr.files.documents import (
     InputError,
     Problems,
@@ -14,6 +16,13 @@ from freeswing.cdpr.files.documents import (
     dump_toml,
     inside,
     load_toml,
+)
+from freeswing.cdpr.files.drive_file import (
+    Named,
+    cable_table,
+    drive_table,
+    read_motors,
+    read_shape,
 )
 from freeswing.cdpr.files.mesh import METRES_PER_UNIT, platform_from_mesh
 from freeswing.cdpr.robot import POSE_COORDINATES, STANDARD_GRAVITY_M_S2, Cable, Platform, Robot
@@ -36,11 +45,22 @@ def read_robot(path: Path | str) -> Robot:
     reader = Reader(load_toml(path, "robot", problems), problems)
     name = reader.string("name")
     gravity = _read_gravity(reader)
-    cables = [_read_cable(table) for table in reader.children("cables")]
+    named = read_shape(reader.child("shape", required=False))
+    tables = reader.children("cables")
+    driving = reader.child("drive", required=False)
+    read = [_read_cable(table, named, is_driven=driving is not None) for table in tables]
+    cables, points = [values for values, _ in read], [formulas for _, formulas in read]
     _check_cables(reader, cables)
     free = _read_free_coordinates(reader, len(cables))
     platform = _read_platform(reader.child("platform", required=False), Path(path).parent)
+    drive = None
+    if driving is not None:
+        motors = read_motors(driving, tables, named)
+        drive = Drive(named.shape, *_columns(points), motors)
+        _check_driven(reader, platform)
     reader.finish()
+    for table in tables:
+        table.finish()
     problems.raise_if_any(path)
     return Robot(
         name=name,
@@ -48,7 +68,19 @@ def read_robot(path: Path | str) -> Robot:
         gravity_m_s2=gravity,
         free_coordinates=free,
         platform=platform,
+        drive=drive,
     )
+
+
+def _columns(points: list[Points]) -> Points:
+    """Formulas of all entries, and of all attachments."""
+    return tuple(entry for entry, _ in points), tuple(attachment for _, attachment in points)
+
+
+def _check_driven(reader: Reader, platform: Platform) -> None:
+    """The dynamics of a driven robot need its mass and inertia."""
+    if not reader.problems and (platform.mass_kg is None or platform.specific_inertia_m2 is None):
+        reader.add("platform", "a driven robot needs mass_kg and inertia_kg_m2")
 
 
 def write_robot(path: Path | str, robot: Robot) -> None:
@@ -66,8 +98,9 @@ def write_robot(path: Path | str, robot: Robot) -> None:
             "pulley_radius_m": float(cable.pulley_radius_m),
             "attachment_m": cable.attachment_m,
             **{key: getattr(cable, key) for key in SWIVEL_KEYS},
+            **({} if robot.drive is None else cable_table(robot.drive, index)),
         }
-        for cable in robot.cables
+        for index, cable in enumerate(robot.cables)
     ]
     table = {
         "format": "freeswing-robot/1",
@@ -75,12 +108,14 @@ def write_robot(path: Path | str, robot: Robot) -> None:
         "gravity_m_s2": robot.gravity_m_s2,
         "free_coordinates": "auto" if free is None else list(free),
         "platform": platform if any(v is not None for v in platform.values()) else None,
+        **({} if robot.drive is None else drive_table(robot.drive)),
         "cables": cables,
     }
     dump_toml(path, table)
 
 
 CableValues = tuple[str, Array, float, Array, Array, Array, Array]
+Points = tuple[tuple[Formula, ...], tuple[Formula, ...]]
 
 
 def _read_gravity(reader: Reader) -> Array:
@@ -92,14 +127,15 @@ def _read_gravity(reader: Reader) -> Array:
     return gravity
 
 
-def _read_cable(reader: Reader) -> CableValues:
+def _read_cable(reader: Reader, named: Named, *, is_driven: bool) -> tuple[CableValues, Points]:
     name = reader.string("name")
-    entry = reader.vector("entry_m", 3)
-    radius = reader.number("pulley_radius_m", minimum=0.0)
-    attachment = reader.vector("attachment_m", 3)
+    entry_formulas, entry = named.point(reader, "entry_m")
+    radius = 0.0
+    if not is_driven or "pulley_radius_m" in reader:
+        radius = reader.number("pulley_radius_m", minimum=0.0)
+    attachment_formulas, attachment = named.point(reader, "attachment_m")
     axes = _read_swivel(reader, is_eyelet=radius == 0.0)
-    reader.finish()
-    return (name, entry, radius, attachment, *axes)
+    return (name, entry, radius, attachment, *axes), (entry_formulas, attachment_formulas)
 
 
 def _read_swivel(reader: Reader, *, is_eyelet: bool) -> tuple[Array, Array, Array]:
@@ -170,6 +206,8 @@ def _read_platform(reader: Reader | None, folder: Path) -> Platform:
     density = reader.optional_number("density_kg_m3", above=0.0)
     com = reader.optional_vector("com_m", 3)
     inertia = reader.optional_vector("specific_inertia_m2", 6)
+    inertia = _over_mass(reader, mass, inertia)
+    com = np.zeros(3) if com is None and "inertia_kg_m2" in reader else com
     mesh = reader.optional_string("mesh")
     unit = reader.optional_string("mesh_unit", choices=tuple(METRES_PER_UNIT))
     reader.finish()
@@ -192,6 +230,19 @@ def _read_platform(reader: Reader | None, folder: Path) -> Platform:
             inertia = solid.specific_inertia_m2 if inertia is None else inertia
             _check_inertia(reader, com, inertia)
     return Platform() if reader.problems else Platform(mass, com, inertia)
+
+
+def _over_mass(reader: Reader, mass: float | None, specific: Array | None) -> Array | None:
+    """The specific inertia, of `inertia_kg_m2` where that is given instead."""
+    whole = reader.optional_vector("inertia_kg_m2", 6)
+    if whole is None:
+        return specific
+    if specific is not None:
+        reader.add("inertia_kg_m2", "give it or specific_inertia_m2, not both")
+    if mass is None:
+        reader.add("inertia_kg_m2", "needs mass_kg beside it")
+        return specific
+    return whole / mass
 
 
 def _check_inertia(reader: Reader, com: Array | None, inertia: Array | None) -> None:

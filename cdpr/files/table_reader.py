@@ -164,7 +164,7 @@ class Reader:
     def _checked(
         self, key: str, value: object, minimum: float, above: float, maximum: float
     ) -> float:
-        number = self._finite(key, value)
+        number = self.finite(key, value)
         if number < minimum:
             self.add(key, f"{number:g} must be >= {minimum:g}")
         if number <= above:
@@ -173,7 +173,8 @@ class Reader:
             self.add(key, f"{number:g} must be <= {maximum:g}")
         return number
 
-    def _finite(self, key: str, value: object) -> float:
+    def finite(self, key: str, value: object) -> float:
+        """`value` as a finite number; NaN, and recorded under `key`, where it is none."""
         if isinstance(value, bool) or not isinstance(value, int | float):
             self.add(key, f"{_shown(value)} is not a number")
             return math.nan
@@ -197,7 +198,7 @@ class Reader:
         if length is not None and len(value) != length:
             self.add(key, f"{len(value)} entries, must be {wanted}")
             return np.full(length, np.nan)
-        return np.array([self._finite(f"{key}[{i}]", entry) for i, entry in enumerate(value)])
+        return np.array([self.finite(f"{key}[{i}]", entry) for i, entry in enumerate(value)])
 
     def _text(self, key: str, value: object, choices: Sequence[str]) -> str:
         if not isinstance(value, str) or not value.strip():

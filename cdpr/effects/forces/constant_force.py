@@ -13,6 +13,7 @@ class ConstantForce(Effect):
     name = "constant_force"
     summary = "a constant force"
     separated_by = (PAYLOAD,)
+    on_driven = True
 
     def parameters(self, robot: Robot) -> tuple[Parameter, ...]:
         """Three components."""

@@ -19,6 +19,7 @@ class GravityTilt(Effect):
     summary = "the base frame is not level"
     separated_by = (PAYLOAD, EQUILIBRIA)
     stage = "base"
+    on_driven = True
 
     def parameters(self, robot: Robot) -> tuple[Parameter, ...]:
         """Two angles."""

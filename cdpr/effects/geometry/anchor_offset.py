@@ -17,6 +17,7 @@ class AnchorOffset(Effect):
     summary = "cable entry points that are not where they were declared"
     separated_by = (EQUILIBRIA,)
     stage = "kinematics"
+    on_driven = True
 
     def parameters(self, robot: Robot) -> tuple[Parameter, ...]:
         """Three coordinates a cable."""

@@ -15,6 +15,7 @@ class QuadraticDrag(Effect):
     name = "quadratic_drag"
     summary = "quadratic drag on translation"
     separated_by = (AMPLITUDES,)
+    on_driven = True
 
     def parameters(self, robot: Robot) -> tuple[Parameter, ...]:
         """Drag area times density over twice the mass, and the point of application."""

@@ -13,6 +13,7 @@ class RotationalDrag(Effect):
     name = "rotational_drag"
     summary = "linear drag on rotation"
     separated_by = (AMPLITUDES,)
+    on_driven = True
 
     def parameters(self, robot: Robot) -> tuple[Parameter, ...]:
         """Specific drag torque for each rad/s."""

@@ -19,6 +19,7 @@ class TranslationalDrag(Effect):
     name = "translational_drag"
     summary = "linear drag on translation"
     separated_by = (AMPLITUDES,)
+    on_driven = True
 
     def parameters(self, robot: Robot) -> tuple[Parameter, ...]:
         """Drag rate and where on the line from P to the centre of mass it acts."""

@@ -1,0 +1,1 @@
+"""The robot whose cables motors drive: actuators, springs, dynamics, linear model."""

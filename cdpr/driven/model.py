@@ -1,0 +1,232 @@
+"""A driven robot with a set of effects as functions that share one graph of expressions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from freeswing.cdpr.driven.drive import LEAST_DRIVEN
+from freeswing.cdpr.driven.equations import quaternion_rate, rotation_of
+from freeswing.cdpr.driven.parameters import Numbers, declared_numbers
+from freeswing.cdpr.driven.scene import Premises, Scene, premises, scene
+from freeswing.cdpr.effects import Parameter, effect_named
+from freeswing.cdpr.robot import Robot
+
+Array = NDArray[np.float64]
+Function = Any
+Expression = Any
+
+N_STATE = 13  # pose 7 (position, quaternion w x y z) and twist 6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DrivenModel:
+    """One driven robot with a set of effects.
+
+    A state is [position of P 3; quaternion w x y z 4; velocity of P, base frame 3; angular
+    velocity, platform frame 3], a twist its last six. `theta` below is every number of the
+    robot's file (`numbers.values`) followed by the effects' values.
+
+    Attributes:
+        robot: what the model was built from.
+        numbers: the file's numbers.
+        effects: names of the effects, in the order of their values.
+        parameters: the effects' parameters, in the order of their values.
+        names: names of all of theta: `numbers.names`, then `effect.parameter`.
+        declared: theta as declared, effects at their start values, (len(names),).
+        premises: the constants as expressions, for those who derive more functions.
+        lengths: (pose 7, theta) -> L (n,).
+        drums: (theta) -> drum radii (n,).
+        decays: (theta) -> the fastest that friction can stop each motor alone, 1/s (n,).
+        motion: (state, currents, theta) -> acceleration of the twist (6,), tensions (n,), smoothed
+            signs of unwinding (n,).
+        needed: (state, acceleration, theta) -> the left side of (10), (6,): what the currents'
+            wrench W_I I must be; force in the base frame, moment about P in the platform frame.
+        wrench_matrix: (pose 7, theta) -> W_I (6, n) of (13), in the same frames as `needed`.
+        step: (state, currents, references, period, theta) -> state, currents after one period of
+            held references, and by how much the sign of a motor's friction changed at most.
+        stages: (the same) -> the four states at which a step looks (13, 4), the currents that it
+            takes there (n, 4).
+        energy: (state, currents, theta) -> kinetic energy with the motors', potential energy of
+            weight, springs and held currents.
+    """
+
+    robot: Robot
+    numbers: Numbers
+    effects: tuple[str, ...]
+    parameters: tuple[Parameter, ...]
+    names: tuple[str, ...]
+    declared: Array
+    premises: Premises
+    lengths: Function
+    drums: Function
+    decays: Function
+    motion: Function
+    needed: Function
+    wrench_matrix: Function
+    step: Function
+    stages: Function
+    energy: Function
+
+    @property
+    def n_cables(self) -> int:
+        """Number of cables n."""
+        return self.robot.n_cables
+
+    def index(self, name: str) -> int:
+        """Where a name stands in theta.
+
+        Raises:
+            ValueError: when it is not there, naming what is.
+        """
+        if name not in self.names:
+            raise ValueError(f"{name!r} is not one of {', '.join(self.names)}")
+        return self.names.index(name)
+
+    def theta(self, changes: dict[str, float]) -> Array:
+        """The declared numbers with some of them changed, (len(names),)."""
+        values = self.declared.copy()
+        for name, value in changes.items():
+            values[self.index(name)] = value
+        return values
+
+
+def build_driven(robot: Robot, effects: tuple[str, ...] = ()) -> DrivenModel:
+    """The model of a driven robot with the named effects.
+
+    Raises:
+        ValueError: for an effect unknown, repeated or without a meaning here, fewer than
+            `LEAST_DRIVEN` cables, a robot without [drive], mass or inertia.
+    """
+    if robot.n_cables < LEAST_DRIVEN:
+        raise ValueError(
+            f"robot {robot.name} has {robot.n_cables} driven cables: the direct dynamics of a "
+            f"driven robot need n >= {LEAST_DRIVEN}"
+        )
+    if len(set(effects)) != len(effects):
+        raise ValueError(f"an effect is named twice in {effects}")
+    found = tuple(effect_named(name) for name in effects)
+    for effect in found:
+        if not effect.on_driven:
+            raise ValueError(f"effect {effect.name} has no meaning for a driven robot")
+    numbers = declared_numbers(robot)
+    groups = [effect.parameters(robot) for effect in found]
+    parameters = tuple(parameter for group in groups for parameter in group)
+    names = [f"{e.name}.{p.name}" for e, g in zip(found, groups, strict=True) for p in g]
+    given = premises(robot, numbers, found)
+    return DrivenModel(
+        robot,
+        numbers,
+        effects,
+        parameters,
+        (*numbers.names, *names),
+        np.concatenate([numbers.values, [parameter.start for parameter in parameters]]),
+        given,
+        **_functions(given),
+    )
+
+
+def function(name: str, inputs: dict[str, Expression], outputs: dict[str, Expression]) -> Function:
+    """A CasADi function with dense outputs, common subexpressions computed once."""
+    dense = [ca.densify(output) for output in outputs.values()]
+    return ca.Function(name, [*inputs.values()], dense, [*inputs], [*outputs], {"cse": True})
+
+
+def _functions(given: Premises) -> dict[str, Function]:
+    n, motors = given.robot.n_cables, given.terms.motors
+    state, currents = ca.SX.sym("state", N_STATE), ca.SX.sym("currents", n)
+    acceleration = ca.SX.sym("acceleration", 6)
+    now = scene(given, state[:3], rotation_of(state[3:7]), state[7:], currents)
+    solved = now.balanced.solved(now.balanced.effort)
+    tensions = now.pulled.loose + now.pulled.reflected * (now.rows @ solved)
+    unpowered = ca.substitute(now.balanced.effort, currents, ca.SX.zeros(n))
+    gains = -now.rows.T @ ca.diag(motors.torque_constant / motors.drum_radius)
+    posed = {"pose": state[:7], "theta": given.theta}
+    moving = {"state": state, "currents": currents, "theta": given.theta}
+    asked = {"state": state, "acceleration": acceleration, "theta": given.theta}
+    left = {"needed": now.balanced.whole @ acceleration - unpowered}
+    fastest = (motors.coulomb / motors.coulomb_width + motors.viscous) / motors.inertia
+    outputs = {"acceleration": solved, "tensions": tensions, "signs": now.pulled.signs}
+    motion = function("motion", moving, outputs)
+    return {
+        "lengths": function("lengths", posed, {"lengths": now.lengths}),
+        "drums": function("drums", {"theta": given.theta}, {"drums": motors.drum_radius}),
+        "decays": function("decays", {"theta": given.theta}, {"decays": fastest}),
+        "motion": motion,
+        "needed": function("needed", asked, left),
+        "wrench_matrix": function("wrench_matrix", posed, {"matrix_wrench": gains}),
+        "energy": function("energy", moving, _energy(given, now, state, currents)),
+        **_steps(given, motion),
+    }
+
+
+def _energy(
+    given: Premises, now: Scene, state: Expression, currents: Expression
+) -> dict[str, Expression]:
+    motors, body, twist = given.terms.motors, now.body, state[7:]
+    turn = rotation_of(state[3:7])
+    wound = now.lengths / motors.drum_radius
+    rates = ca.vertcat(*[one.rate for one in now.lines]) / motors.drum_radius
+    kinetic = ca.dot(twist, body.matrix(turn) @ twist) + ca.dot(motors.inertia, rates**2)
+    potential = -ca.dot(given.terms.geometry.gravity, body.mass * state[:3] + turn @ body.moment)
+    potential += ca.dot(motors.spring, wound**2) / 2 + ca.dot(
+        motors.torque_constant * currents, wound
+    )
+    return {"scalar_kinetic": kinetic / 2, "scalar_potential": potential}
+
+
+def _steps(given: Premises, motion: Function) -> dict[str, Function]:
+    """Runge and Kutta's step of fourth order with the current loop's exponential in it.
+
+    The currents that its stages take are chosen so that the impulse and its first moment are
+    those of the exponential itself: PRBS edges then cost no accuracy at steps near the loop's
+    time constant.
+    """
+    n = given.robot.n_cables
+    state, start = ca.SX.sym("state", N_STATE), ca.SX.sym("currents", n)
+    references, period = ca.SX.sym("references", n), ca.SX.sym("scalar_period")
+    ratio = given.terms.motors.time_constant / period
+    left = ca.exp(-1 / ratio)
+    impulse = ratio * (1 - left)  # integral of the decay over the period, over the period
+    moment = 2 * ratio * (1 - impulse)  # the same weighted with the time that is left, times 2
+    middle = (3 * moment - 1) / 2
+    last = 6 * impulse - 1 - 4 * middle
+    gap = start - references
+    currents = [
+        start,
+        references + gap * middle,
+        references + gap * middle,
+        references + gap * last,
+    ]
+
+    signs = []
+
+    def slope(at: Expression, stage: int) -> Expression:
+        twist_rate, _, sign = motion(at, currents[stage], given.theta)
+        signs.append(sign)
+        return ca.vertcat(at[7:10], quaternion_rate(at[3:7], at[10:]), twist_rate)
+
+    states, slopes = [state], [slope(state, 0)]
+    for stage, fraction in ((1, 0.5), (2, 0.5), (3, 1.0)):
+        states.append(state + fraction * period * slopes[-1])
+        slopes.append(slope(states[-1], stage))
+    after = state + period / 6 * (slopes[0] + 2 * slopes[1] + 2 * slopes[2] + slopes[3])
+    quaternion = after[3:7] / ca.norm_2(after[3:7])
+    ends = {
+        "state_after": ca.vertcat(after[:3], quaternion, after[7:]),
+        "currents_after": references + gap * left,
+        "scalar_turned": ca.mmax(ca.fabs(signs[3] - signs[0])),
+    }
+    inputs = {
+        "state": state,
+        "currents": start,
+        "references": references,
+        "scalar_period": period,
+        "theta": given.theta,
+    }
+    looks = {"matrix_states": ca.horzcat(*states), "matrix_currents": ca.horzcat(*currents)}
+    return {"step": function("step", inputs, ends), "stages": function("stages", inputs, looks)}

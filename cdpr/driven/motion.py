@@ -1,0 +1,198 @@
+"""A driven robot moved by held current references: rigid cables, one step a sample or finer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from freeswing.cdpr.driven.model import N_STATE, DrivenModel
+from freeswing.cdpr.model.batch import Bound, evaluate
+
+Array = NDArray[np.float64]
+
+# A step of RK4 follows a decay of this many time constants to 2e-4 of its size, well inside its
+# limit of stability (2.78); the fastest decay is smoothed Coulomb friction about standstill.
+MOST_DECAY = 1.2
+MOST_SUBSTEPS = 64
+# Between motors that turn round within a step and ones that do so in 20, the pose differs by
+# 0.01 mm after 5 s of PRBS: as much as an encoder step.
+MOST_TURN = 0.1
+MOST_REFINED = 16
+# A platform that leaves its frame by this factor is lost: cables push there in earnest.
+LARGEST_REACH = 3.0
+
+
+@dataclass(frozen=True, slots=True)
+class DrivenMotion:
+    """A simulated motion at the sample times.
+
+    Attributes:
+        model: the equations.
+        theta: their numbers.
+        times_s: sample times, (n_t,).
+        states: (n_t, 13).
+        currents_A: what flows at each sample, (n_t, n).
+        references_A: held from each sample to the next, (n_t, n).
+        tensions_N: at each sample with rigid cables, negative where one would have pushed,
+            (n_t, n).
+        steps: integration steps taken from each sample to the next, (n_t - 1,).
+    """
+
+    model: DrivenModel
+    theta: Array
+    times_s: Array
+    states: Array
+    currents_A: Array
+    references_A: Array
+    tensions_N: Array
+    steps: NDArray[np.intp]
+
+    @property
+    def poses(self) -> Array:
+        """Position and quaternion, (n_t, 7)."""
+        return self.states[:, :7]
+
+    @property
+    def slack(self) -> NDArray[np.bool_]:
+        """Where a cable would have had to push, wrong from there on, (n_t, n)."""
+        return self.tensions_N < 0.0
+
+    def angles_rad(self, zero_pose: Array) -> Array:
+        """Motor angles that are zero at a pose and grow with winding (2), (n_t, n)."""
+        return motor_angles(self.model, self.poses, zero_pose, self.theta)
+
+
+def motor_angles(model: DrivenModel, poses: Array, zero_pose: Array, theta: Array) -> Array:
+    """The inverse position kinematic model (2): (..., 7) and (7,) -> (..., n)."""
+    lengths = evaluate(model.lengths, poses, theta)[0]
+    zero = evaluate(model.lengths, zero_pose, theta)[0]
+    return (zero - lengths) / evaluate(model.drums, theta)[0]
+
+
+def substeps_for(model: DrivenModel, period_s: float, theta: Array) -> int:
+    """Steps a sample that keep the fastest decay of a motor within `MOST_DECAY`.
+
+    Raises:
+        ValueError: when friction is so large for its inertia that it would need too many.
+    """
+    motors = evaluate(model.decays, theta)[0]
+    count = max(1, int(np.ceil(period_s * float(motors.max()) / MOST_DECAY)))
+    if count > MOST_SUBSTEPS:
+        raise ValueError(
+            f"friction against motor inertia decays at {motors.max():.3g} 1/s: {count} steps a "
+            f"sample of {period_s:g} s, more than {MOST_SUBSTEPS}; check coulomb_N_m, "
+            "viscous_N_m_s, motor_inertia_kg_m2"
+        )
+    return count
+
+
+class Stepper:
+    """Advances a state by one period after another, its memory bound once.
+
+    A period in which a motor turns round, and its friction with it, is taken again in steps so
+    fine that the smoothed sign changes by at most `MOST_TURN` in each.
+
+    Args:
+        model: the equations.
+        theta: their numbers, (len(model.names),).
+        period_s: how long references are held.
+        least: integration steps a period at least; None for what `substeps_for` asks.
+    """
+
+    def __init__(
+        self, model: DrivenModel, theta: Array, period_s: float, least: int | None = None
+    ) -> None:
+        self.least = substeps_for(model, period_s, theta) if least is None else least
+        self.period_s = period_s
+        self._step = Bound(model.step, 1)
+        self._step.inputs[4][:] = theta
+
+    def advance(self, state: Array, currents: Array, references: Array) -> tuple[Array, Array, int]:
+        """State (13,) and currents (n,) after one period of held references (n,); steps taken."""
+        turned = self._run(state, currents, references, self.least)
+        count = self.least
+        if turned > MOST_TURN:
+            count = self.least * min(int(np.ceil(turned / MOST_TURN)), MOST_REFINED)
+            self._run(state, currents, references, count)
+        outputs = self._step.outputs
+        return outputs[0][0], outputs[1][0], count
+
+    def _run(self, state: Array, currents: Array, references: Array, count: int) -> float:
+        """Take `count` steps; the largest change of a sign in one of them."""
+        step = self._step
+        step.inputs[3][:] = self.period_s / count
+        step.inputs[0][0], step.inputs[1][0], step.inputs[2][0] = state, currents, references
+        step.run()
+        turned = float(step.outputs[2][0, 0])
+        for _ in range(count - 1):
+            step.inputs[0][0], step.inputs[1][0] = step.outputs[0][0], step.outputs[1][0]
+            step.run()
+            turned = max(turned, float(step.outputs[2][0, 0]))
+        return turned
+
+
+def simulate_driven(
+    model: DrivenModel,
+    state: Array,
+    references_A: Array,
+    rate_hz: float,
+    theta: Array | None = None,
+    *,
+    currents_A: Array | None = None,
+    least: int | None = None,
+) -> DrivenMotion:
+    """The motion under current references, each held for one sample.
+
+    Cables are rigid: where one would have to push it does, and `slack` tells so.
+
+    Args:
+        model: the equations.
+        state: at the first sample, (13,).
+        references_A: (n_t, n); the last row is never reached.
+        rate_hz: samples a second.
+        theta: the model's numbers; None as declared.
+        currents_A: what flows at the start, (n,); None: the first references.
+        least: integration steps a sample at least; None for what the friction asks.
+
+    Raises:
+        ValueError: for wrong shapes or numbers, and when the platform leaves its frame for good.
+    """
+    theta = model.declared if theta is None else np.asarray(theta, dtype=np.float64)
+    references = np.ascontiguousarray(references_A, dtype=np.float64)
+    start = references[0] if currents_A is None else np.asarray(currents_A, dtype=np.float64)
+    _check(model, state, references, start, rate_hz)
+    stepper = Stepper(model, theta, 1.0 / rate_hz, least)
+    states, currents = np.empty((len(references), N_STATE)), np.empty_like(references)
+    states[0], currents[0] = state, start
+    steps = np.ones(len(references) - 1, dtype=np.intp)
+    limit = LARGEST_REACH * float(np.abs(model.robot.entries_m).max())
+    for k in range(len(references) - 1):
+        after = stepper.advance(states[k], currents[k], references[k])
+        states[k + 1], currents[k + 1], steps[k] = after
+        if not abs(states[k + 1, :3]).max() < limit:
+            raise ValueError(
+                f"at {(k + 1) / rate_hz:.3f} s the platform is at {states[k + 1, :3]} m, more than "
+                f"{LARGEST_REACH:g} frames away: the currents pull it out; take smaller ones"
+            )
+    tensions = evaluate(model.motion, states, currents, theta)[1]
+    times = np.arange(len(references)) / rate_hz
+    return DrivenMotion(model, theta, times, states, currents, references, tensions, steps)
+
+
+def _check(
+    model: DrivenModel, state: Array, references: Array, start: Array, rate_hz: float
+) -> None:
+    n = model.n_cables
+    if np.shape(state) != (N_STATE,) or not np.isfinite(state).all():
+        raise ValueError(f"state has shape {np.shape(state)}, must be {N_STATE} finite numbers")
+    if references.ndim != 2 or references.shape[1] != n or len(references) < 2:
+        raise ValueError(f"references_A has shape {references.shape}, must be (2 or more, {n})")
+    if not (np.isfinite(references).all() and start.shape == (n,) and np.isfinite(start).all()):
+        raise ValueError("references_A and currents_A must be finite, one number a motor")
+    if not rate_hz > 0.0:
+        raise ValueError(f"rate_hz is {rate_hz}, must be > 0")
+    norm = float(np.linalg.norm(state[3:7]))
+    if abs(norm - 1.0) > 1e-6:
+        raise ValueError(f"the start's quaternion has norm {norm:.6f}, must be 1 within 1e-6")
