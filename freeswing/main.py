@@ -24,6 +24,7 @@ COMMANDS = (
     "convert",
     "export",
     "simulate",
+    "linearise",
     "effects",
     "board",
     "home",

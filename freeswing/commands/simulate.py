@@ -1,4 +1,4 @@
-"""Simulate a free swing of a robot, with any effects, into a trajectory file."""
+"""Simulate a free swing, or the motion of a driven robot, with any effects, into a file."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from freeswing.commands.simulate_drive import add_drive_arguments, run_drive
 from freeswing.console import Console
 
 if TYPE_CHECKING:
@@ -20,7 +21,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("robot", metavar="ROBOT", help="robot.toml with nominal inertia")
     parser.add_argument("result", metavar="TO", help="trajectory to write, .csv or .tum")
     parser.add_argument(
-        "--lengths-m", required=True, type=_numbers, metavar="L1,L2,..", help="cable lengths"
+        "--lengths-m", type=_numbers, metavar="L1,L2,..", help="cable lengths of a free swing"
     )
     parser.add_argument(
         "--effect", action="append", default=[], metavar="NAME", help="an effect; may be repeated"
@@ -35,10 +36,11 @@ def add_arguments(parser: ArgumentParser) -> None:
     )
     parser.add_argument("--amplitude-m", type=float, default=0.03, help="release, default 0.03")
     parser.add_argument("--duration-s", type=float, default=10.0, help="default 10")
-    parser.add_argument("--rate-hz", type=float, default=100.0, help="default 100")
+    parser.add_argument("--rate-hz", type=float, help="default 100; of a driven robot 1000")
     parser.add_argument("--noise-m", type=float, default=0.0, help="std of each coordinate")
     parser.add_argument("--noise-rad", type=float, default=0.0, help="std of each angle")
     parser.add_argument("--seed", type=int, default=0, help="decides the release and the noise")
+    add_drive_arguments(parser)
 
 
 def run(options: Namespace, console: Console) -> None:
@@ -49,6 +51,13 @@ def run(options: Namespace, console: Console) -> None:
     from freeswing.cdpr.files.trajectory_files import write_csv, write_tum
     from freeswing.cdpr.measured.trajectory import Trajectory
 
+    if options.rate_hz is None:
+        options.rate_hz = 1000.0 if options.drive else 100.0
+    if options.drive:
+        run_drive(options, console)
+        return
+    if options.lengths_m is None:
+        raise InputError("give --lengths-m for a free swing, or --drive for a driven robot")
     result = Path(options.result)
     writers = {".csv": write_csv, ".tum": write_tum}
     if result.suffix.lower() not in writers:

@@ -1,0 +1,66 @@
+"""The linear model of a driven robot about a pose: matrices, modes, singular values."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+
+from freeswing.commands.arguments import add_results
+from freeswing.console import Console
+
+RATES = (0.1, 1000.0)  # rad/s, as Fig. 8 of the paper spans its resonances
+N_RATES = 400
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """The robot and the pose."""
+    parser.add_argument("robot", metavar="ROBOT", help="robot.toml with [drive]")
+    parser.add_argument(
+        "--at",
+        type=float,
+        nargs=6,
+        default=(0.0,) * 6,
+        metavar=("X", "Y", "Z", "ROLL", "PITCH", "YAW"),
+        help="pose in m and rad, R = Rz(yaw) Ry(pitch) Rx(roll); default the origin",
+    )
+    add_results(parser, "ROBOT's folder/results")
+
+
+def run(options: Namespace, console: Console) -> None:
+    """Linearise, write matrices and picture, say the modes."""
+    import numpy as np
+
+    from freeswing.cdpr.driven.linear import linear_model, modes
+    from freeswing.cdpr.driven.model import build_driven
+    from freeswing.cdpr.files.documents import InputError, replace_file, write_json
+    from freeswing.cdpr.files.robot_file import read_robot
+    from freeswing.printing.curves import log_log_svg
+    from freeswing.results.linear import linear_document, linear_panels
+
+    path, at = Path(options.robot), np.array(options.at)
+    robot = read_robot(path)
+    if robot.drive is None:
+        raise InputError(f"{path}: has no [drive]: only a driven robot has this linear model")
+    low, high = robot.entries_m.min(axis=0), robot.entries_m.max(axis=0)
+    if ((at[:3] <= low) | (at[:3] >= high)).any() or np.abs(at[3:]).max() > np.pi:
+        raise InputError(
+            f"--at {' '.join(f'{v:g}' for v in at)}: outside the robot's frame, "
+            f"{low.round(3).tolist()} to {high.round(3).tolist()} m (angles within +-pi rad)"
+        )
+    linear = linear_model(build_driven(robot), at)
+    found, rates = modes(linear), np.geomspace(*RATES, N_RATES)
+    folder = path.parent / "results" if options.results is None else Path(options.results)
+    response = linear.response(rates)
+    write_json(folder / "linear.json", linear_document(robot.name, linear, found, rates, response))
+    replace_file(folder / "linear.svg", log_log_svg(linear_panels(rates, response)))
+    for mode in found:
+        swings = f"damping {mode.damping:.3f}" if mode.damping < 1.0 else "does not swing"
+        console.say(f"  {mode.rate_rad_s:7.3f} rad/s  {swings}  {mode.words}")
+    if any(mode.damping < 0.0 for mode in found):
+        console.complain(
+            "a mode grows: a wrench held in base axes does not hold the platform at this pose; "
+            "the controller must"
+        )
+    console.say(str(folder / "linear.svg"))
+    console.say(str(folder / "linear.json"))
+    console.show_file(folder / "linear.json")
