@@ -1,0 +1,141 @@
+"""What the house looks like: few files a room, short files and functions, all rooms named."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import tomllib
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from tests.places import ROOT
+
+FLOORS = ("calib", "cdpr", "excite", "freeswing", "homing", "ident", "servo", "vision")
+MOST_FILES = 16
+# One file a command, named as it is typed: there is nothing to search for.
+MOST_COMMANDS = 24
+MOST_FILE_LINES = 400
+MOST_FUNCTION_LINES = 80
+MEAN_COMPLEXITY = 2.5
+
+# What still stands over a limit. It only becomes fewer: whoever mends one takes its line out.
+LONG_FUNCTIONS = {
+    "calib/calibrate.py:calibrate_session",
+    "calib/rig/reprojection_kernels.py:view_rows",
+    "calib/rig/reprojection_kernels.py:add_views",
+    "calib/tags/corner_kernels.py:accumulate",
+    "calib/tags/corner_kernels.py:fit_pattern",
+    "vision/fuse/pose_kernels.py:solve_instant",
+    "vision/render/render_kernels.py:sample_plane",
+    "vision/rig/rig_kernels.py:add_rig_equations",
+}
+# Files that ruff is told not to count arguments or branches of.
+MOST_PARDONED_FILES = 8
+
+# What ruff's C901 counts.
+BRANCHES = (ast.If, ast.For, ast.While, ast.AsyncFor, ast.ExceptHandler, ast.match_case)
+
+
+def sources() -> list[Path]:
+    """Python files of the product, each once: symlinks are not followed."""
+    return [path for floor in FLOORS for path in _walk(ROOT / floor)]
+
+
+def _walk(folder: Path) -> list[Path]:
+    found = []
+    for path in sorted(folder.iterdir()):
+        if path.is_dir() and not path.is_symlink() and path.name != "__pycache__":
+            found += _walk(path)
+        elif path.suffix == ".py":
+            found.append(path)
+    return found
+
+
+SOURCES = sources()
+FUNCTIONS = [
+    (path, node)
+    for path in SOURCES
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+    if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
+]
+
+
+def name_of(path: Path) -> str:
+    return path.relative_to(ROOT).as_posix()
+
+
+def test_there_is_a_house() -> None:
+    assert len(SOURCES) > 250, len(SOURCES)
+    assert len(FUNCTIONS) > 1500, len(FUNCTIONS)
+
+
+def test_no_room_is_crowded() -> None:
+    counts = Counter(path.parent for path in SOURCES if path.name != "__init__.py")
+    tests = [path for path in _walk(ROOT / "tests") if "oracle" not in path.parts]
+    counts += Counter(path.parent for path in tests)
+    limits = {ROOT / "freeswing" / "commands": MOST_COMMANDS}
+    crowded = {name_of(p): n for p, n in counts.items() if n > limits.get(p, MOST_FILES)}
+    assert crowded == {}, crowded
+
+
+def test_every_room_says_what_lives_there() -> None:
+    rooms = {path.parent for path in SOURCES}
+    silent = [
+        name_of(room)
+        for room in rooms
+        if not (room / "__init__.py").is_file()
+        or not ast.get_docstring(ast.parse((room / "__init__.py").read_text(encoding="utf-8")))
+    ]
+    assert silent == [name_of(ROOT / "freeswing")] or silent == [], silent
+
+
+def test_no_file_is_long() -> None:
+    lines = {name_of(p): len(p.read_text(encoding="utf-8").splitlines()) for p in SOURCES}
+    long = {name: n for name, n in lines.items() if n > MOST_FILE_LINES}
+    assert long == {}, long
+
+
+def test_no_function_is_long() -> None:
+    lines = {f"{name_of(p)}:{f.name}": (f.end_lineno or 0) - f.lineno + 1 for p, f in FUNCTIONS}
+    long = {name: n for name, n in lines.items() if n > MOST_FUNCTION_LINES}
+    new = {name: n for name, n in long.items() if name not in LONG_FUNCTIONS}
+    assert new == {}, f"over {MOST_FUNCTION_LINES} lines: {new}"
+    assert set(long) == LONG_FUNCTIONS, f"mended, take out: {sorted(LONG_FUNCTIONS - set(long))}"
+
+
+def complexity(function: ast.AST) -> int:
+    """McCabe's number: branches plus one."""
+    return 1 + sum(isinstance(node, BRANCHES) for node in ast.walk(function))
+
+
+def test_functions_are_simple_on_the_whole() -> None:
+    """Ruff holds the greatest (C901, at most 15); this is the mean."""
+    mean = sum(complexity(function) for _, function in FUNCTIONS) / len(FUNCTIONS)
+    assert mean <= MEAN_COMPLEXITY, f"mean complexity {mean:.2f}"
+
+
+def test_pardons_of_the_linter_become_fewer() -> None:
+    with (ROOT / "pyproject.toml").open("rb") as file:
+        ignores = tomllib.load(file)["tool"]["ruff"]["lint"]["per-file-ignores"]
+    pardoned = [name for name in ignores if name.endswith(".py")]
+    assert len(pardoned) <= MOST_PARDONED_FILES, pardoned
+    noqa = [name_of(p) for p in SOURCES if "noqa: C901" in p.read_text(encoding="utf-8")]
+    assert noqa == [], noqa
+
+
+@pytest.mark.parametrize("floor", [name for name in FLOORS if name != "freeswing"])
+def test_floors_are_reached_through_the_package(floor: str) -> None:
+    """`import freeswing.<floor>` finds the folder at the top, whatever lies in the way."""
+    link = ROOT / "freeswing" / floor
+    assert link.resolve() == (ROOT / floor).resolve(), link
+    kept = subprocess.run(
+        ["git", "ls-files", "-s", f"freeswing/{floor}"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if kept.returncode == 0 and kept.stdout:
+        assert kept.stdout.startswith("120000"), f"not a symbolic link in git: {kept.stdout}"
