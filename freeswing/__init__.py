@@ -1,3 +1,11 @@
 """The front door: session files, commands and the report."""
 
+from pathlib import Path
+
 __version__ = "0.1.0"
+
+if not (Path(__file__).parent / "cdpr").is_dir():
+    raise ImportError(
+        "freeswing/cdpr and its neighbours are symbolic links to the folders beside freeswing/, and "
+        "this checkout has files instead: git config core.symlinks true, git checkout -- freeswing"
+    )

@@ -69,6 +69,17 @@ def test_ones_own_modules_are_never_imported(own_files: Path) -> None:
     assert top_level == "[]", f"imported from the top: {top_level}"
 
 
+def test_a_checkout_without_symbolic_links_says_so(tmp_path: Path) -> None:
+    """As git leaves it where links are not allowed: small files that hold the links' targets."""
+    package = tmp_path / "freeswing"
+    package.mkdir()
+    shutil.copy(ROOT / "freeswing" / "__init__.py", package)
+    (package / "cdpr").write_text("../cdpr", encoding="utf-8")
+    done = run(sys.executable, ["-c", "import freeswing"], tmp_path, str(tmp_path))
+    assert done.returncode == 1, done.stdout
+    assert "git config core.symlinks true" in done.stderr, done.stderr
+
+
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A wheel built from a copy of what git holds, so that nothing is left in the tree."""
