@@ -9,10 +9,19 @@ import numpy as np
 from freeswing.cdpr.robot import Robot
 from freeswing.doctor.finding import Finding
 
+# Millimetres given as metres are a thousand times too large: stadium cameras hang on 200 m, and
+# the smallest laboratory frame, 0.3 m, would read 300.
 LARGEST_FRAME_M = 200.0
+# A platform of 30 mm would read 30 m; none that hangs on cables is larger than 20 m.
 LARGEST_PLATFORM_M = 20.0
+# The smallest groove, 1 mm, would read 1 m; drums of cranes reach half a metre in radius.
 LARGEST_PULLEY_M = 0.5
-GRAVITY_RANGE_M_S2 = (9.70, 9.90)
+# At sea level 9.780 at the equator to 9.832 at the poles (WGS 84), 0.003 less a kilometre up; wider
+# by what people round off: 9.7 and 9.9 are slips, 9.8 and 9.81 are not.
+LEAST_GRAVITY_M_S2 = 9.70
+MOST_GRAVITY_M_S2 = 9.90
+# Two holes nearer than a millimetre are one hole, or a line that was copied.
+SAME_POINT_M = 1e-3
 
 
 def robot_findings(robot: Robot) -> Iterator[Finding]:
@@ -27,7 +36,7 @@ def robot_findings(robot: Robot) -> Iterator[Finding]:
             text = f"{key} reaches {largest:g} m, more than {limit:g} m"
             yield Finding("error", "robot", text, "all lengths are in metres")
     gravity = float(np.linalg.norm(robot.gravity_m_s2))
-    low, high = GRAVITY_RANGE_M_S2
+    low, high = LEAST_GRAVITY_M_S2, MOST_GRAVITY_M_S2
     if not low <= gravity <= high:
         text = f"gravity is {gravity:.4g} m/s², on Earth {low} to {high}"
         yield Finding("warning", "robot", text, "check gravity_m_s2")
@@ -50,6 +59,6 @@ def _together(robot: Robot) -> Iterator[Finding]:
     names = [cable.name for cable in robot.cables]
     for points, what in ((robot.attachments_m, "attachment_m"), (robot.entries_m, "entry_m")):
         gaps = np.linalg.norm(points[:, None] - points[None], axis=2)
-        for i, k in np.argwhere(np.triu(gaps < 1e-3, 1)):
+        for i, k in np.argwhere(np.triu(gaps < SAME_POINT_M, 1)):
             text = f"cables {names[i]} and {names[k]} have the same {what}"
             yield Finding("note", "robot", text, "check for a copied line if that is not meant")

@@ -14,13 +14,29 @@ from freeswing.cdpr.robot import Robot
 from freeswing.doctor.finding import Finding
 from freeswing.ident.runs import SwingRun
 
+# The slowest modes of a metre of cable take 2 s: two and a half periods tell its frequency.
 WORTHWHILE_WINDOW_S = 5.0
+# A twentieth missing costs a fortieth of the accuracy; but the same share in one piece costs more.
 MOST_MISSING = 0.05
+# A quarter of the period of the fastest modes, 2.5 Hz: longer gaps are not bridged but left.
 LONGEST_GAP_S = 0.1
+# Cameras keep their rate to 0.01 %, stamps rounded to a millisecond at 100 Hz to 1 % or better;
+# 30 against 29.97 Hz is meant to pass, 50 against 60 is not.
 RATE_TOLERANCE = 0.02
+# Beyond every hall; and beside it twenty times the pulleys' own distance, for stadium cameras.
 FARTHEST_M = 100.0
+FARTHEST_REACHES = 20.0
+# Locked cables keep their length to the poses' noise: 0.1 to 0.5 mm, of which 98 % of the samples
+# span 4.7 deviations. 3 mm is more than that, and less than any slip of a drum's turn.
 LENGTH_CHANGE_M = 0.003
+# Told lengths come from a tape or from counted turns, good to a few mm; 20 mm is another datum.
 LENGTH_DIFFERENCE_M = 0.02
+# Swings of use are 10 mm and more; 0.1 mm is what standing platforms show as noise.
+HARDLY_MOVES_M = 1e-4
+# The shortest filter needs eight.
+LEAST_SAMPLES = 8
+# A dropped frame doubles a step; jitter of the stamps stays below half a step.
+SKIPPED_STEPS = 1.5
 
 
 def run_findings(run: SwingRun, robot: Robot, frame_rate_hz: float | None) -> Iterator[Finding]:
@@ -45,15 +61,17 @@ def run_findings(run: SwingRun, robot: Robot, frame_rate_hz: float | None) -> It
 
 
 def _stamps(subject: str, trajectory: Trajectory, rate_hz: float | None) -> Iterator[Finding]:
-    if len(trajectory) < 8:
-        yield Finding("error", subject, f"{len(trajectory)} samples, at least 8 are needed")
+    if len(trajectory) < LEAST_SAMPLES:
+        yield Finding(
+            "error", subject, f"{len(trajectory)} samples, at least {LEAST_SAMPLES} are needed"
+        )
         return
     found = trajectory.sample_rate_hz
     if rate_hz is not None and abs(found / rate_hz - 1.0) > RATE_TOLERANCE:
         text = f"samples come at {found:.2f} Hz, the session says {rate_hz:g} Hz"
         yield Finding("warning", subject, text, "check frame_rate_hz and the time stamps")
     steps = np.diff(trajectory.times_s)
-    skipped = int((steps > 1.5 * np.median(steps)).sum())
+    skipped = int((steps > SKIPPED_STEPS * np.median(steps)).sum())
     if skipped:
         text = f"time stamps jump {skipped} times, at most by {steps.max():.3f} s"
         yield Finding("note", subject, text, "dropped frames are bridged or left out")
@@ -91,11 +109,11 @@ def _places(subject: str, part: Trajectory, robot: Robot) -> Iterator[Finding]:
         return
     farthest = float(np.nanmax(np.abs(part.values[:, lengths])))
     reach = float(np.abs(robot.entries_m).max())
-    if farthest > max(FARTHEST_M, 20.0 * reach):
+    if farthest > max(FARTHEST_M, FARTHEST_REACHES * reach):
         text = f"the platform is {farthest:g} m from the origin, the pulleys within {reach:g} m"
         yield Finding("error", subject, text, "the unit is metres")
     still = float(np.nanmax(np.nanstd(part.values[:, lengths], axis=0)))
-    if still < 1e-4:
+    if still < HARDLY_MOVES_M:
         text = f"the platform hardly moves (std {1e3 * still:.3f} mm)"
         yield Finding("warning", subject, text, "set it swinging, or correct window_s")
 

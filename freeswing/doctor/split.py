@@ -13,6 +13,7 @@ from freeswing.ident.runs import SwingRun
 from freeswing.session.provenance import hashes
 from freeswing.session.session_file import Run, Session
 
+# One run left out leaves two, which still disagree with each other where something is wrong.
 FEWEST_IDENTIFY = 3
 
 

@@ -1,0 +1,37 @@
+"""Constants that decide something: each has its reason at its line and tests that hold it."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.house.wreck import HELD, LARGER, SMALLER, line_of, wrecked
+from tests.places import ROOT
+
+NAMED = [(held.file, name, held.tests) for held in HELD for name in held.names]
+
+
+def test_each_is_named_once() -> None:
+    assert len({(file, name) for file, name, _ in NAMED}) == len(NAMED) > 30
+
+
+@pytest.mark.parametrize(("file", "name", "tests"), NAMED)
+def test_a_held_constant_says_why_it_is_what_it_is(file: str, name: str, tests: str) -> None:
+    """A comment stands at its line, or above the block of constants that it belongs to."""
+    lines = (ROOT / file).read_text(encoding="utf-8").splitlines()
+    (place,) = [k for k, line in enumerate(lines) if line.startswith(f"{name} = ")]
+    above = place
+    while above > 0 and " = " in lines[above - 1] and lines[above - 1][0].isupper():
+        above -= 1
+    assert "  # " in lines[place] or lines[above - 1].startswith("# "), lines[place]
+    for path in tests.split():
+        assert (ROOT / path.partition("::")[0]).is_file(), path
+
+
+def test_a_wreck_changes_one_number_and_nothing_else() -> None:
+    text = "A = 3\nB = 0.5  # why\nC = 10 * 2\n"
+    assert wrecked(text, "A", LARGER) == "A = 4\nB = 0.5  # why\nC = 10 * 2\n"
+    assert wrecked(text, "A", SMALLER) == "A = 2\nB = 0.5  # why\nC = 10 * 2\n"
+    assert wrecked(text, "B", LARGER) == "A = 3\nB = 0.625  # why\nC = 10 * 2\n"
+    assert wrecked(text, "C", SMALLER) == "A = 3\nB = 0.5  # why\nC = 16\n"
+    with pytest.raises(ValueError, match="no line gives D a number"):
+        line_of(text, "D")

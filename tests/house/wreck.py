@@ -1,0 +1,162 @@
+"""Wrecks each held decision constant by itself and demands that a default test fails.
+
+    python -m tests.house.wreck                      # all of them, in a copy of the tree
+    python -m tests.house.wreck grades LEAST_VIEWS   # those whose place holds one of the words
+
+Each constant is made larger and smaller in turn; the tests named beside it must turn red both
+times. Exit status 1 names what no test noticed. One wreck takes the start of one pytest: two to
+five seconds on a quiet core.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+from tests.places import ROOT
+
+COPIED = (
+    "calib", "cdpr", "excite", "freeswing", "homing", "ident", "servo", "vision", "tests",
+    "pyproject.toml",
+)  # fmt: skip
+# By how much a constant is moved: a test on both sides of it, within a few percent, sees this.
+LARGER, SMALLER = 1.25, 0.8
+
+
+@dataclass(frozen=True, slots=True)
+class Held:
+    """Constants of one file, and the default tests that hold them on both sides.
+
+    Attributes:
+        file: from the repository's root.
+        names: of the constants.
+        tests: what pytest is given.
+    """
+
+    file: str
+    names: tuple[str, ...]
+    tests: str
+
+
+HELD = (
+    Held(
+        "calib/verdict/grades.py",
+        (
+            "LEAST_VIEWS", "GOOD_VIEWS", "LEAST_TILT_DEG", "GOOD_TILT_DEG", "LEAST_FILLED",
+            "GOOD_FILLED", "WORST_FOCAL_STD", "GOOD_FOCAL_STD", "WORST_PX", "WORST_HELD_OUT",
+            "GOOD_HELD_OUT", "WORST_LENGTH_BIAS", "GOOD_LENGTH_BIAS", "WORST_VOLUME_M",
+            "GOOD_VOLUME_M", "WORST_DROPPED", "WORST_RIG_OVER_ALONE", "LEAST_ALONE_PX",
+        ),
+        "tests/calib/verdict/test_grades.py",
+    ),
+    Held(
+        "freeswing/doctor/geometry.py",
+        (
+            "LARGEST_FRAME_M", "LARGEST_PLATFORM_M", "LARGEST_PULLEY_M", "LEAST_GRAVITY_M_S2",
+            "MOST_GRAVITY_M_S2", "SAME_POINT_M",
+        ),
+        "tests/freeswing/doctor/test_doctor.py",
+    ),
+    Held(
+        "freeswing/doctor/motion.py",
+        (
+            "WORTHWHILE_WINDOW_S", "MOST_MISSING", "LONGEST_GAP_S", "RATE_TOLERANCE", "FARTHEST_M",
+            "FARTHEST_REACHES", "LENGTH_CHANGE_M", "LENGTH_DIFFERENCE_M", "HARDLY_MOVES_M",
+            "LEAST_SAMPLES", "SKIPPED_STEPS",
+        ),
+        "tests/freeswing/doctor/test_doctor.py",
+    ),
+    Held(
+        "freeswing/doctor/split.py", ("FEWEST_IDENTIFY",), "tests/freeswing/doctor/test_doctor.py"
+    ),
+)  # fmt: skip
+
+
+def line_of(text: str, name: str) -> re.Match[str]:
+    """The line that gives a constant its number, as (before, number, after).
+
+    Raises:
+        ValueError: where there is none, or where it is not a plain number.
+    """
+    found = re.search(rf"(?m)^({name} = )(-?[0-9][0-9_.e*/ +-]*?)((?:  #.*)?)$", text)
+    if found is None:
+        raise ValueError(f"no line gives {name} a number: rename it in tests/house/wreck.py too")
+    return found
+
+
+def wrecked(text: str, name: str, factor: float) -> str:
+    """The file's text with one constant made larger or smaller; counts by at least one."""
+    found = line_of(text, name)
+    value = eval(found[2], {"__builtins__": {}})
+    moved: float = value * factor
+    if isinstance(value, int):
+        moved = max(value + 1, round(moved)) if factor > 1.0 else min(value - 1, round(moved))
+    return f"{text[: found.start()]}{found[1]}{moved!r}{found[3]}{text[found.end() :]}"
+
+
+def copied(folder: Path) -> Path:
+    """A copy of what the tests need, links as links."""
+    for name in COPIED:
+        source = ROOT / name
+        if source.is_dir():
+            ignored = shutil.ignore_patterns("__pycache__")
+            shutil.copytree(source, folder / name, symlinks=True, ignore=ignored)
+        else:
+            shutil.copy(source, folder / name)
+    (folder / "samples").symlink_to(ROOT / "samples")
+    return folder
+
+
+def fails(tree: Path, tests: str) -> bool:
+    """Whether the tests fail there, for a reason of their own."""
+    words = ["-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *tests.split()]
+    done = subprocess.run(
+        [sys.executable, *words], cwd=tree, capture_output=True, text=True, check=False
+    )
+    if done.returncode not in (0, 1):
+        raise RuntimeError(f"pytest could not be run on {tests}:\n{done.stdout}{done.stderr}")
+    return done.returncode == 1
+
+
+def unnoticed(tree: Path, held: Held, name: str) -> list[str]:
+    """Which ways of wrecking a constant no test noticed."""
+    path = tree / held.file
+    whole = path.read_text(encoding="utf-8")
+    missed = []
+    for word, factor in (("larger", LARGER), ("smaller", SMALLER)):
+        path.write_text(wrecked(whole, name, factor), encoding="utf-8")
+        if not fails(tree, held.tests):
+            missed.append(f"{held.file}: {name} made {word}")
+    path.write_text(whole, encoding="utf-8")
+    return missed
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("words", nargs="*", help="only constants whose file or name holds one")
+    words = parser.parse_args().words
+    chosen = [
+        (held, name)
+        for held in HELD
+        for name in held.names
+        if not words or any(word in f"{held.file} {name}" for word in words)
+    ]
+    missed: list[str] = []
+    with tempfile.TemporaryDirectory() as folder:
+        tree = copied(Path(folder))
+        for held, name in chosen:
+            now = unnoticed(tree, held, name)
+            print(f"{'MISSED' if now else 'held  '} {held.file}: {name}", flush=True)  # noqa: T201
+            missed += now
+    print(f"{2 * len(chosen)} wrecks, {len(missed)} unnoticed", *missed, sep="\n  ")  # noqa: T201
+    return 1 if missed or not chosen else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
