@@ -145,6 +145,29 @@ class StartProblem:
             prior_weight,
         )
 
+    def whitened_readings(self, noise: ReadingNoise) -> Array:
+        """Swivels and lengths over their noise, (N, 2 n); zero where nothing was read."""
+        return (self._filled / self.row_std(noise))[:, self._offset_rows]
+
+    def one_row(
+        self, noise: ReadingNoise, row: int, poses: Array, borders: Array
+    ) -> tuple[Array, Array]:
+        """Whitened residuals (k, m) of one row at poses (k, 6), and their derivatives (k, m, 6).
+
+        Args:
+            noise: of the readings.
+            row: which of the static poses.
+            poses: guesses of it, (k, 6).
+            borders: the start's swivels and lengths that belong to each guess, (k, 2 n).
+        """
+        found = self.model.evaluate(poses)
+        residuals = found.values - self._filled[row]
+        residuals[:, self._offset_rows] -= borders
+        angles = residuals[:, self._angular]
+        residuals[:, self._angular] = np.remainder(angles + np.pi, 2 * np.pi) - np.pi
+        scale = self.present[row] / self.row_std(noise)
+        return residuals * scale, found.by_pose * scale[:, None]
+
     def solve(
         self, noise: ReadingNoise, poses: Array, border: Array, loss_limit: float = np.inf
     ) -> ArrowSolution:
@@ -170,15 +193,14 @@ class StartProblem:
             solution = self.solve(noise, solution.blocks, solution.border, LOSS_LIMIT)
             if count and np.allclose(solution.border, first.border, rtol=0, atol=1e-13):
                 break
-        spread = covariance(solution.linearization, solution.weights)
-        self._check(solution, spread)
+        spread = self._spread(solution)
         return self._result(solution, spread, noise)
 
     def _scaled(self, noise: ReadingNoise, solution: ArrowSolution) -> ReadingNoise:
         """Noise of swivel angles and lengths as the residuals show it, wrong readings aside."""
         part = self.linearize(noise, solution.blocks, solution.border)
         weights = huber_weights(part.residuals, LOSS_LIMIT)
-        left = 1 - covariance(part, weights).predicted(part.by_block, part.by_border)
+        left = 1 - self._determined(part, weights).predicted(part.by_block, part.by_border)
         ratio = {}
         for kind in ("sigma", "length"):
             columns = self.model.columns(kind)
@@ -192,17 +214,30 @@ class StartProblem:
             length_m=max(noise.length_m * ratio["length"], _SMALLEST_NOISE),
         )
 
-    def _check(self, solution: ArrowSolution, spread: ArrowCovariance) -> None:
+    def _spread(self, solution: ArrowSolution) -> ArrowCovariance:
+        """The covariance, where there is one."""
         if not solution.converged:
+            worst = np.argsort((solution.weights * solution.linearization.residuals**2).sum(axis=1))
+            rows = ", ".join(str(k + 2) for k in worst[:-4:-1])
             raise DataError(
-                f"the start pose was not found: {solution.stop}; check start_tensions_N and the "
-                "signs of the readings"
+                f"the start pose was not found: {solution.stop}; the readings in lines {rows} fit "
+                "worst: look at their signs and units, and at the robot's cables"
             )
-        if spread.rank < self.n_border:
+        return self._determined(solution.linearization, solution.weights)
+
+    def _determined(self, linearization: Linearization, weights: Array) -> ArrowCovariance:
+        """The covariance of what all poses determine."""
+        try:
+            spread = covariance(linearization, weights)
+            rank = spread.rank
+        except np.linalg.LinAlgError:  # a pose whose own readings leave it undetermined
+            spread, rank = None, 0
+        if spread is None or rank < self.n_border:
             raise DataError(
-                f"{len(self.data)} static poses determine {spread.rank} of the "
+                f"{len(self.data)} static poses determine {rank} of the "
                 f"{2 * self.n} start angles and lengths; record more, with every cable tightened"
             )
+        return spread
 
     def _result(
         self, solution: ArrowSolution, spread: ArrowCovariance, noise: ReadingNoise

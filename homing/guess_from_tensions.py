@@ -76,6 +76,9 @@ class TensionEnergy:
         """
         poses = np.array(poses, dtype=np.float64)
         forces = (pulls, np.zeros(6) if pushes is None else pushes)
+        inside = np.isfinite(evaluate_evenly(self._all, poses, *forces)[2]).all(axis=(1, 2))
+        if not inside.all():  # a start within a pulley, or at angles that no rotation has
+            return self._among(inside, poses, forces)
         energy, slope, curvature = evaluate_evenly(self._all, poses, *forces)
         for _ in range(_MOST_STEPS):
             values, vectors = np.linalg.eigh(curvature)
@@ -92,6 +95,18 @@ class TensionEnergy:
         settled = (np.abs(slope).max(axis=1) < 1e-6) & (stiffness > 0)
         return StableRest(poses, settled, stiffness)
 
+    def _among(
+        self, inside: NDArray[np.bool_], poses: Array, forces: tuple[Array, Array]
+    ) -> StableRest:
+        """Settle the starts that can be computed; the others stay where they are, unsettled."""
+        settled, stiffness = np.zeros(len(poses), dtype=bool), np.full(len(poses), -np.inf)
+        if inside.any():
+            pulls, pushes = (f[inside] if f.ndim > 1 else f for f in forces)
+            rest = self.settle(poses[inside], pulls, pushes)
+            poses[inside], settled[inside] = rest.poses, rest.settled
+            stiffness[inside] = rest.smallest_stiffness
+        return StableRest(poses, settled, stiffness)
+
     def _descend(
         self, poses: Array, forces: tuple[Array, Array], energy: Array, step: Array
     ) -> tuple[Array, tuple[Array, Array, Array]]:
@@ -100,10 +115,11 @@ class TensionEnergy:
         while True:
             trial = poses + share * step
             found = evaluate_evenly(self._all, trial, *forces)
-            uphill = ~(found[0] <= energy + 1e-12)
-            if not uphill.any() or halvings == _MOST_HALVINGS:
+            outside = ~np.isfinite(found[2]).all(axis=(1, 2))  # within a pulley, say
+            uphill = ~(found[0] <= energy + 1e-12) | outside
+            if not uphill.any() or halvings > _MOST_HALVINGS:
                 return trial, (found[0], found[1], found[2])
-            share[uphill] *= 0.5
+            share[uphill] *= 0.5 if halvings < _MOST_HALVINGS else 0.0
             halvings += 1
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,14 +16,17 @@ from numpy.typing import NDArray
 
 from freeswing.cdpr.files.documents import DataError, write_json
 from freeswing.cdpr.robot import Robot
-from freeswing.homing.fit_start_pose import StartFit, StartProblem
+from freeswing.homing.arrow_least_squares import ArrowSolution
+from freeswing.homing.fit_start_pose import LOSS_LIMIT, StartFit, StartProblem
 from freeswing.homing.guess_from_tensions import (
     TensionEnergy,
     acquisition_tensions,
     free_indices,
     stable_starts,
 )
-from freeswing.homing.homing_files import GeometryNoise, Homing, read_homing
+from freeswing.homing.homing_files import GeometryNoise, Homing, ReadingNoise, read_homing
+from freeswing.homing.many_starts import far_rows, many_starts, rank_starts
+from freeswing.homing.reading_mistakes import likely_mistake
 from freeswing.homing.rest_readings import RestModel, geometry_labels
 
 Array = NDArray[np.float64]
@@ -31,6 +34,9 @@ Progress = Callable[[str, float], None]
 
 _GOOD_FIT = 9.0
 _DOUBTFUL_FIT = 4.0
+# Mean squares over the noise's: a geometry that is some millimetres off leaves tens to thousands,
+# a wrong start, unit or sign a million and more.
+_FAR_OFF = 1e4
 _SUSPECT_WEIGHT = 0.6
 _WEIGHTS_OF_A_GUESS = 1.5
 
@@ -83,8 +89,16 @@ def find_start(homing: Homing) -> StartFit:
         raise DataError("platform.com_m is missing in the robot file: equilibrium needs it")
     energy = TensionEnergy(homing.robot)
     guesses = guess_poses(homing, energy)
+    guesses = guesses or [
+        np.tile(pose, (count, 1)) for pose in many_starts(energy, homing.robot.n_cables)[:1]
+    ]
+    if not guesses:
+        raise DataError(
+            f"{homing.robot.name} hangs at no stable pose, whatever the tensions: correct "
+            "platform.com_m, gravity_m_s2 or the cables' entry_m and attachment_m"
+        )
     model = _model_for(homing, guesses[0][0])
-    fit = _best_fit(StartProblem(homing, model, homing.geometry), homing, guesses)
+    fit = _best_fit(StartProblem(homing, model, homing.geometry), homing, guesses, energy)
     if homing.geometry is not None or fit.chi_square < _DOUBTFUL_FIT * fit.degrees:
         return fit
     doubted = StartProblem(homing, model, GeometryNoise())
@@ -96,10 +110,8 @@ def find_start(homing: Homing) -> StartFit:
 def guess_poses(homing: Homing, energy: TensionEnergy) -> list[Array]:
     """First guesses of all poses, (N, 6) each: one for every stable rest at the start tensions.
 
-    Tensions that were read serve where there are any, else the set-points of the procedure.
-
-    Raises:
-        DataError: no stable rest at the start tensions.
+    Tensions that were read serve where there are any, else the set-points of the procedure. There
+    is no guess where the platform cannot rest at the start tensions.
     """
     robot, readings = homing.robot, homing.readings
     count = len(readings.sigma_rad)
@@ -107,14 +119,8 @@ def guess_poses(homing: Homing, energy: TensionEnergy) -> list[Array]:
     if readings.tension_N is not None:
         tensions = np.where(np.isfinite(readings.tension_N), readings.tension_N, tensions)
     pulls = tensions / _weight_N(robot, homing.start_tensions_N)
-    starts = stable_starts(energy, pulls[0])
-    if not len(starts):
-        raise DataError(
-            f"tensions {np.round(tensions[0], 1)} N hold the platform at no stable pose; "
-            "correct start_tensions_N, platform.mass_kg or the geometry"
-        )
     guesses = []
-    for start in starts[:4]:
+    for start in stable_starts(energy, pulls[0])[:4]:
         rest = energy.settle(np.tile(start, (count, 1)), pulls)
         guesses.append(np.where(rest.settled[:, None], rest.poses, start))
     return guesses
@@ -165,16 +171,102 @@ def _model_for(homing: Homing, pose: Array) -> RestModel:
     )
 
 
-def _best_fit(problem: StartProblem, homing: Homing, guesses: list[Array]) -> StartFit:
-    """The fit of the guess that explains the readings best; the first good one ends the search."""
-    solutions = []
-    for poses in guesses:
-        solution = problem.solve(homing.noise, poses, problem.start_border(poses[0]))
-        solutions.append(solution)
-        if solution.converged and 2 * solution.cost < _GOOD_FIT * problem.degrees:
-            break
-    best = min(solutions, key=lambda solution: (not solution.converged, solution.cost))
+def guess_widely(homing: Homing, starts: Array) -> list[Array]:
+    """Every pose as the best of many starts has it, (N, 6); nothing where none can be computed."""
+    if not len(starts):
+        return []
+    model = _model_for(homing, starts[0])
+    few = replace(homing, readings=homing.readings.rows(far_rows(homing.readings)))
+    problem = StartProblem(few, model, None)
+    best = _solve_from(problem, homing.noise, rank_starts(problem, homing.noise, starts), ROBUST)
+    if best is None:
+        return []
+    return rank_starts(StartProblem(homing, model, None), homing.noise, best.blocks[:1])
+
+
+def _best_fit(
+    problem: StartProblem, homing: Homing, guesses: list[Array], energy: TensionEnergy
+) -> StartFit:
+    """The fit of the guess that explains the readings best; the first good one ends the search.
+
+    Raises:
+        DataError: where none is found, with a mistake in the readings that would explain it.
+    """
+    best = _solve_from(problem, homing.noise, guesses, PLAIN)
+    if PLAIN.explains(best, problem):
+        return problem.finish(best, homing.noise)
+    begun = [best.blocks] if best is not None and best.converged else []
+    near = _solve_from(problem, homing.noise, begun, ROBUST)
+    if ROBUST.explains(near, problem):
+        return problem.finish(near, homing.noise)
+    if near is not None and near.converged and 2 * near.cost < _FAR_OFF * problem.degrees:
+        return problem.finish(near, homing.noise)
+    starts = many_starts(energy, homing.robot.n_cables)
+    wide = _solve_from(problem, homing.noise, guess_widely(homing, starts), ROBUST)
+    if ROBUST.explains(wide, problem):
+        return problem.finish(wide, homing.noise)
+    suspect = likely_mistake(homing, lambda changed: _explained(changed, starts))
+    if suspect or best is None:
+        raise DataError(f"the readings come from no start pose{suspect and ', but do '}{suspect}")
     return problem.finish(best, homing.noise)
+
+
+def _explained(homing: Homing, starts: Array) -> bool:
+    """Whether these readings come from some start pose."""
+    guesses = guess_widely(homing, starts)
+    if not guesses:
+        return False
+    problem = StartProblem(homing, _model_for(homing, guesses[0][0]), None)
+    return ROBUST.explains(_solve_from(problem, homing.noise, guesses, ROBUST), problem)
+
+
+@dataclass(frozen=True, slots=True)
+class Judgement:
+    """When a solution explains the readings.
+
+    Attributes:
+        loss_limit: of Huber's loss in the fit, standard deviations; begun where plain squares end,
+            since its slopes are too flat to lead there from afar.
+        share: of the static poses that must be explained; the worst others are left out.
+    """
+
+    loss_limit: float
+    share: float
+
+    def explains(self, solution: ArrowSolution | None, problem: StartProblem) -> bool:
+        """Whether the squares of that share of the poses are what noise leaves."""
+        if solution is None or not solution.converged:
+            return False
+        squares = np.sort((solution.linearization.residuals**2).sum(axis=1))
+        kept = squares[: int(np.ceil(self.share * len(squares)))]
+        return float(kept.sum()) < _GOOD_FIT * problem.degrees
+
+
+PLAIN = Judgement(np.inf, 1.0)
+ROBUST = Judgement(LOSS_LIMIT, 0.9)  # a mistyped row in ten is told as suspect, not as no start
+
+
+def _solve_from(
+    problem: StartProblem, noise: ReadingNoise, guesses: list[Array], judgement: Judgement
+) -> ArrowSolution | None:
+    """The best solution, or the first good one; None without guesses that can be computed."""
+    best = None
+    for poses in guesses:
+        border = problem.start_border(poses[0])
+        if not np.isfinite(problem.linearize(noise, poses, border).residuals).all():
+            continue
+        solution = problem.solve(noise, poses, border)
+        if np.isfinite(judgement.loss_limit) and solution.converged:
+            blocks, shared = solution.blocks, solution.border
+            solution = problem.solve(noise, blocks, shared, judgement.loss_limit)
+        best = min((best, solution), key=_rank_of_solution)
+        if judgement.explains(best, problem):
+            break
+    return best
+
+
+def _rank_of_solution(solution: ArrowSolution | None) -> tuple[bool, float]:
+    return (True, np.inf) if solution is None else (not solution.converged, solution.cost)
 
 
 def _information_price(fit: StartFit, problem: StartProblem) -> float:

@@ -92,6 +92,12 @@ class Readings:
     tension_N: Array | None = None
     tilt_rad: Array | None = None
 
+    def rows(self, chosen: Array) -> Readings:
+        """Some of the static poses alone."""
+        tension = None if self.tension_N is None else self.tension_N[chosen]
+        tilt = None if self.tilt_rad is None else self.tilt_rad[chosen]
+        return Readings(self.sigma_rad[chosen], self.length_m[chosen], tension, tilt)
+
 
 @dataclass(frozen=True, slots=True)
 class Homing:
