@@ -95,7 +95,7 @@ def track_run(
         corrected.before,
         corrected.after,
         corrected.findings,
-        tuple(_problems(counts, corrected.after, watch)),
+        (*corrected.remarks, *_problems(counts, corrected.after, watch)),
         layout_sums(poses, corrected.after, corrected.views, watch),
     )
 

@@ -16,11 +16,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Executor
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Protocol
 
 from freeswing.calib.board.recordings import Recording, find_recordings
 from freeswing.calib.camera.camera import Camera
+from freeswing.calib.footage.condition import condition_of, torn_text
+from freeswing.calib.footage.frame_times import frame_times, needed
 from freeswing.calib.tags.base_tags import SurveyedTag
 from freeswing.cdpr.files.documents import DataError, InputError, write_json
 from freeswing.cdpr.measured.target import Target
@@ -28,6 +31,7 @@ from freeswing.vision.fuse.calibration_share import read_calibration_noise
 from freeswing.vision.fuse.tag_layout import layout_change, with_layout
 from freeswing.vision.jobs import Job, run_jobs
 from freeswing.vision.look.sightings import collect_sightings
+from freeswing.vision.look.target_check import examined_watch
 from freeswing.vision.look.watched_target import Watch
 from freeswing.vision.settings import Settings
 from freeswing.vision.track_run import RunTrack, track_run
@@ -89,6 +93,9 @@ def track_session(
     if not filmed:
         raise InputError("no run of the session has a video; there is nothing to track")
     pairs = [(run.name, run_recordings(run, cameras)) for run in filmed]
+    remarks = {name: _examined(found, frame_rate_hz) for name, found in pairs}
+    watch, said = examined_watch(watch, pairs[0][1])
+    remarks[pairs[0][0]] += said
     jobs = [
         Job(
             f"{name} {camera.name}",
@@ -108,6 +115,7 @@ def track_session(
             refined = layout_change([track.layout for track in tracks], watch)
             watch = with_layout(watch, refined.corners_m)
             tracks = _fuse(sources, watch, results, settings, workers, told)
+    tracks = [replace(t, problems=(*remarks[t.name], *t.problems)) for t in tracks]
     document = tracking_document(tracks, watch, change, refined=settings.refine_layout)
     write_json(results / "tracking.json", document)
     _refuse_empty(tracks)
@@ -134,6 +142,21 @@ def run_recordings(run: RecordedRun, cameras: Sequence[Camera]) -> list[tuple[Ca
             f"{', '.join(by_name)}: name the files as the cameras are named"
         )
     return [(by_name[name], found[name]) for name in known]
+
+
+def _examined(found: Sequence[tuple[Camera, Recording]], frame_rate_hz: float | None) -> list[str]:
+    """What a run's recordings say of their times that a reader should know.
+
+    Raises:
+        DataError: where a recording's frames are torn, or its stated rates contradict each other.
+    """
+    said = []
+    for camera, recording in found:
+        if condition_of(recording).is_torn:
+            raise DataError(torn_text(recording))
+        times = needed(frame_times(recording, frame_rate_hz), recording)
+        said += [f"{camera.name}: {remark.text}" for remark in times.remarks if remark.is_warning]
+    return said
 
 
 def _by_run(

@@ -22,6 +22,7 @@ from freeswing.cdpr.rotation import exp_rotation
 from freeswing.vision.fuse.tag_layout import with_layout
 from freeswing.vision.look.pieces import Piece, load_piece
 from freeswing.vision.look.sightings import collect_sightings
+from freeswing.vision.look.target_check import examined_watch
 from freeswing.vision.look.watched_target import Watch
 from freeswing.vision.track_session import RecordedRun, run_recordings, sightings_folder
 
@@ -78,9 +79,10 @@ def tracked_run(
     if not csv.is_file() or not told.is_file():
         raise DataError(f"run {run.name}: {csv} is not there; run freeswing track first")
     document = json.loads(told.read_text(encoding="utf-8"))
-    watch = Watch.of(target, base_tags)
+    found = run_recordings(run, cameras)
+    watch, _ = examined_watch(Watch.of(target, base_tags), found)
     seen = []
-    for camera, recording in run_recordings(run, cameras):
+    for camera, recording in found:
         folder = sightings_folder(results, run.name)
         paths = collect_sightings(folder, camera, watch, recording, frame_rate_hz)
         effects = [

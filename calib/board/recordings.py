@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from freeswing.calib.camera.lens_models import Array
+from freeswing.calib.footage.presentation import presentation_of, turn_of, upright
 from freeswing.cdpr.files.documents import InputError, read_text
 
 Image = NDArray[np.uint8]
@@ -112,7 +112,7 @@ def _images(recording: Recording) -> Iterator[tuple[int, str, Image]]:
     for number, path in zip(recording.numbers, recording.images, strict=True):
         _refuse_bomb(path)
         try:
-            image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
+            image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)  # turned as its EXIF asks
         except cv2.error as error:
             reason = str(error.err or error)
             raise InputError(f"{path}: an image that is not read ({reason})") from error
@@ -145,9 +145,12 @@ def _refuse_pixels(path: Path, width: int, height: int) -> None:
 
 
 def _video(recording: Recording) -> Iterator[tuple[int, str, Image]]:
+    """Frames by their place in the order of presentation, turned upright as the file asks."""
     import av
     from av.error import FFmpegError
 
+    shown = presentation_of(recording.path)
+    places = {} if shown is None else {int(tick): k for k, tick in enumerate(shown.ticks)}
     try:
         with av.open(str(recording.path)) as container:
             if not container.streams.video:
@@ -156,28 +159,12 @@ def _video(recording: Recording) -> Iterator[tuple[int, str, Image]]:
             _refuse_pixels(recording.path, stream.width, stream.height)
             stream.thread_type = "AUTO"
             for index, frame in enumerate(container.decode(video=0)):
-                label = f"{recording.path.name} frame {index}"
-                yield index, label, np.asarray(frame.to_ndarray(format="gray"), np.uint8)
+                number = places.get(frame.pts, index) if frame.pts is not None else index
+                label = f"{recording.path.name} frame {number}"
+                image = np.asarray(frame.to_ndarray(format="gray"), np.uint8)
+                yield number, label, upright(image, turn_of(frame))
     except (FFmpegError, OSError) as error:
         raise InputError(f"{recording.path}: cannot be decoded ({error})") from error
-
-
-def read_stamps(recording: Recording) -> dict[int, float] | None:
-    """Stamps in seconds by frame number from `<camera>.csv` beside the recording, None without.
-
-    Raises:
-        InputError: when the file does not hold `frame,t_s` rows with rising stamps.
-    """
-    path = stamp_file(recording)
-    if not path.is_file():
-        return None
-    stamps: dict[int, float] = {}
-    last = -np.inf
-    for row, number, time in stamp_rows(path):
-        if not time > last or number in stamps:
-            raise InputError(f"{path}: line {row}: stamps must rise, one a frame")
-        stamps[number], last = time, time
-    return stamps
 
 
 def stamp_file(recording: Recording) -> Path:
@@ -205,13 +192,3 @@ def stamp_rows(path: Path) -> Iterator[tuple[int, int, float]]:
         if not np.isfinite(time):
             raise InputError(f"{path}: line {row}: the stamp {stamp!r} is not a number of seconds")
         yield row, number, time
-
-
-def stamps_of(recording: Recording, numbers: np.ndarray, frame_rate_hz: float | None) -> Array:
-    """Stamps in seconds of frame numbers: from the csv, else number / rate, NaN without a rate."""
-    stamps = read_stamps(recording)
-    if stamps is not None:
-        return np.array([stamps.get(int(number), np.nan) for number in numbers])
-    if frame_rate_hz is None:
-        return np.full(len(numbers), np.nan)
-    return np.asarray(numbers, dtype=np.float64) / frame_rate_hz

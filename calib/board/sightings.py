@@ -11,8 +11,9 @@ import numpy as np
 from freeswing.calib.board.board_motion import Timeline, linked, timeline
 from freeswing.calib.board.boards import Board
 from freeswing.calib.board.detection import BoardDetector
-from freeswing.calib.board.recordings import Recording, read_frames, stamps_of
+from freeswing.calib.board.recordings import Recording, read_frames
 from freeswing.calib.camera.lens_models import Array
+from freeswing.calib.footage.frame_times import frame_times
 from freeswing.calib.rig.views import Views, make_views
 
 Progress = Callable[[str, float], None]
@@ -106,7 +107,7 @@ def _see_board(
         size,
         count,
         frames,
-        stamps_of(recording, frames, frame_rate_hz),
+        frame_times(recording, frame_rate_hz).of(frames),
         tuple(labels),
         np.stack([empty.pixels, *(corners.pixels for corners in found)])[1:],
         np.stack([empty.covariance_px2, *(corners.covariance_px2 for corners in found)])[1:],

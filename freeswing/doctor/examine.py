@@ -11,7 +11,11 @@ from freeswing.cdpr.robot import Robot
 from freeswing.doctor.finding import Finding
 from freeswing.doctor.geometry import robot_findings
 from freeswing.doctor.motion import run_findings
-from freeswing.doctor.recordings import calibration_findings, video_findings
+from freeswing.doctor.recordings import (
+    calibration_findings,
+    footage_findings,
+    video_findings,
+)
 from freeswing.doctor.split import split_findings
 from freeswing.ident.runs import SwingRun
 from freeswing.session.load_swings import load_robot, load_swing, load_target, trajectory_path
@@ -39,6 +43,7 @@ def _findings(session: Session, progress: Progress) -> Iterator[Finding]:
         progress("examining the runs", count / len(session.runs))
         if run.video is not None:
             yield from video_findings(session, run)
+            yield from footage_findings(f"run {run.name}", run.video, session.frame_rate_hz)
         if robot is not None:
             swing = yield from _run(session, run, robot, target)
             swings += [] if swing is None else [swing]

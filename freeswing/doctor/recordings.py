@@ -4,11 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from freeswing.cdpr.files.documents import InputError
+from freeswing.cdpr.files.documents import DataError, InputError
 from freeswing.doctor.finding import Finding
 from freeswing.session.session_file import Run, Session
 
+if TYPE_CHECKING:
+    from freeswing.calib.board.recordings import Recording
+
+LOOKED_AT = 100
+"""Frames looked at for copies: a recorder that repeats frames does so many times in as many."""
+MOST_COPIES = 0.03
+"""Fewer are a platform that turns round, or do not matter."""
 VIDEO_SUFFIXES = (".mkv", ".avi", ".mp4", ".mov")
 IMAGE_SUFFIXES = (".png", ".bmp", ".tif", ".tiff", ".pgm", ".jpg", ".jpeg")
 
@@ -58,6 +66,43 @@ def video_findings(session: Session, run: Run) -> Iterator[Finding]:
         for name in sorted(found - known):
             text = f"camera {name} is not in {session.cameras.name}"
             yield Finding("warning", subject, text, "its recording is not used")
+
+
+def footage_findings(subject: str, folder: Path, frame_rate_hz: float | None) -> Iterator[Finding]:
+    """Each recording of a folder: its frames' times, copies of frames, torn ones."""
+    from freeswing.calib.board.recordings import find_recordings
+
+    try:
+        found = find_recordings(folder)
+    except InputError:
+        return  # that nothing is there is said elsewhere
+    for recording in found:
+        where = f"{subject} {recording.name}"
+        try:
+            yield from _recording_findings(where, recording, frame_rate_hz)
+        except (InputError, DataError) as failure:
+            yield Finding("error", where, str(failure).replace("\n", " "))
+
+
+def _recording_findings(
+    subject: str, recording: Recording, frame_rate_hz: float | None
+) -> Iterator[Finding]:
+    from freeswing.calib.footage.condition import condition_of, torn_text
+    from freeswing.calib.footage.frame_times import frame_times
+
+    times = frame_times(recording, frame_rate_hz)
+    for remark in times.remarks:
+        yield Finding("warning" if remark.is_warning else "note", subject, remark.text)
+    if times.source == "none":
+        text = f"no {recording.name}.csv beside the images, and no frame_rate_hz"
+        yield Finding("error", subject, text, "add one of them")
+    condition = condition_of(recording, LOOKED_AT)
+    if condition.is_torn:
+        yield Finding("error", subject, torn_text(recording))
+    if condition.copies > MOST_COPIES * condition.frames:
+        text = f"{condition.copies} of the first {condition.frames} frames repeat the one before"
+        remedy = "record at the source's own rate; copies are left out"
+        yield Finding("warning", subject, text, remedy)
 
 
 def camera_names(folder: Path) -> set[str]:

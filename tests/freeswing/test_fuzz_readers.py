@@ -18,9 +18,10 @@ from hypothesis import strategies as st
 
 from freeswing.calib import exchange
 from freeswing.calib.board.boards import read_board
-from freeswing.calib.board.recordings import Recording, read_stamps
+from freeswing.calib.board.recordings import Recording
 from freeswing.calib.camera.camera import Camera
 from freeswing.calib.camera.cameras_file import read_cameras, write_cameras
+from freeswing.calib.footage.frame_times import frame_times
 from freeswing.calib.verdict.calibration_result import read_camera_covariance
 from freeswing.cdpr.files.documents import DataError, InputError
 from freeswing.cdpr.files.robot_file import read_robot
@@ -37,7 +38,6 @@ from freeswing.homing.homing_files import read_homing
 from freeswing.report.material import read_material
 from freeswing.report.page import render_page
 from freeswing.vision.fuse.calibration_share import read_calibration_noise
-from freeswing.vision.look.stamps import run_stamps
 from tests.freeswing.hostile_files import broken
 from tests.freeswing.report_material import whole_material
 from tests.places import SAMPLES
@@ -81,10 +81,8 @@ def cameras(count: int = 2) -> tuple[Camera, ...]:
 
 
 def stamps_of(path: Path) -> None:
-    """Both readers of a recording's stamps."""
-    recording = Recording("cam0", path.parent / "cam0.mkv")
-    read_stamps(recording)
-    run_stamps(recording, 40.0)
+    """The reader of a recording's stamps."""
+    frame_times(Recording("cam0", path.parent / "cam0.mkv", (path,), (0,)), 40.0)
 
 
 def covariance_of(path: Path) -> None:

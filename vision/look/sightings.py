@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from freeswing.calib.board.recordings import Image, Recording, read_frames
 from freeswing.calib.camera.camera import Camera
+from freeswing.calib.footage.copies import WARM_UP, with_copies
+from freeswing.calib.footage.frame_times import frame_times, needed
 from freeswing.cdpr.files.documents import InputError
 from freeswing.vision.look.follow import REPEATED, UNSTAMPED, Follower, FrameView
 from freeswing.vision.look.pieces import (
@@ -23,7 +25,6 @@ from freeswing.vision.look.pieces import (
     restore,
     save_piece,
 )
-from freeswing.vision.look.stamps import run_stamps, stamp_of
 from freeswing.vision.look.watched_target import Watch
 
 Array = NDArray[np.float64]
@@ -50,14 +51,17 @@ def collect_sightings(
     Raises:
         InputError: when frames have another size than the camera, or have no stamps.
     """
-    stamps, rate_hz = run_stamps(recording, frame_rate_hz)
-    inputs = input_hash(camera, watch, recording, repr((rate_hz, stamps)).encode())
+    stamps = needed(frame_times(recording, frame_rate_hz), recording)
+    told = repr((stamps.rate_hz, stamps.stamps)).encode()
+    inputs = input_hash(camera, watch, recording, told)
     paths = _existing(folder, camera.name, inputs)
     if paths and len(load_piece(paths[-1]).numbers) < FRAMES_A_PIECE:
         return paths
     done = len(paths) * FRAMES_A_PIECE
-    frames = islice(read_frames(recording), max(done - 1, 0), None)
-    before = next(frames)[2] if done else None  # tells whether the next frame repeats it
+    warm_up = min(done, WARM_UP)
+    frames = islice(
+        with_copies(islice(read_frames(recording), done - warm_up, None)), warm_up, None
+    )
     follower: Follower | None = None
     while batch := list(islice(frames, 1)):
         if follower is None:
@@ -68,13 +72,12 @@ def collect_sightings(
         times: list[float] = []
         views: list[FrameView] = []
         while batch:
-            number, label, image = batch.pop()
+            (number, label, image), is_copy = batch.pop()
             _check_size(camera, label, image)
-            time_s = stamp_of(number, stamps, rate_hz)
-            views.append(_view(follower, image, before, time_s))
+            time_s = stamps.at(number)
+            views.append(_view(follower, image, time_s, is_copy=is_copy))
             numbers.append(number)
             times.append(time_s)
-            before = image
             if len(numbers) < FRAMES_A_PIECE:
                 batch = list(islice(frames, 1))
         path = piece_path(folder, camera.name, inputs, len(paths))
@@ -92,10 +95,10 @@ def _existing(folder: Path, camera: str, inputs: str) -> list[Path]:
     return paths
 
 
-def _view(follower: Follower, image: Image, before: Image | None, time_s: float) -> FrameView:
+def _view(follower: Follower, image: Image, time_s: float, *, is_copy: bool) -> FrameView:
     if not np.isfinite(time_s):
         return FrameView(UNSTAMPED, (), None)
-    if before is not None and np.array_equal(before, image):
+    if is_copy:
         return FrameView(REPEATED, (), None)
     return follower.look(image, time_s)
 

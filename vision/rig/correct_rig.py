@@ -13,12 +13,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.rotation import log_rotation
 from freeswing.vision.fuse.fuse_cameras import Fit, fuse
 from freeswing.vision.fuse.poses import Poses
 from freeswing.vision.fuse.run_views import CameraViews, instants_of
 from freeswing.vision.look.label import label_markers
 from freeswing.vision.look.watched_target import Watch
+from freeswing.vision.rig.alignment import aligned
+from freeswing.vision.rig.gross_faults import moved_too_far, refuse_disagreement, refuse_gross
 from freeswing.vision.rig.rig_effects import (
     LEAST_CLOCK_S,
     LEAST_LINE_S,
@@ -48,6 +51,7 @@ class Corrected:
         before: agreement with the cameras as calibrated.
         after: agreement with the corrected ones.
         findings: the effects found.
+        remarks: what else was found, in words.
     """
 
     views: tuple[CameraViews, ...]
@@ -55,6 +59,7 @@ class Corrected:
     before: Fit
     after: Fit
     findings: tuple[Finding, ...]
+    remarks: tuple[str, ...] = ()
 
 
 def correct_rig(
@@ -67,7 +72,16 @@ def correct_rig(
         watch: what was looked for.
         survey_std_m: of the base tags' corners.
         look: False leaves the cameras as calibrated.
+
+    Raises:
+        DataError: when a camera is not where it can have got by a knock, or the cameras do not
+            agree after all corrections.
     """
+    calibrated, started = tuple(views), None
+    if look and watch.tags and len(views):
+        started = aligned(views, _reference(views))
+        views = started.views
+        refuse_gross(views, watch, started.pairs)
     instants = instants_of(views)
     start = None
     if watch.markers and len(instants):
@@ -75,6 +89,8 @@ def correct_rig(
     poses, before = fuse(views, watch, instants, start=start)
     if not look or int(poses.known.sum()) < _LEAST_KNOWN:
         return Corrected(tuple(views), poses, before, before, ())
+    lags = np.zeros(len(views)) if started is None else started.lags_s
+    remarks = () if started is None else started.remarks
     moved = moved_cameras(views, watch)
     current = list(views)
     for index in moved:
@@ -82,15 +98,33 @@ def correct_rig(
             repose_by_base_tags(views[index], watch, survey_std_m)
         )
     clocks, lines, last = _estimate(current, watch, instants, moved, survey_std_m, poses)
+    clocks = clocks + lags
     if not (moved or clocks.any() or lines.any()):
+        refuse_disagreement(views, before)
         return Corrected(tuple(views), poses, before, before, ())
     final = [
-        _decided(view, calibrated, clock, line)
-        for view, calibrated, clock, line in zip(current, views, clocks, lines, strict=True)
+        _decided(view, own, clock, line)
+        for view, own, clock, line in zip(current, calibrated, clocks, lines, strict=True)
     ]
+    _refuse_far(calibrated, final)
     poses, after = fuse(final, watch, instants_of(final), start=_restarted(final, watch, start))
-    findings = _findings(views, final, moved, clocks, lines, last)
-    return Corrected(tuple(final), poses, before, after, findings)
+    refuse_disagreement(final, after)
+    findings = _findings(calibrated, final, moved, clocks, lines, last)
+    return Corrected(tuple(final), poses, before, after, findings, remarks)
+
+
+def _refuse_far(views: Sequence[CameraViews], final: Sequence[CameraViews]) -> None:
+    """Passes cameras that were corrected by no more than a knock.
+
+    Raises:
+        DataError: for one that was not.
+    """
+    for view, now in zip(views, final, strict=True):
+        if moved_too_far(view.camera, now.camera):
+            raise DataError(
+                f"camera {view.camera.name}: its base tags put it elsewhere than a knock could: "
+                "calibrate again"
+            )
 
 
 def _estimate(

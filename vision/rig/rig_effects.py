@@ -48,12 +48,8 @@ class Finding:
     parameters: tuple[tuple[str, float, float], ...]
 
 
-def base_tag_misses(views: CameraViews, watch: Watch) -> tuple[Array, Array, Array]:
-    """Mean base-tag corners against their calibrated places.
-
-    Returns:
-        Residual rays (n, 8), their number of frames (n,) and base corners (n, 4, 3).
-    """
+def base_tag_rays(views: CameraViews, watch: Watch) -> tuple[Array, Array, Array]:
+    """Mean base-tag corners over a run: rays (n, 8), frames (n,) and base corners (n, 4, 3)."""
     sums: dict[int, Array] = {}
     counts: dict[int, int] = {}
     for _, piece in views.pieces():
@@ -63,10 +59,20 @@ def base_tag_misses(views: CameraViews, watch: Watch) -> tuple[Array, Array, Arr
             counts[int(thing)] = counts.get(int(thing), 0) + 1
     things = sorted(sums)
     corners = watch.base_corners_m[[t - watch.first_base for t in things]].reshape(-1, 4, 3)
+    measured = np.array([sums[t] / counts[t] for t in things]).reshape(-1, 8)
+    return measured, np.array([counts[t] for t in things]), corners
+
+
+def base_tag_misses(views: CameraViews, watch: Watch) -> tuple[Array, Array, Array]:
+    """Mean base-tag corners against their calibrated places.
+
+    Returns:
+        Residual rays (n, 8), their number of frames (n,) and base corners (n, 4, 3).
+    """
+    measured, counts, corners = base_tag_rays(views, watch)
     seen = views.camera.to_camera(corners)
     predicted = (seen[..., :2] / seen[..., 2:]).reshape(-1, 8)
-    measured = np.array([sums[t] / counts[t] for t in things]).reshape(-1, 8)
-    return measured - predicted, np.array([counts[t] for t in things]), corners
+    return measured - predicted, counts, corners
 
 
 def moved_cameras(views: Sequence[CameraViews], watch: Watch) -> dict[int, float]:

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from freeswing.calib.board.recordings import find_recordings, read_frames
+from freeswing.calib.footage.frame_times import frame_times
 from freeswing.cdpr.files.documents import DataError, InputError
 from freeswing.cdpr.files.trajectory_files import read_trajectory
 from freeswing.cdpr.measured.target import Target
-from freeswing.vision.look.stamps import run_stamps
 from freeswing.vision.look.video import write_stamps, write_video
 from freeswing.vision.render.record import record
 from freeswing.vision.render.render_scene import Renderer
@@ -98,11 +98,12 @@ def test_no_platform_in_view_is_told_with_a_remedy(tmp_path) -> None:
 def test_stamps_that_go_back_are_left_out(tmp_path) -> None:
     record(tmp_path, CAMERAS[:1], SCENE, np.arange(5) / 50.0)
     (tmp_path / "cam0.csv").write_text("frame,t_s\n0,0.0\n1,0.02\n2,0.02\n3,0.06\n4,0.05\n")
-    stamps, rate = run_stamps(find_recordings(tmp_path)[0], None)
-    assert (stamps, rate) == ({0: 0.0, 1: 0.02, 3: 0.06}, None), stamps
+    found = frame_times(find_recordings(tmp_path)[0], None)
+    assert found.stamps == {0: 0.0, 1: 0.02, 3: 0.06}, found
+    assert any("2 of 5 rows" in remark.text for remark in found.remarks), found.remarks
     (tmp_path / "cam0.csv").write_text("frame,t_s\n0,zero\n")
     with pytest.raises(InputError, match="line 2"):
-        run_stamps(find_recordings(tmp_path)[0], None)
+        frame_times(find_recordings(tmp_path)[0], None)
 
 
 @pytest.mark.slow

@@ -1,0 +1,129 @@
+"""Cameras that were started apart: whole seconds are found before anything is fused."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from freeswing.cdpr.files.documents import DataError
+from freeswing.cdpr.rotation import invert
+from freeswing.vision.fuse.run_views import CameraViews
+from freeswing.vision.rig.pairs import OwnTrack, Pair, pair_of
+
+Array = NDArray[np.float64]
+
+REACH_FRAMES = 0.5
+"""Smaller lags are left to the adjustment of the clocks, which is exact that near."""
+CLEARLY_BETTER = 1.5
+"""A start is believed when poses fit so many times better there than at no offset, and at any
+other start."""
+WORSE_M = 0.003
+"""Without an offset the platform must be missed by this much more: below, clocks are adjusted."""
+
+
+@dataclass(frozen=True, slots=True)
+class Aligned:
+    """Cameras with clocks good to a fraction of a frame.
+
+    Attributes:
+        views: with the lags added to their clocks.
+        lags_s: what was added, (n_c,).
+        pairs: by index of the first and the second camera.
+        remarks: which camera was started when, and how sure that is.
+    """
+
+    views: tuple[CameraViews, ...]
+    lags_s: Array
+    pairs: dict[tuple[int, int], Pair]
+    remarks: tuple[str, ...]
+
+
+def aligned(views: Sequence[CameraViews], reference: int) -> Aligned:
+    """Every camera beside one whose clock is known already, from the reference on.
+
+    Raises:
+        DataError: when two starts fit alike and none would not.
+    """
+    tracks = [own_track(view) for view in views]
+    lags = np.zeros(len(views))
+    pairs: dict[tuple[int, int], Pair] = {}
+    remarks = []
+    placed = [reference]
+    while len(placed) < len(views):
+        left = [k for k in range(len(views)) if k not in placed]
+        found = _next(views, tracks, lags, placed, left)
+        if found is None:
+            break
+        known, new, pair = found
+        pairs[known, new] = pair
+        placed.append(new)
+        step = min(tracks[known].step_s, tracks[new].step_s)
+        if abs(pair.lag_s) < REACH_FRAMES * step or not _needed(pair):
+            continue
+        here, there = views[new].camera.name, views[known].camera.name
+        if pair.confidence < CLEARLY_BETTER:
+            raise DataError(
+                f"cameras {there} and {here} were started apart, and the swing does not tell by "
+                f"how much: {pair.lag_s:+.3f} s leaves {1e3 * pair.decided_m:.1f} mm, another "
+                f"start {1e3 * pair.rival_m:.1f} mm. Record the release too, or stamps of one clock"
+            )
+        lags[new] = pair.lag_s
+        remarks.append(
+            f"{here}: its clock is {pair.lag_s:+.3f} s from {there}'s (poses then agree to "
+            f"{1e3 * pair.decided_m:.1f} mm; as stamped {_mm(pair.at_zero_m)}, next best start "
+            f"{_mm(pair.rival_m)})"
+        )
+    moved = tuple(_later(view, lag) for view, lag in zip(views, lags, strict=True))
+    return Aligned(moved, lags, pairs, tuple(remarks))
+
+
+def own_track(view: CameraViews) -> OwnTrack:
+    """The platform as the camera alone saw it."""
+    times, rotations, positions = [np.zeros(0)], [np.zeros((0, 3, 3))], [np.zeros((0, 3))]
+    stamps = view.middle_times()
+    for first, piece in view.pieces():
+        mine = np.isfinite(piece.poses).all(axis=1) & np.isfinite(piece.stamps_s)
+        times.append(stamps[first : first + len(mine)][mine])
+        rotations.append(piece.poses[mine, :9].reshape(-1, 3, 3))
+        positions.append(piece.poses[mine, 9:])
+    at = np.concatenate(times)
+    order = np.argsort(at, kind="stable")
+    order = order[np.concatenate([[True], np.diff(at[order]) > 0.0])[: len(order)]]
+    return OwnTrack(at[order], np.concatenate(rotations)[order], np.concatenate(positions)[order])
+
+
+def _next(
+    views: Sequence[CameraViews],
+    tracks: Sequence[OwnTrack],
+    lags: Array,
+    placed: Sequence[int],
+    left: Sequence[int],
+) -> tuple[int, int, Pair] | None:
+    """The first camera that shares motion with one that is placed."""
+    for known in placed:
+        first = replace(tracks[known], times_s=tracks[known].times_s + lags[known])
+        for new in left:
+            T_known_new = views[known].camera.T_camera_base @ invert(
+                views[new].camera.T_camera_base
+            )
+            pair = pair_of(first, tracks[new], T_known_new)
+            if pair is not None:
+                return known, new, pair
+    return None
+
+
+def _needed(pair: Pair) -> bool:
+    """Whether the records do not fit as they are stamped."""
+    return pair.at_zero_m > CLEARLY_BETTER * pair.decided_m + WORSE_M
+
+
+def _later(view: CameraViews, lag_s: float) -> CameraViews:
+    camera = view.camera
+    return view.believed(replace(camera, clock_offset_s=camera.clock_offset_s + float(lag_s)))
+
+
+def _mm(miss_m: float) -> str:
+    return f"{1e3 * miss_m:.1f} mm" if np.isfinite(miss_m) else "none"

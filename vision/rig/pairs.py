@@ -1,0 +1,223 @@
+"""Two cameras beside each other, by the platform alone: when and where they saw it.
+
+Each camera follows the platform on its own. How fast it moves and turns does not depend on who
+looks, so one camera's speeds are slid over the other's through the whole record; and the platform
+being one rigid body, all poses of one camera follow from the other's by one and the same motion,
+`T_first_second`, at the right lag and at no other. Neither step asks where the cameras are supposed
+to be, so their calibration can be held against it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from freeswing.cdpr.rotation import log_rotation
+
+Array = NDArray[np.float64]
+
+MOST_LAG_S = 10.0
+LEAST_OVERLAP_S = 1.0
+_LEAST_OVERLAP = 20
+_STEPS_A_FRAME = 2
+_NEARLY_BEST = 0.25
+"""Lags whose speeds correlate worse than the best by more are not looked at by poses."""
+_MOST_CANDIDATES = 16
+_PLAUSIBLE, _PLAUSIBLE_M = 3.0, 0.02
+"""Cameras that were knocked by less than this leave the choice of the lag to their calibration."""
+_HALVINGS = 7
+_LEVER_M = 0.2
+"""A turn counts as it moves a point so far from the platform's origin."""
+_LEVERS = _LEVER_M * np.vstack([np.zeros(3), np.eye(3), -np.eye(3)])
+
+
+@dataclass(frozen=True, slots=True)
+class OwnTrack:
+    """The platform as one camera alone saw it.
+
+    Attributes:
+        times_s: by the camera's clock as it stands, rising, (n,).
+        rotations: R_camera_platform, (n, 3, 3).
+        positions_m: (n, 3).
+    """
+
+    times_s: Array
+    rotations: Array
+    positions_m: Array
+
+    @property
+    def step_s(self) -> float:
+        """The usual time from one frame to the next."""
+        return float(np.median(np.diff(self.times_s)))
+
+
+@dataclass(frozen=True, slots=True)
+class Pair:
+    """Second camera beside the first.
+
+    Attributes:
+        lag_s: to be added to the second's times.
+        T_first_second: the second camera in the first's frame, as the platform says, (4, 4).
+        miss_m: median distance of points about the platform after that, in metres.
+        known_m: the same with the cameras where their calibration has them.
+        rival_m: of the measure that decided, the best at another lag, infinite without one.
+        decided_m: that measure at `lag_s`.
+        at_zero_m: that measure without a lag, infinite where the records then do not overlap.
+    """
+
+    lag_s: float
+    T_first_second: Array
+    miss_m: float
+    known_m: float
+    rival_m: float
+    decided_m: float
+    at_zero_m: float
+
+    @property
+    def confidence(self) -> float:
+        """How many times worse the next best lag is."""
+        return self.rival_m / max(self.decided_m, 1e-9)
+
+
+def pair_of(first: OwnTrack, second: OwnTrack, T_known: Array) -> Pair | None:
+    """Finds lag and relative place of two cameras; None when they share too little motion.
+
+    Args:
+        first: one camera's track.
+        second: the other's.
+        T_known: the second camera in the first's frame by their calibration, (4, 4): where it can
+            be right it decides between lags, else the platform's motion alone does.
+    """
+    if min(len(first.times_s), len(second.times_s)) < _LEAST_OVERLAP:
+        return None
+    step = min(first.step_s, second.step_s)
+    lags, scores = _correlations(_speeds(first), _speeds(second), step)
+    if not len(lags):
+        return None
+    zero = _fitted(first, second, 0.0, T_known)
+    tried = [_fitted(first, second, lag, T_known) for lag in _candidates(lags, scores)]
+    found = [fit for fit in (zero, *tried) if fit is not None]
+    if not found:
+        return None
+    best_free, best_known = min(f.miss_m for f in found), min(f.known_m for f in found)
+    by_known = best_known < _PLAUSIBLE * best_free + _PLAUSIBLE_M
+
+    def size(fit: Fitted) -> float:
+        return fit.known_m if by_known else fit.miss_m
+
+    best = min(found, key=size)
+    width = step / _STEPS_A_FRAME
+    for _ in range(_HALVINGS):
+        width *= 0.6
+        near = [_fitted(first, second, best.lag_s + s, T_known) for s in (-width, width)]
+        best = min([best, *(f for f in near if f is not None)], key=size)
+    rivals = [size(fit) for fit in found if abs(fit.lag_s - best.lag_s) > 2.0 * step]
+    return Pair(
+        best.lag_s,
+        best.T_first_second,
+        best.miss_m,
+        best.known_m,
+        min(rivals, default=float("inf")),
+        size(best),
+        float("inf") if zero is None else size(zero),
+    )
+
+
+def _speeds(track: OwnTrack) -> tuple[Array, Array]:
+    """Times midway between neighbouring frames, and speed and turning rate there, (n, 2)."""
+    dt = np.diff(track.times_s)
+    turns = track.rotations[1:] @ np.swapaxes(track.rotations[:-1], 1, 2)
+    way = np.linalg.norm(np.diff(track.positions_m, axis=0), axis=1)
+    rates = np.stack([way, np.linalg.norm(log_rotation(turns), axis=1)], axis=1) / dt[:, None]
+    near = dt < 2.5 * track.step_s
+    return (track.times_s[1:] - 0.5 * dt)[near], _calm(rates)[near]
+
+
+def _calm(rates: Array) -> Array:
+    """The median of three neighbours: a single camera's depth jumps now and then."""
+    padded = np.concatenate([rates[:1], rates, rates[-1:]])
+    return np.median(np.stack([padded[:-2], padded[1:-1], padded[2:]]), axis=0)
+
+
+def _correlations(
+    first: tuple[Array, Array], second: tuple[Array, Array], step: float
+) -> tuple[Array, Array]:
+    """Lags of enough overlap and how well the speeds then correlate."""
+    lags, scores = [], []
+    count = int(MOST_LAG_S / step * _STEPS_A_FRAME)
+    for lag in np.arange(-count, count + 1) * step / _STEPS_A_FRAME:
+        at = second[0] + lag
+        inside = (at > first[0][0]) & (at < first[0][-1])
+        if inside.sum() < _LEAST_OVERLAP or np.ptp(at[inside]) < LEAST_OVERLAP_S:
+            continue
+        parts = []
+        for k in range(2):
+            a = np.interp(at[inside], first[0], first[1][:, k])
+            b = second[1][inside, k]
+            a, b = a - a.mean(), b - b.mean()
+            parts.append(float(a @ b) / max(float(np.linalg.norm(a) * np.linalg.norm(b)), 1e-12))
+        lags.append(float(lag))
+        scores.append(float(np.mean(parts)))
+    return np.array(lags), np.array(scores)
+
+
+def _candidates(lags: Array, scores: Array) -> Array:
+    """Peaks of the correlation that come near the highest, best first."""
+    padded = np.concatenate([[-np.inf], scores, [-np.inf]])
+    peak = (scores >= padded[:-2]) & (scores >= padded[2:])
+    peak &= scores > scores.max() - _NEARLY_BEST
+    order = np.argsort(-scores[peak], kind="stable")
+    return lags[peak][order][:_MOST_CANDIDATES]
+
+
+@dataclass(frozen=True, slots=True)
+class Fitted:
+    """Two tracks at one lag: the motion between the cameras, what it and the known one leave."""
+
+    lag_s: float
+    miss_m: float
+    known_m: float
+    T_first_second: Array
+
+
+def _fitted(first: OwnTrack, second: OwnTrack, lag: float, T_known: Array) -> Fitted | None:
+    """The one motion that carries the second camera's poses onto the first's."""
+    at = second.times_s + lag
+    right = np.searchsorted(first.times_s, at)
+    inside = (right > 0) & (right < len(first.times_s))
+    right = np.clip(right, 1, len(first.times_s) - 1)
+    gap = first.times_s[right] - first.times_s[right - 1]
+    inside &= gap < 1.5 * first.step_s
+    if inside.sum() < _LEAST_OVERLAP or np.ptp(at[inside]) < LEAST_OVERLAP_S:
+        return None
+    share = ((at - first.times_s[right - 1]) / gap)[inside, None, None]
+    own = _points(second)[inside]
+    whole = _points(first)
+    seen = (1.0 - share) * whole[right[inside] - 1] + share * whole[right[inside]]
+    miss = _misses(rigid(own.reshape(-1, 3), seen.reshape(-1, 3)), own, seen)
+    good = miss <= 2.0 * np.median(miss)
+    T = rigid(own[good].reshape(-1, 3), seen[good].reshape(-1, 3))
+    known = float(np.median(_misses(T_known, own, seen)))
+    return Fitted(lag, float(np.median(_misses(T, own, seen))), known, T)
+
+
+def _misses(T: Array, own: Array, seen: Array) -> Array:
+    """Mean distance of the moved points from those seen, (n,)."""
+    return np.linalg.norm(own @ T[:3, :3].T + T[:3, 3] - seen, axis=2).mean(axis=1)
+
+
+def _points(track: OwnTrack) -> Array:
+    """Points about the platform in the camera's frame, (n, 7, 3)."""
+    return _LEVERS @ np.swapaxes(track.rotations, 1, 2) + track.positions_m[:, None]
+
+
+def rigid(points: Array, onto: Array) -> Array:
+    """The motion that brings points nearest to others, both (n, 3)."""
+    middle, aim = points.mean(axis=0), onto.mean(axis=0)
+    left, _, right = np.linalg.svd((points - middle).T @ (onto - aim))
+    turn = (left @ np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))]) @ right).T
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = turn, aim - turn @ middle
+    return T
