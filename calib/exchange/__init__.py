@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +13,7 @@ from freeswing.calib.camera.cameras_file import read_cameras, write_cameras
 from freeswing.cdpr.files.documents import InputError
 
 FORMATS = ("freeswing", "opencv", "kalibr", "ros", "anipose", "colmap", "qualisys")
+Tell = Callable[[str], None]
 _LOOKED_AT_BYTES = 20_000
 _RIGID = 1e-3
 _MODULES = {
@@ -25,12 +26,13 @@ _MODULES = {
 }
 
 
-def read(path: Path | str, kind: str | None = None) -> tuple[Camera, ...]:
+def read(path: Path | str, kind: str | None = None, tell: Tell | None = None) -> tuple[Camera, ...]:
     """Cameras from a file (COLMAP, several ROS cameras: a folder) of another program.
 
     Args:
         path: the file or folder.
         kind: one of `FORMATS`; guessed from name and content when None.
+        tell: told what was left out, and what was taken for what.
 
     Raises:
         InputError: when it cannot be read as such.
@@ -39,7 +41,7 @@ def read(path: Path | str, kind: str | None = None) -> tuple[Camera, ...]:
     kind = kind or guess(path)
     if kind == "freeswing":
         return read_cameras(path)
-    cameras = _module(kind).read(path)
+    cameras = _module(kind).read(path, tell or _nobody)
     _refuse_impossible(path, cameras)
     return cameras
 
@@ -71,6 +73,7 @@ def guess(path: Path) -> str:
     signs = (
         ("freeswing", 'format = "freeswing-cameras'),
         ("opencv", "!!opencv-matrix"),
+        ("opencv", "<opencv_storage"),
         ("qualisys", "<calibration"),
         ("ros", "camera_matrix:"),
         ("kalibr", "intrinsics:"),
@@ -97,6 +100,10 @@ def _refuse_impossible(path: Path, cameras: Sequence[Camera]) -> None:
             raise InputError(f"{path}: camera {camera.name}: an image of {camera.size_px} pixels")
         if names.count(camera.name) > 1:
             raise InputError(f"{path}: two cameras are named {camera.name!r}")
+
+
+def _nobody(text: str) -> None:
+    """Tells nobody."""
 
 
 def _module(kind: str):

@@ -1,9 +1,14 @@
-"""Anipose's and Caliscope's calibration toml; lengths are taken as metres."""
+"""Anipose's and Caliscope's calibration toml.
+
+Lengths are those of the board's drawing, metres or millimetres: a rig that would be hundreds of
+metres across is taken for one in millimetres, and that is said.
+"""
 
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +21,11 @@ from freeswing.cdpr.files.documents import InputError, dump_toml, read_text
 from freeswing.cdpr.rotation import exp_rotation, log_rotation, transform
 
 _MOST_BYTES = 1 << 24
+FARTHEST_M = 60.0
+"""Laboratories are smaller; in millimetres it would be 6 cm, and no rig is that small."""
 
 
-def read(path: Path) -> tuple[Camera, ...]:
+def read(path: Path, tell: Callable[[str], None]) -> tuple[Camera, ...]:
     """Cameras of `[cam_0]` tables (Anipose) or `[cameras.0]` tables (Caliscope)."""
     try:
         document = tomllib.loads(read_text(path, _MOST_BYTES))
@@ -28,16 +35,48 @@ def read(path: Path) -> tuple[Camera, ...]:
     entries = [(k, v) for k, v in tables.items() if isinstance(v, dict) and "matrix" in v]
     if not entries:
         raise InputError(f"{path}: holds no camera with a matrix")
+    posed = [(key, entry) for key, entry in entries if _has_pose(entry)]
+    for key, entry in entries if posed else ():
+        if not _has_pose(entry):
+            tell(f"{path}: {_name(key, entry)} has no pose: left out")
     cameras = []
-    for key, entry in entries:
+    for key, entry in posed or entries:
         try:
             cameras.append(_camera(key, entry))
         except ODD_ENTRY as error:
             raise InputError(f"{path}: {key}: {error}") from error
-    return tuple(cameras)
+    return _in_metres(path, tuple(cameras), tell)
+
+
+def _has_pose(entry: dict[str, Any]) -> bool:
+    return "rotation" in entry and "translation" in entry and not entry.get("ignore", False)
+
+
+def _name(key: str, entry: dict[str, Any]) -> str:
+    return str(entry.get("name", entry.get("cam_id", key)))
+
+
+def _in_metres(
+    path: Path, cameras: tuple[Camera, ...], tell: Callable[[str], None]
+) -> tuple[Camera, ...]:
+    farthest = max(float(np.linalg.norm(camera.position_base_m)) for camera in cameras)
+    if farthest < FARTHEST_M:
+        return cameras
+    tell(
+        f"{path}: cameras up to {farthest:.4g} units from the origin: taken for millimetres "
+        f"({1e-3 * farthest:.3g} m)"
+    )
+    poses = [transform(c.T_camera_base[:3, :3], 1e-3 * c.T_camera_base[:3, 3]) for c in cameras]
+    return tuple(replace(c, T_camera_base=T) for c, T in zip(cameras, poses, strict=True))
 
 
 def _camera(key: str, entry: dict[str, Any]) -> Camera:
+    if int(entry.get("rotation_count", 0)) % 4:
+        raise InputError(
+            f"rotation_count = {entry['rotation_count']}: its picture is turned by quarters before "
+            "it is shown, and whether lens and pose are of the turned one the file does not say: "
+            "turn the recordings, calibrate them with rotation_count = 0"
+        )
     K = np.array(entry["matrix"], dtype=np.float64).reshape(3, 3)
     fisheye = bool(entry.get("fisheye", False))
     coefficients = np.array(entry["distortions"], dtype=np.float64)
@@ -46,8 +85,7 @@ def _camera(key: str, entry: dict[str, Any]) -> Camera:
     R = turn.reshape(3, 3) if turn.size == 9 else exp_rotation(turn.reshape(3))
     shift = usable(entry.get("translation", np.zeros(3)), "translation").reshape(3)
     width, height = (int(size) for size in entry["size"])
-    name = str(entry.get("name", entry.get("cam_id", key)))
-    return Camera(name, (width, height), model, params, transform(R, shift))
+    return Camera(_name(key, entry), (width, height), model, params, transform(R, shift))
 
 
 def write(path: Path, cameras: Sequence[Camera]) -> None:

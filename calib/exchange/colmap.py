@@ -6,7 +6,8 @@ are shifted by half a pixel both ways. The base frame is COLMAP's world.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -14,16 +15,21 @@ import numpy as np
 from freeswing.calib.camera.camera import Camera
 from freeswing.calib.camera.lens_models import PARAMETER_NAMES
 from freeswing.calib.exchange.lens import ODD_ENTRY, usable
+from freeswing.calib.exchange.names import distinct_names
 from freeswing.cdpr.files.documents import InputError, read_text, replace_file
 from freeswing.cdpr.rotation import matrix_from_quaternion, quaternion_from_matrix, transform
 
 HALF_PIXEL = 0.5
 _MOST_BYTES = 1 << 28
 _LEAST_QUATERNION = 1e-6
+_PLAIN_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 
 
-def read(path: Path) -> tuple[Camera, ...]:
-    """One camera an image, named as the image without suffix; `path` is the folder."""
+def read(path: Path, tell: Callable[[str], None]) -> tuple[Camera, ...]:
+    """One camera an image, named as the image without suffix; `path` is the folder.
+
+    Where images of several folders have one name, the folders name the cameras.
+    """
     folder = path if path.is_dir() else path.parent
     try:
         return _cameras(folder)
@@ -41,15 +47,16 @@ def _cameras(folder: Path) -> tuple[Camera, ...]:
         values[_centre(model)] -= HALF_PIXEL
         lenses[number] = (model, (int(width), int(height)), values)
     cameras = []
-    for row in _rows(folder / "images.txt"):
-        if len(row) < 10 or not row[0].isdigit() or row[8] not in lenses:
-            continue  # the line of image points that follows each image
+    images = [row for row in _images(folder / "images.txt") if len(row) > 9 and row[8] in lenses]
+    stems = [Path(" ".join(row[9:])).with_suffix("") for row in images]
+    names = distinct_names([stem.parts for stem in stems], [row[0] for row in images])
+    for row, name in zip(images, names, strict=True):
         q, t = usable(row[1:5], "quaternion"), usable(row[5:8], "translation")
         if not np.linalg.norm(q) > _LEAST_QUATERNION:
             raise InputError(f"quaternion {row[1:5]} has no length")
         model, size, params = lenses[row[8]]
         pose = transform(matrix_from_quaternion(q), t)
-        cameras.append(Camera(Path(" ".join(row[9:])).stem, size, model, params, pose))
+        cameras.append(Camera(name, size, model, params, pose))
     if not cameras:
         raise InputError(f"{folder / 'images.txt'}: holds no image with a camera of cameras.txt")
     return tuple(cameras)
@@ -58,6 +65,26 @@ def _cameras(folder: Path) -> tuple[Camera, ...]:
 def _rows(path: Path) -> list[list[str]]:
     lines = read_text(path, _MOST_BYTES).splitlines()
     return [line.split() for line in lines if line.strip() and not line.startswith("#")]
+
+
+def _images(path: Path) -> list[list[str]]:
+    """The lines that state images: each is followed by one of image points, which may be empty."""
+    lines = [line.split() for line in read_text(path, _MOST_BYTES).splitlines()]
+    lines = [row for row in lines if not (row and row[0].startswith("#"))]
+    found: list[list[str]] = []
+    points_next = False
+    for row in lines:
+        if points_next and _is_points(row):
+            points_next = False
+        elif row:
+            found.append(row)
+            points_next = True
+    return found
+
+
+def _is_points(row: list[str]) -> bool:
+    """Whether a line is one of image points: x y id, x y id, ..."""
+    return len(row) % 3 == 0 and all(_PLAIN_NUMBER.fullmatch(word) for word in row)
 
 
 def _centre(model: str) -> list[int]:

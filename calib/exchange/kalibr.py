@@ -7,36 +7,60 @@ first camera. Kalibr's pixel (0, 0) is the centre of the top-left pixel, as here
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from freeswing.calib.camera.camera import Camera
-from freeswing.calib.camera.lens_models import FISHEYE
+from freeswing.calib.camera.lens_models import FISHEYE, Array
 from freeswing.calib.exchange.lens import ODD_ENTRY, distortion, lens, shortest, usable
+from freeswing.calib.exchange.names import by_number, distinct_names
 from freeswing.calib.exchange.plain_yaml import load_yaml
 from freeswing.cdpr.files.documents import InputError, replace_file
 from freeswing.cdpr.rotation import invert
 
 
-def read(path: Path) -> tuple[Camera, ...]:
-    """Cameras cam0, cam1, ... of the chain."""
+def read(path: Path, tell: Callable[[str], None]) -> tuple[Camera, ...]:
+    """Cameras cam0, cam1, ... of the chain, in the order of their numbers."""
     document = load_yaml(path)
-    entries = [(k, v) for k, v in document.items() if isinstance(v, dict) and "intrinsics" in v]
+    entries = {str(k): v for k, v in document.items() if isinstance(v, dict) and "intrinsics" in v}
     if not entries:
         raise InputError(f"{path}: holds no camera with intrinsics")
+    keys = by_number(list(entries))
+    topics = [str(entries[key].get("rostopic", "")).strip("/").split("/") for key in keys]
+    no_poses = not any({"T_cam_imu", "T_cn_cnm1"} & set(entry) for entry in entries.values())
+    if no_poses and len(entries) > 1:
+        tell(f"{path}: holds no poses: all its cameras stand at the origin")
+    poses: dict[str, Array] = {}
     cameras: list[Camera] = []
-    for name, entry in entries:
+    for key, name in zip(keys, distinct_names(topics, keys), strict=True):
         try:
-            cameras.append(_camera(str(name), entry, cameras))
+            before = keys[keys.index(key) - 1] if key != keys[0] and not no_poses else None
+            pose = _pose(entries[key], before, poses)
+            if pose is None:
+                tell(f"{path}: {key}: nothing joins it to {before} and so to the others: left out")
+                continue
+            poses[key] = pose
+            cameras.append(_camera(name, entries[key], pose))
         except ODD_ENTRY as error:
-            raise InputError(f"{path}: {name}: {error}") from error
+            raise InputError(f"{path}: {key}: {error}") from error
     return tuple(cameras)
 
 
-def _camera(key: str, entry: dict[str, Any], before: Sequence[Camera]) -> Camera:
+def _pose(entry: dict[str, Any], before: str | None, poses: dict[str, Array]) -> Array | None:
+    """T_cam_base; None for a camera that nothing joins to the others."""
+    if "T_cam_imu" in entry:
+        return usable(entry["T_cam_imu"], "T_cam_imu")
+    if before is None:
+        return np.eye(4)
+    if "T_cn_cnm1" in entry and before in poses:
+        return usable(entry["T_cn_cnm1"], "T_cn_cnm1") @ poses[before]
+    return None
+
+
+def _camera(name: str, entry: dict[str, Any], pose: Array) -> Camera:
     if entry.get("camera_model", "pinhole") != "pinhole":
         raise InputError(f"camera_model {entry['camera_model']!r} is not pinhole")
     kind = str(entry.get("distortion_model", "none"))
@@ -45,18 +69,10 @@ def _camera(key: str, entry: dict[str, Any], before: Sequence[Camera]) -> Camera
     values = np.array(entry["intrinsics"], dtype=np.float64)
     coefficients = np.array(entry.get("distortion_coeffs", []), dtype=np.float64)
     model, params = lens(values[:2], values[2:4], coefficients, fisheye=kind == "equidistant")
-    if "T_cam_imu" in entry:
-        T = usable(entry["T_cam_imu"], "T_cam_imu")
-    elif "T_cn_cnm1" in entry and before:
-        T = usable(entry["T_cn_cnm1"], "T_cn_cnm1") @ before[-1].T_camera_base
-    else:
-        T = np.eye(4)
-    topic = str(entry.get("rostopic", "")).strip("/").split("/")
-    name = topic[-2] if len(topic) > 1 else key
     width, height = (int(size) for size in entry["resolution"])
     offset = float(entry.get("timeshift_cam_imu", 0.0))
     return Camera(
-        name, (width, height), model, params, T, offset, float(entry.get("line_delay", 0))
+        name, (width, height), model, params, pose, offset, float(entry.get("line_delay", 0))
     )
 
 

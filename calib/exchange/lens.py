@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from freeswing.calib.camera.camera import Camera
@@ -75,3 +77,28 @@ def lens(focal: Array, centre: Array, coefficients: Array, *, fisheye: bool) -> 
     if k[4:].any():
         return "FULL_OPENCV", np.concatenate([front, k])
     return ("OPENCV", np.concatenate([front, k[:4]])) if k.any() else ("PINHOLE", front)
+
+
+def turned(camera: Camera) -> Camera:
+    """The camera whose picture is this one's turned clockwise by a quarter.
+
+    A pixel (x, y) of a picture of height h comes to (h - 1 - y, x); the camera's axes turn with it.
+    """
+    width, height = camera.size_px
+    fx, fy = camera.focal_px
+    cx, cy = camera.centre_px
+    k = distortion(camera)
+    is_fisheye = camera.model == FISHEYE
+    if not is_fisheye:
+        k[2:4] = k[3], -k[2]
+    model, params = lens(
+        np.array([fy, fx]), np.array([height - 1.0 - cy, cx]), k, fisheye=is_fisheye
+    )
+    quarter = np.array([[0.0, -1.0, 0, 0], [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
+    return replace(
+        camera,
+        size_px=(height, width),
+        model=model,
+        params=params,
+        T_camera_base=quarter @ camera.T_camera_base,
+    )

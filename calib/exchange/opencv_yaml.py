@@ -1,4 +1,4 @@
-"""OpenCV's FileStorage yaml: `camera_matrix`, `distortion_coefficients`, sizes, by camera.
+"""OpenCV's FileStorage, yaml or xml: `camera_matrix`, `distortion_coefficients`, sizes, by camera.
 
 A file of one camera holds the keys at its top, as OpenCV's own calibration sample writes them; a
 rig holds a list `cameras` with, beside them, `name`, `model` and `T_camera_base`.
@@ -6,7 +6,7 @@ rig holds a list `cameras` with, beside them, `name`, `model` and `T_camera_base
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,16 +15,30 @@ import numpy as np
 from freeswing.calib.camera.camera import Camera
 from freeswing.calib.camera.lens_models import FISHEYE
 from freeswing.calib.exchange.lens import ODD_ENTRY, distortion, lens, matrix, shortest, usable
+from freeswing.calib.exchange.plain_xml import load_opencv_xml
 from freeswing.calib.exchange.plain_yaml import load_yaml
 from freeswing.cdpr.files.documents import InputError, replace_file
+from freeswing.cdpr.rotation import transform
+
+# as OpenCV's samples of different years, and programs after them, write the keys
+_MATRICES = ("camera_matrix", "Camera_Matrix", "cameraMatrix", "K")
+_DISTORTIONS = ("distortion_coefficients", "Distortion_Coefficients", "distCoeffs", "D")
+_WIDTHS = ("image_width", "image_Width")
+_HEIGHTS = ("image_height", "image_Height")
+_STEREO = (
+    ("M1", "cameraMatrix1", "K1", "D1", "distCoeffs1"),
+    ("M2", "cameraMatrix2", "K2", "D2", "distCoeffs2"),
+)
 
 
-def read(path: Path) -> tuple[Camera, ...]:
+def read(path: Path, tell: Callable[[str], None]) -> tuple[Camera, ...]:
     """The cameras of the file.
 
     OpenCV's own reader ends the process on some damaged files, so this one does not use it.
     """
-    document = load_yaml(path)
+    document = _document(path)
+    if _first(document, _STEREO[0][:3]) is not None:
+        return _stereo(path, document)
     listed = document.get("cameras", [document])
     if not isinstance(listed, list) or not listed:
         raise InputError(f"{path}: cameras is not a list")
@@ -41,17 +55,69 @@ def read(path: Path) -> tuple[Camera, ...]:
     return tuple(cameras)
 
 
+def _document(path: Path) -> dict[str, Any]:
+    """Of yaml or xml."""
+    with path.open("rb") as file:
+        is_xml = file.read(200).lstrip().startswith(b"<")
+    return load_opencv_xml(path) if is_xml else load_yaml(path)
+
+
+def _stereo(path: Path, document: dict[str, Any]) -> tuple[Camera, ...]:
+    """Two cameras of stereo_calib, whose R and T may stand in extrinsics beside intrinsics."""
+    beside = path.with_name(path.name.replace("intrinsics", "extrinsics"))
+    if _first(document, ("R",)) is None and beside != path and beside.is_file():
+        document = {**_document(beside), **document}
+    try:
+        width, height = _first(document, _WIDTHS), _first(document, _HEIGHTS)
+        if width is None or height is None:
+            raise InputError("states no image size: add image_width and image_height to it")
+        turn, shift = _first(document, ("R",)), _first(document, ("T",))
+        if turn is None or shift is None:
+            raise InputError("holds no R and T of the second camera: they stand in extrinsics.yml")
+        poses = np.eye(4), transform(_matrix(turn).reshape(3, 3), _matrix(shift).reshape(3))
+        cameras = []
+        for name, keys, pose in zip(("left", "right"), _STEREO, poses, strict=True):
+            K = _matrix(_first(document, keys[:3])).reshape(3, 3)
+            k = _matrix(_first(document, keys[3:]))
+            model, params = lens(K[[0, 1], [0, 1]], K[:2, 2], k, fisheye=_is_fisheye(document))
+            cameras.append(Camera(name, (int(width), int(height)), model, params, pose))
+    except ODD_ENTRY as error:
+        raise InputError(f"{path}: not a pair of OpenCV's stereo_calib ({error})") from error
+    return tuple(cameras)
+
+
 def _camera(entry: dict[str, Any], name: str) -> Camera:
-    K = _matrix(entry["camera_matrix"]).reshape(3, 3)
-    k = _matrix(entry["distortion_coefficients"])
-    size = (int(entry["image_width"]), int(entry["image_height"]))
-    fisheye = entry.get("model") in (FISHEYE, "fisheye")
-    model, params = lens(K[[0, 1], [0, 1]], K[:2, 2], k, fisheye=fisheye)
+    K = _matrix(_named(entry, _MATRICES)).reshape(3, 3)
+    k = _matrix(_named(entry, _DISTORTIONS))
+    size = (int(_named(entry, _WIDTHS)), int(_named(entry, _HEIGHTS)))
+    model, params = lens(K[[0, 1], [0, 1]], K[:2, 2], k, fisheye=_is_fisheye(entry))
     pose = _matrix(entry["T_camera_base"]) if "T_camera_base" in entry else np.eye(4)
     return Camera(str(entry.get("name", name)), size, model, params, pose)
 
 
-def _matrix(node: dict[str, Any]) -> np.ndarray:
+def _is_fisheye(entry: dict[str, Any]) -> bool:
+    """By the key of OpenCV's own calibration sample, by ours, or by what others write."""
+    if str(entry.get("fisheye_model", "0")).strip().lower() not in ("0", "false", ""):
+        return True
+    told = {
+        str(entry.get(key, "")).lower() for key in ("model", "distortion_model", "camera_model")
+    }
+    return bool(told & {FISHEYE.lower(), "fisheye", "equidistant", "kannala_brandt"})
+
+
+def _first(entry: dict[str, Any], keys: tuple[str, ...]) -> Any:
+    """The first of the keys that is there, else None."""
+    return next((entry[key] for key in keys if key in entry), None)
+
+
+def _named(entry: dict[str, Any], keys: tuple[str, ...]) -> Any:
+    value = _first(entry, keys)
+    if value is None:
+        raise InputError(f"{keys[0]} is missing")
+    return value
+
+
+def _matrix(node: Any) -> np.ndarray:
     rows, columns = int(node["rows"]), int(node["cols"])
     return usable(node["data"], "a matrix").reshape(rows, columns)
 

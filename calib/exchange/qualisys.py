@@ -8,23 +8,25 @@ the centre of the first pixel (sensorMax is the last pixel's index).
 from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from freeswing.calib.camera.camera import Camera
 from freeswing.calib.camera.lens_models import FISHEYE
-from freeswing.calib.exchange.lens import ODD_ENTRY, distortion, lens, shortest, usable
+from freeswing.calib.exchange.lens import ODD_ENTRY, distortion, lens, shortest, turned, usable
 from freeswing.cdpr.files.documents import InputError, read_text, replace_file
 from freeswing.cdpr.rotation import invert, transform
 
 SUBPIXELS = 64.0
 _HALF_TURN = np.diag([1.0, -1.0, -1.0])
 _MOST_BYTES = 1 << 24
+_NEAR_MIDDLE = 0.3
+"""Lenses sit within a twentieth of the middle; a picture cut out of the sensor may be off more."""
 
 
-def read(path: Path) -> tuple[Camera, ...]:
+def read(path: Path, tell: Callable[[str], None]) -> tuple[Camera, ...]:
     """The active cameras, named by serial number."""
     text = read_text(path, _MOST_BYTES)
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
@@ -39,7 +41,7 @@ def read(path: Path) -> tuple[Camera, ...]:
             continue
         name = entry.get("serial", f"camera{len(cameras) + 1}")
         try:
-            cameras.append(_camera(name, entry))
+            cameras.append(_camera(name, entry, tell))
         except ODD_ENTRY as error:
             raise InputError(f"{path}: camera {name}: {error}") from error
     if not cameras:
@@ -47,7 +49,7 @@ def read(path: Path) -> tuple[Camera, ...]:
     return tuple(cameras)
 
 
-def _camera(name: str, entry: ElementTree.Element) -> Camera:
+def _camera(name: str, entry: ElementTree.Element, tell: Callable[[str], None]) -> Camera:
     pose, optics = entry.find("transform"), entry.find("intrinsic")
     field = entry.find("fov_video")
     if pose is None or optics is None:
@@ -55,18 +57,52 @@ def _camera(name: str, entry: ElementTree.Element) -> Camera:
     area = field if field is not None else entry.find("fov_marker")
     if area is None:
         raise InputError("has no fov_video")
-    left, top = _number(area, "left"), _number(area, "top")
-    size = (int(_number(area, "right") - left) + 1, int(_number(area, "bottom") - top) + 1)
+    corner = np.array([_number(area, "left"), _number(area, "top")])
+    size = np.array([_number(area, "right"), _number(area, "bottom")]) - corner + 1.0
+    quarters = round(float(entry.get("viewrotation", "0") or 0.0) / 90.0) % 4
+    if quarters % 2:
+        size, corner = size[::-1], corner[::-1]  # the picture is turned, the lens is not
     focal = np.array([_number(optics, f"focalLength{axis}") for axis in "UV"]) / SUBPIXELS
     centre = np.array([_number(optics, f"centerPoint{axis}") for axis in "UV"]) / SUBPIXELS
+    binning = _binning(centre, corner, size)
     radial = [_number(optics, f"radialDistortion{k}") for k in (1, 2, 3)]
     tangential = [_number(optics, f"tangentalDistortion{k}") for k in (1, 2)]
     k = np.array([radial[0], radial[1], tangential[0], tangential[1], radial[2]])
-    model, params = lens(focal, centre - [left, top], k, fisheye=False)
+    # the middle of the first of several binned pixels lies (binning - 1) / 2 sensor pixels on
+    binned = (centre - 0.5 * (binning - 1)) / binning - corner
+    model, params = lens(focal / binning, binned, k, fisheye=False)
     rotation = np.array([[_number(pose, f"r{i}{j}") for j in (1, 2, 3)] for i in (1, 2, 3)])
     place = np.array([_number(pose, axis) for axis in "xyz"]) / 1000.0
     T_base_camera = transform(rotation.T @ _HALF_TURN, place)
-    return Camera(name, size, model, params, invert(T_base_camera))
+    size_px = (int(size[0]), int(size[1]))
+    camera = Camera(name, size_px, model, params, invert(T_base_camera))
+    if binning > 1:
+        tell(f"camera {name}: its picture bins {binning} x {binning} pixels of the sensor")
+    if quarters:
+        tell(
+            f"camera {name}: viewrotation {90 * quarters}: read as a clockwise turn of the picture"
+        )
+    for _ in range(quarters):
+        camera = turned(camera)
+    return camera
+
+
+def _binning(centre: np.ndarray, corner: np.ndarray, size: np.ndarray) -> int:
+    """Sensor pixels to a pixel of the picture, each way.
+
+    The lens looks through the middle of the sensor, so its axis meets the picture near the middle.
+
+    Raises:
+        InputError: when no binning puts it there.
+    """
+    for binning in (1, 2, 3, 4):
+        share = (centre / binning - corner) / size
+        if (np.abs(share - 0.5) < _NEAR_MIDDLE).all():
+            return binning
+    raise InputError(
+        f"its principal point {centre.round(1).tolist()} lies outside the middle of the picture of "
+        f"{size.round().tolist()} pixels, binned or not: centerPoint and fov_video contradict"
+    )
 
 
 def _number(entry: ElementTree.Element, key: str) -> float:

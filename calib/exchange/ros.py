@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,12 +15,17 @@ from freeswing.calib.exchange.plain_yaml import load_yaml
 from freeswing.cdpr.files.documents import InputError, replace_file
 
 
-def read(path: Path) -> tuple[Camera, ...]:
+def read(path: Path, tell: Callable[[str], None]) -> tuple[Camera, ...]:
     """The camera of a file, or all cameras of a folder's *.yaml, at the identity pose."""
     files = sorted(path.glob("*.yaml")) if path.is_dir() else [path]
     if not files:
         raise InputError(f"{path}: holds no *.yaml")
-    return tuple(_read_one(file) for file in files)
+    cameras = tuple(_read_one(file) for file in files)
+    names = [camera.name for camera in cameras]
+    if len(set(names)) == len(names):
+        return cameras
+    tell(f"{path}: cameras share the name {names[0]!r}: they are named as their files")
+    return tuple(replace(c, name=f.stem) for c, f in zip(cameras, files, strict=True))
 
 
 def _read_one(path: Path) -> Camera:

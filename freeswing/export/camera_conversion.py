@@ -33,11 +33,12 @@ def convert_cameras(
         InputError: a kind that is not told, a lens that the format cannot hold, a name that does
             not suit it.
     """
-    cameras = exchange.read(source, source_kind)
+    said: list[str] = []
+    cameras = exchange.read(source, source_kind, said.append)
     kind = result_kind or kind_of_name(result)
     _check_name(result, kind, len(cameras))
     exchange.write(result, cameras, kind)
-    return _losses(cameras, exchange.read(result, kind), kind)
+    return said + _losses(cameras, exchange.read(result, kind), kind)
 
 
 def kind_of_name(path: Path) -> str:

@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 from freeswing.calib.board.recordings import Recording, read_frames
 from freeswing.calib.camera.camera import Camera
+from freeswing.calib.tags.corners import lens_rays
 from freeswing.cdpr.files.documents import DataError
-from freeswing.vision.look.detect import TagFinder
+from freeswing.vision.look.detect import TagFinder, detect_tags
 from freeswing.vision.look.single_pose import start_pose
 from freeswing.vision.look.watched_target import Watch
 
@@ -26,12 +27,12 @@ Array = NDArray[np.float64]
 _EVERY = 20
 _FRAMES = 5
 _LEAST_FRAMES = 2
-WRONG_SHARE = 0.06
-"""Corners found by OpenCV alone lie within 1 or 2 px, 2 % of a tag's side; a target whose corners
-are off by more than this share of a side is not the one in the picture."""
+WRONG_SHARE = 0.05
+"""Corners are found to a hundredth of a pixel; a target measured with a ruler is off by 1 % of a
+tag's side. One that is off by more than this is not the one in the picture."""
 _FITS_SHARE = 0.4
 """A mistake is named where undoing it leaves less than this share of the miss."""
-_SIZES = np.geomspace(0.4, 2.5, 60)
+_SIZES = np.geomspace(0.4, 2.5, 184)
 _SAME_SIZE = 0.03
 
 
@@ -85,17 +86,16 @@ def examined_watch(
 def _looked(watch: Watch, camera: Camera, recording: Recording) -> Iterator[_Seen]:
     """Images of a recording that show two platform tags or more."""
     finder = TagFinder.of(watch.tags)
+    directions = lens_rays(camera)
     frames = islice(read_frames(recording), 0, _EVERY * _FRAMES, _EVERY)
     for _, _, image in frames:
         if (image.shape[1], image.shape[0]) != camera.size_px:
             return  # said where the frames are followed
-        quads = [q for q in finder.quads(image) if (q.family, q.id) in watch.tags]
-        if len(quads) < 2:
+        fits = detect_tags(image, camera, directions, watch.tags, finder)
+        if len(fits) < 2:
             continue
-        rays = camera.normalise(np.array([q.corners_px for q in quads]))
-        if not np.isfinite(rays).all():
-            continue
-        tags = np.array([watch.tags.index((q.family, q.id)) for q in quads])
+        rays = np.array([fit.rays for fit in fits.values()])
+        tags = np.array([watch.tags.index(key) for key in fits])
         sides = np.linalg.norm(rays - np.roll(rays, 1, axis=1), axis=2)
         yield _Seen(tags, rays, float(sides.mean()))
 
