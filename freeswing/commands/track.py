@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from argparse import ArgumentParser, Namespace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from freeswing.commands.arguments import add_session, add_workers, crew_of, open_session
@@ -24,6 +26,11 @@ def add_arguments(parser: ArgumentParser) -> None:
     )
     parser.add_argument(
         "--refine-layout", action="store_true", help="fit the tags' places to the recordings"
+    )
+    parser.add_argument(
+        "--write-clocks",
+        action="store_true",
+        help="put the clocks that all runs agree on into cameras.toml",
     )
     parser.add_argument(
         "--view",
@@ -51,6 +58,8 @@ def run(options: Namespace, console: Console) -> None:
         result = TRACK.take(session, console, settings, crew)
     if options.view or options.overlay:
         _draw(session, console, view=options.view, overlay=options.overlay)
+    if options.write_clocks:
+        _write_clocks(session, result, console)
     console.say(str(result))
     console.show_file(result)
 
@@ -117,6 +126,18 @@ def _draw(session: Session, console: Console, *, view: bool, overlay: bool) -> N
         path = session.results / "overlay" / run.name / f"{seen.camera.name}.mp4"
         write_overlay(path, run, seen)
         console.say(f"  {path}")
+
+
+def _write_clocks(session: Session, result: Path, console: Console) -> None:
+    """cameras.toml with the clocks that the runs agree on; tracks made before are then old."""
+    from freeswing.calib.camera.cameras_file import read_cameras, write_cameras
+    from freeswing.vision.rig.kept_clocks import with_kept_clocks
+
+    document = json.loads(result.read_text(encoding="utf-8"))
+    cameras, said = with_kept_clocks(read_cameras(session.cameras), document)
+    write_cameras(session.cameras, cameras)
+    for text in said or ["no clock was found off: cameras.toml stays"]:
+        console.say(f"  {text}")
 
 
 def _summarise(document: dict[str, Any], console: Console) -> None:

@@ -74,7 +74,7 @@ def write_phone_video(
     path.parent.mkdir(parents=True, exist_ok=True)
     with av.open(str(path), "w") as container:
         stream = container.add_stream("libx264", rate=Fraction(30000, 1001))
-        stream.options = {"preset": "medium", "crf": "18", "tune": "grain", **options}
+        stream.options = {"preset": "medium", "crf": "18", "tune": "grain"}
         stream.pix_fmt = "yuv420p"
         stream.codec_context.time_base = stream.time_base = TICK
         if turn_deg:

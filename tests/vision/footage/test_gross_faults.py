@@ -1,0 +1,105 @@
+"""Mistakes in files that no mounted camera can make: each is named, none is explained away."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from freeswing.calib.camera.camera import Camera
+from freeswing.cdpr.measured.target import read_target, write_target
+from freeswing.cdpr.rotation import exp_rotation, invert, transform
+from tests.vision.footage.sessions import errors_m, track, without_base_tags, write_session
+
+UPSIDE_DOWN = np.diag([-1.0, -1.0, 1.0, 1.0])
+
+
+def posed(camera: Camera, T_camera_base: np.ndarray) -> Camera:
+    return replace(camera, T_camera_base=T_camera_base)
+
+
+def in_millimetres(camera: Camera) -> Camera:
+    pose = camera.T_camera_base
+    return posed(camera, transform(pose[:3, :3], 1e3 * pose[:3, 3]))
+
+
+RIGS = {
+    "exchanged": (
+        lambda c: [posed(c[0], c[1].T_camera_base), posed(c[1], c[0].T_camera_base)],
+        "left and right are exchanged",
+    ),
+    "upside down": (
+        lambda c: [c[0], posed(c[1], UPSIDE_DOWN @ c[1].T_camera_base)],
+        "turned by 180 degrees for right",
+    ),
+    "millimetres": (lambda c: [in_millimetres(camera) for camera in c], "in millimetres"),
+    "inverted": (
+        lambda c: [posed(camera, invert(camera.T_camera_base)) for camera in c],
+        "the pose is inverted",
+    ),
+}
+SLOW = pytest.mark.slow
+
+
+@pytest.mark.parametrize("with_base_tags", [True, pytest.param(False, marks=SLOW)])
+@pytest.mark.parametrize(
+    "mistake", ["exchanged", *(pytest.param(m, marks=SLOW) for m in list(RIGS)[1:])]
+)
+def test_cameras_that_cannot_stand_so(tmp_path, capsys, mistake, with_base_tags) -> None:
+    change, words = RIGS[mistake]
+    text = str if with_base_tags else without_base_tags
+    folder = write_session(tmp_path, change, text=text)
+    assert track(folder) == 1
+    said = capsys.readouterr().err
+    assert words in said, said
+    assert not (folder / "results" / "tracks" / "swing-01.csv").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("turn_rad", [0.02, 0.1])
+def test_a_knock_without_base_tags_is_refused(tmp_path, capsys, turn_rad) -> None:
+    def knocked(cameras):
+        turn = transform(exp_rotation(np.array([0.0, turn_rad, 0.0])), np.zeros(3))
+        return [cameras[0], posed(cameras[1], turn @ cameras[1].T_camera_base)]
+
+    folder = write_session(tmp_path, knocked, text=without_base_tags)
+    assert track(folder) == 1
+    assert "moved" in capsys.readouterr().err
+
+
+def exchanged_ids(text: str) -> str:
+    swapped = {"0": "1", "1": "0"}
+    return re.sub(r"^id = ([01])$", lambda m: f"id = {swapped[m[1]]}", text, flags=re.M)
+
+
+def test_exchanged_ids_are_put_right_from_the_first_frame(tmp_path) -> None:
+    folder = write_session(tmp_path, target=exchanged_ids)
+    assert track(folder) == 0
+    run = json.loads((folder / "results" / "tracking.json").read_text())["runs"][0]
+    assert any("exchanged they fit" in text for text in run["problems"]), run["problems"]
+    worst = np.abs(errors_m(folder, 0.0)).max()
+    assert worst < 5e-4, f"{1e3 * worst:.3f} mm"
+
+
+def test_a_wrong_tag_size_is_named_with_the_right_one(tmp_path, capsys) -> None:
+    def larger(text: str) -> str:
+        return re.sub(r"size_m = ([\d.]+)", lambda m: f"size_m = {1.13 * float(m[1])}", text)
+
+    assert track(write_session(tmp_path, target=larger)) == 1
+    found = re.search(r"with size_m ([\d.]+) times as large they fit", capsys.readouterr().err)
+    assert found is not None
+    assert abs(float(found[1]) - 1.0 / 1.13) < 0.012, found[0]
+
+
+@pytest.mark.slow
+def test_tags_in_another_convention_are_named(tmp_path, capsys) -> None:
+    folder = write_session(tmp_path)
+    target = read_target(folder / "target.toml")
+    down = np.diag([1.0, -1.0, -1.0, 1.0])  # y down, z into the face
+    tags = tuple(replace(tag, T_platform_tag=tag.T_platform_tag @ down) for tag in target.tags)
+    write_target(folder / "target.toml", replace(target, tags=tags))
+    assert track(folder) == 1
+    assert "target.toml's x, -y, -z" in capsys.readouterr().err
