@@ -18,6 +18,7 @@ from freeswing.calib.camera.intrinsics import CameraStart
 from freeswing.calib.camera.lens_choice import lens_warnings, weigh_lenses
 from freeswing.calib.camera.lens_models import Array
 from freeswing.calib.rig.coarse_clocks import board_moves, coarse_offsets_s
+from freeswing.calib.rig.rig_start import BaseTie, base_tie, board_groups
 from freeswing.calib.rig.solve_rig import Rig, solve_rig, start_cameras, tie_to_base
 from freeswing.calib.rig.views import Views
 from freeswing.calib.tags.base_tags import SURVEY_STD_M, SurveyedTag, find_base_tags
@@ -115,12 +116,12 @@ def calibrate_session(
         lambda label, share: told(label, 0.7 * share),
     )
     told("adjusting", 0.7)
-    rig, alone_px = rig_from_sightings(sightings, board, frame_rate_hz, model)
+    std = SURVEY_STD_M if survey_std_m is None else survey_std_m
+    rig, alone_px = rig_from_sightings(sightings, board, frame_rate_hz, model, base_tags, std)
     warnings: list[str] = []
     survey: SurveyCheck | None = None
     if base_tags:
         told("base tags", 0.8)
-        std = SURVEY_STD_M if survey_std_m is None else survey_std_m
         stills = [camera.still_frames for camera in sightings]
         seen = find_base_tags(rig.cameras, stills, base_tags, rig.adjustment.sigma_px, std)
         warnings += _moved_warnings(seen.moved)
@@ -132,7 +133,7 @@ def calibrate_session(
     told("checking against truth", 0.9)
     verdict = judge(rig, check_truth(rig, board.edges), survey, alone_px)
     lenses = weigh_lenses(rig)
-    warnings += [*clock_warnings(rig), *lens_warnings(rig.cameras, lenses)]
+    warnings += [*_group_warnings(rig), *clock_warnings(rig), *lens_warnings(rig.cameras, lenses)]
     verdict = replace(verdict, warnings=(*warnings, *verdict.warnings))
     vertical: dict[str, Any] = {}
     if strings and verdict.usable:
@@ -164,8 +165,12 @@ def rig_from_sightings(
     board: Board,
     frame_rate_hz: float | None,
     model: str = DEFAULT_MODEL,
+    base_tags: Sequence[SurveyedTag] = (),
+    survey_std_m: float = SURVEY_STD_M,
 ) -> tuple[Rig, Array]:
     """The rig in a frame of its own, and what each camera reached alone, px.
+
+    Base tags take part, and give the frame, where cameras share no board.
 
     Raises:
         DataError: when a camera never sees the board or the sightings make no rig.
@@ -196,8 +201,26 @@ def rig_from_sightings(
         offsets,
         line,
         lambda scene, views: straightened(scene, views, board, borders),
+        _tie(sightings, starts, seen.views, base_tags, survey_std_m),
     )
     return rig, alone
+
+
+def _tie(
+    sightings: tuple[Sightings, ...],
+    starts: tuple[CameraStart, ...],
+    views: Views,
+    base_tags: Sequence[SurveyedTag],
+    survey_std_m: float,
+) -> BaseTie | None:
+    """The surveyed tags as each camera sees them, where boards alone do not join the cameras."""
+    if not base_tags or not board_groups(len(starts), views).any():
+        return None
+    cameras = tuple(start.camera for start in starts)
+    stills = [camera.still_frames for camera in sightings]
+    noise = np.array([start.rms_px for start in starts])
+    seen = find_base_tags(cameras, stills, base_tags, noise, survey_std_m)
+    return base_tie(cameras, seen.fixed)
 
 
 def _starts(
@@ -223,6 +246,21 @@ def clock_warnings(rig: Rig) -> list[str]:
     return [
         "the board moved too little for the cameras' clocks: they are taken to agree here, and "
         "`track` measures them from the swing; wave the board about to have them calibrated"
+    ]
+
+
+def _group_warnings(rig: Rig) -> list[str]:
+    """Says which cameras only the base tags join, and that their clocks are not measured."""
+    groups = board_groups(len(rig.cameras), rig.problem.views)
+    if not groups.any():
+        return []
+    parts = [
+        " ".join(c.name for c, own in zip(rig.cameras, groups, strict=True) if own == group)
+        for group in np.unique(groups)
+    ]
+    return [
+        f"no board view joins these cameras: {' | '.join(parts)}. The base tags do; clocks are "
+        "measured within each group alone, between groups `track` finds them from the swing"
     ]
 
 

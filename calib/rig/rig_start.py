@@ -35,19 +35,49 @@ class RigStart:
     shared: np.ndarray
 
 
+@dataclass(frozen=True, slots=True)
+class BaseTie:
+    """Cameras that share no board, each held by the surveyed tags that it sees.
+
+    Attributes:
+        fixed: the survey and its sightings.
+        T_cameras_base: each camera by its own sightings, None where they do not give a pose.
+    """
+
+    fixed: FixedPoints
+    T_cameras_base: tuple[Array | None, ...]
+
+
+def base_tie(cameras: tuple[Camera, ...], fixed: FixedPoints) -> BaseTie:
+    """Every camera's pose by the surveyed points that it sees."""
+    poses = []
+    for index, camera in enumerate(cameras):
+        own = fixed.camera == index
+        points, pixels = fixed.points_base_m[fixed.point[own]], fixed.pixels[own]
+        poses.append(pose_from_points(camera, points, pixels) if own.sum() >= 4 else None)
+    return BaseTie(fixed, tuple(poses))
+
+
 def start_rig(
-    cameras: tuple[Camera, ...], board_points_m: Array, views: Views, T_camera_boards: Array
+    cameras: tuple[Camera, ...],
+    board_points_m: Array,
+    views: Views,
+    T_camera_boards: Array,
+    tie: BaseTie | None = None,
 ) -> RigStart:
     """Chain the cameras from the one that shares most with the others.
+
+    What shares no board with them is reached through the surveyed tags, where `tie` has them.
 
     Args:
         cameras: their lenses; poses are ignored.
         board_points_m: the board's corners, (n_points, 3).
         views: all sightings.
         T_camera_boards: board pose of every view in its own camera, (n_views, 4, 4).
+        tie: cameras by surveyed tags, where these are needed.
 
     Raises:
-        DataError: when the cameras fall into groups without a common board, naming them.
+        DataError: when the cameras fall into groups that nothing ties, naming them.
     """
     shared = shared_moments(len(cameras), views)
     reference = int(np.argmax(shared.sum(axis=1)))
@@ -56,7 +86,11 @@ def start_rig(
         inside, outside = sorted(placed), [c for c in range(len(cameras)) if c not in placed]
         counts = shared[np.ix_(inside, outside)]
         if counts.max() < LEAST_SHARED:
-            raise DataError(_apart(cameras, inside, outside, int(counts.max())))
+            T_tied = _through_base(tie, placed, outside)
+            if T_tied is None:
+                raise DataError(_apart(cameras, inside, outside))
+            placed |= T_tied
+            continue
         row, column = np.unravel_index(int(np.argmax(counts)), counts.shape)
         known, new = inside[int(row)], outside[int(column)]
         T_new_known = _relative_pose(cameras, board_points_m, views, T_camera_boards, new, known)
@@ -66,6 +100,30 @@ def start_rig(
     )
     boards = _board_poses(rig, board_points_m, views, T_camera_boards)
     return RigStart(Scene(rig, boards, np.zeros(WARP), np.zeros((0, 3))), reference, shared)
+
+
+def _through_base(
+    tie: BaseTie | None, placed: dict[int, Array], outside: list[int]
+) -> dict[int, Array] | None:
+    """One more camera, by the tags that it and one already placed see."""
+    if tie is None:
+        return None
+    T = tie.T_cameras_base
+    known = next((index for index in placed if T[index] is not None), None)
+    new = next((index for index in outside if T[index] is not None), None)
+    if known is None or new is None:
+        return None
+    T_known, T_new = T[known], T[new]
+    return {new: T_new @ invert(T_known) @ placed[known]}
+
+
+def board_groups(count: int, views: Views) -> np.ndarray:
+    """Number of each camera's group: cameras that share boards, also by way of others, (count,)."""
+    reach = shared_moments(count, views) >= LEAST_SHARED
+    reach |= np.eye(count, dtype=bool)
+    for _ in range(count):
+        reach = (reach.astype(int) @ reach.astype(int)) > 0
+    return np.argmax(reach, axis=1)
 
 
 def shared_moments(count: int, views: Views) -> np.ndarray:
@@ -208,12 +266,13 @@ def pose_from_points(camera: Camera, points_m: Array, pixels: Array) -> Array | 
     return best
 
 
-def _apart(cameras: tuple[Camera, ...], inside: list[int], outside: list[int], most: int) -> str:
+def _apart(cameras: tuple[Camera, ...], inside: list[int], outside: list[int]) -> str:
     here = ", ".join(cameras[i].name for i in inside)
     there = ", ".join(cameras[i].name for i in outside)
     return (
-        f"cameras {there} and cameras {here} share at most {most} moments with the board in both, "
-        f"need {LEAST_SHARED}; film the board where one of {here} and one of {there} see it at once"
+        f"cameras {there} and cameras {here} share at most {LEAST_SHARED - 1} moments with the "
+        f"board in both, need {LEAST_SHARED}; film the board where one of {here} and one of "
+        f"{there} see it at once, or survey base tags so that each of these cameras sees two"
     )
 
 

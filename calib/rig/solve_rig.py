@@ -26,7 +26,7 @@ from freeswing.calib.rig.normal_equations import (
 )
 from freeswing.calib.rig.reprojection import Scene, camera_slices, moved, shape_modes
 from freeswing.calib.rig.reprojection_kernels import CLOCK, POSE, WARP
-from freeswing.calib.rig.rig_start import place_in_base, start_rig
+from freeswing.calib.rig.rig_start import BaseTie, board_groups, place_in_base, start_rig
 from freeswing.calib.rig.views import FixedPoints, Views
 
 Progress = Callable[[str, float], None]
@@ -90,8 +90,11 @@ def solve_rig(
     offsets_s: Array | None = None,
     line: Timeline | None = None,
     straighten: Callable[[Scene, Views], Views] | None = None,
+    tie: BaseTie | None = None,
 ) -> Rig:
     """All cameras and board poses at once, in the frame of the reference camera.
+
+    With a `tie` the surveyed tags take part from the start, and their frame is the rig's.
 
     Args:
         board_points_m: the board's corners, (n_points, 3).
@@ -100,6 +103,7 @@ def solve_rig(
         line: times and pieces of the moments when the board moves: clocks are then estimated, and
             time is the first camera's; None for a board that rests at each moment.
         straighten: puts the corners right once the rig is nearly known (`calib.tags.tag_bend`).
+        tie: surveyed tags, needed where cameras share no board.
 
     Raises:
         DataError: when the cameras do not share enough views.
@@ -112,13 +116,22 @@ def solve_rig(
         for start, offset in zip(starts, offsets, strict=True)
     )
     views, moments = views.compacted()
-    start = start_rig(cameras, board_points_m, views, poses)
+    start = start_rig(cameras, board_points_m, views, poses, tie)
     scene, clocks = start.scene, line is not None
+    fixed = None if tie is None else tie.fixed
+    if fixed is not None:
+        scene = place_in_base(scene, fixed)
     if line is not None:
         scene, views = in_pieces(scene, views, Timeline(line.times_s[moments], line.piece[moments]))
-    free = free_unknowns(cameras, held_pose=start.reference, clocks=clocks)
+    free = free_unknowns(
+        cameras,
+        held_pose=start.reference if fixed is None else None,
+        n_fixed=0 if fixed is None else len(fixed.points_base_m),
+        clocks=clocks,
+        held_clocks=frozenset(board_groups(len(cameras), views).tolist()),
+    )
     dropped = tuple(drop for camera in starts for drop in camera.dropped)
-    problem = Problem(board_points_m, views, None, free)
+    problem = Problem(board_points_m, views, fixed, free)
     rig = refine(scene, problem, start.reference, dropped, roughly=straighten is not None)
     if clocks:
         rig = _without_idle_lines(rig)
@@ -177,10 +190,12 @@ def free_unknowns(
     warp: bool = False,
     held_lenses: bool = False,
     clocks: bool = False,
+    held_clocks: frozenset[int] = frozenset({0}),
 ) -> np.ndarray:
     """Which shared unknowns move: lenses, poses but one, base points, and warp if asked.
 
-    With `clocks` every line time is free, and every clock offset but the first camera's.
+    With `clocks` every line time is free, and every clock offset but those of `held_clocks`: the
+    first camera's of each group that shares boards.
     """
     slices = camera_slices(cameras)
     free = np.ones(slices[-1].stop + WARP + 3 * n_fixed, dtype=bool)
@@ -188,7 +203,7 @@ def free_unknowns(
         k = len(camera.params)
         free[own.start : own.start + k] = not held_lenses
         free[own.start + k : own.start + k + POSE] = index != held_pose
-        free[own.stop - CLOCK : own.stop] = (clocks and index > 0, clocks)
+        free[own.stop - CLOCK : own.stop] = (clocks and index not in held_clocks, clocks)
     free[slices[-1].stop : slices[-1].stop + WARP] = warp
     return free
 
@@ -276,7 +291,9 @@ def tie_to_base(rig: Rig, fixed: FixedPoints, *, estimate_survey: bool = True) -
         estimate_survey: measure the survey's noise from how it fits, instead of taking it as given.
     """
     scene = place_in_base(rig.adjustment.scene, fixed)
-    free = np.concatenate([rig.problem.free, np.ones(3 * len(fixed.points_base_m), dtype=bool)])
+    shared = camera_slices(scene.cameras)[-1].stop + WARP
+    tied = np.ones(3 * len(fixed.points_base_m), dtype=bool)
+    free = np.concatenate([rig.problem.free[:shared], tied])
     held = scene.cameras[rig.reference]
     first = camera_slices(scene.cameras)[rig.reference].start + len(held.params)
     free[first : first + POSE] = True

@@ -121,3 +121,11 @@ def error_square(rig: Rig, cameras: tuple[Camera, ...]) -> tuple[float, int]:
     error = errors(rig.adjustment.scene, cameras, rig.reference)[free]
     covariance = rig.adjustment.covariance[: len(free), : len(free)][np.ix_(free, free)]
     return float(error @ np.linalg.solve(covariance, error)), int(free.sum())
+
+
+def error_square_in_base(rig: Rig, cameras: tuple[Camera, ...]) -> tuple[float, int]:
+    """The same for a rig that surveyed points hold in the base frame."""
+    free = rig.problem.free[: camera_slices(cameras)[-1].stop]
+    error = errors(rig.adjustment.scene, cameras, None)[free]
+    covariance = rig.adjustment.covariance[: len(free), : len(free)][np.ix_(free, free)]
+    return float(error @ np.linalg.solve(covariance, error)), int(free.sum())

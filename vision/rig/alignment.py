@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,8 +18,11 @@ Array = NDArray[np.float64]
 REACH_FRAMES = 0.5
 """Smaller lags are left to the adjustment of the clocks, which is exact that near."""
 CLEARLY_BETTER = 1.5
-"""A start is believed when poses fit so many times better there than at no offset, and at any
-other start."""
+"""A start is believed when poses fit so many times better there than at no offset, and cameras at
+any other start."""
+IN_EARNEST = 3.0
+"""Starts that leave poses no more times as far apart as the best are tried with everything free."""
+MOST_TRIED = 10
 WORSE_M = 0.003
 """Without an offset the platform must be missed by this much more: below, clocks are adjusted."""
 
@@ -41,13 +44,21 @@ class Aligned:
     remarks: tuple[str, ...]
 
 
-def aligned(views: Sequence[CameraViews], reference: int) -> Aligned:
+Misfit = Callable[[CameraViews, CameraViews], float]
+"""How far two cameras disagree, in px, with clocks and rolling shutters free to be put right."""
+
+
+def aligned(views: Sequence[CameraViews], reference: int, misfit: Misfit) -> Aligned:
     """Every camera beside one whose clock is known already, from the reference on.
+
+    A swing nearly repeats itself, and rolling shutters bend what one camera sees: starts that fit
+    nearly as well as the best are all tried in earnest.
 
     Raises:
         DataError: when two starts fit alike and none would not.
     """
     tracks = [own_track(view) for view in views]
+    current = list(views)
     lags = np.zeros(len(views))
     pairs: dict[tuple[int, int], Pair] = {}
     remarks = []
@@ -63,21 +74,34 @@ def aligned(views: Sequence[CameraViews], reference: int) -> Aligned:
         step = min(tracks[known].step_s, tracks[new].step_s)
         if abs(pair.lag_s) < REACH_FRAMES * step or not _needed(pair):
             continue
+        lag, best_px, rival_px = _chosen(pair, current[known], views[new], misfit)
         here, there = views[new].camera.name, views[known].camera.name
-        if pair.confidence < CLEARLY_BETTER:
+        if rival_px < CLEARLY_BETTER * best_px:
             raise DataError(
                 f"cameras {there} and {here} were started apart, and the swing does not tell by "
-                f"how much: {pair.lag_s:+.3f} s leaves {1e3 * pair.decided_m:.1f} mm, another "
-                f"start {1e3 * pair.rival_m:.1f} mm. Record the release too, or stamps of one clock"
+                f"how much: {lag:+.3f} s leaves {best_px:.2f} px, another start {rival_px:.2f} px. "
+                "Record the release too, or stamps of one clock"
             )
-        lags[new] = pair.lag_s
+        lags[new] = lag
+        current[new] = _later(views[new], lag)
         remarks.append(
-            f"{here}: its clock is {pair.lag_s:+.3f} s from {there}'s (poses then agree to "
-            f"{1e3 * pair.decided_m:.1f} mm; as stamped {_mm(pair.at_zero_m)}, next best start "
-            f"{_mm(pair.rival_m)})"
+            f"{here}: its clock is {lag:+.3f} s from {there}'s: they then disagree by "
+            f"{best_px:.2f} px, next best start {_px(rival_px)} (as stamped poses are "
+            f"{_mm(pair.at_zero_m)} apart)"
         )
-    moved = tuple(_later(view, lag) for view, lag in zip(views, lags, strict=True))
-    return Aligned(moved, lags, pairs, tuple(remarks))
+    return Aligned(tuple(current), lags, pairs, tuple(remarks))
+
+
+def _chosen(
+    pair: Pair, known: CameraViews, new: CameraViews, misfit: Misfit
+) -> tuple[float, float, float]:
+    """The best lag with its misfit, and that of the next best, in px."""
+    lags = [pair.lag_s]
+    lags += [lag for lag, miss_m in pair.rivals if miss_m < IN_EARNEST * pair.decided_m]
+    sizes = [misfit(known, _later(new, lag)) for lag in lags[:MOST_TRIED]]
+    order = np.argsort(sizes, kind="stable")
+    rival = sizes[order[1]] if len(sizes) > 1 else float("inf")
+    return lags[order[0]], sizes[order[0]], rival
 
 
 def own_track(view: CameraViews) -> OwnTrack:
@@ -125,5 +149,9 @@ def _later(view: CameraViews, lag_s: float) -> CameraViews:
     return view.believed(replace(camera, clock_offset_s=camera.clock_offset_s + float(lag_s)))
 
 
+def _px(misfit_px: float) -> str:
+    return f"{misfit_px:.2f} px" if np.isfinite(misfit_px) else "far off"
+
+
 def _mm(miss_m: float) -> str:
-    return f"{1e3 * miss_m:.1f} mm" if np.isfinite(miss_m) else "none"
+    return f"{1e3 * miss_m:.1f} mm" if np.isfinite(miss_m) else "never both seen, not"

@@ -79,7 +79,9 @@ def correct_rig(
     """
     calibrated, started = tuple(views), None
     if look and watch.tags and len(views):
-        started = aligned(views, _reference(views))
+        started = aligned(
+            views, _reference(views), lambda a, b: _misfit_px([a, b], watch, survey_std_m)
+        )
         views = started.views
         refuse_gross(views, watch, started.pairs)
     instants = instants_of(views)
@@ -111,6 +113,20 @@ def correct_rig(
     refuse_disagreement(final, after)
     findings = _findings(calibrated, final, moved, clocks, lines, last)
     return Corrected(tuple(final), poses, before, after, findings, remarks)
+
+
+def _misfit_px(views: Sequence[CameraViews], watch: Watch, survey_std_m: float) -> float:
+    """What is left between cameras when their clocks and line times are free."""
+    instants, current = instants_of(views), list(views)
+    poses, fit = fuse(current, watch, instants, passes=2, rough=True)
+    if int(poses.known.sum()) < _LEAST_KNOWN:
+        return float("inf")
+    free = np.zeros((len(views), PER_CAMERA), dtype=bool)
+    free[:, LINE] = True
+    free[:, CLOCK] = np.arange(len(views)) != _reference(current)
+    _iterate(current, watch, poses, fit, free, np.zeros_like(free, dtype=float), survey_std_m)
+    _, fit = fuse(current, watch, instants, start=poses, passes=2, rough=True)
+    return float(np.sqrt(np.mean(fit.floor_px**2)))
 
 
 def _refuse_far(views: Sequence[CameraViews], final: Sequence[CameraViews]) -> None:

@@ -62,23 +62,18 @@ class Pair:
         T_first_second: the second camera in the first's frame, as the platform says, (4, 4).
         miss_m: median distance of points about the platform after that, in metres.
         known_m: the same with the cameras where their calibration has them.
-        rival_m: of the measure that decided, the best at another lag, infinite without one.
-        decided_m: that measure at `lag_s`.
+        decided_m: of the two, the one that decided between lags.
         at_zero_m: that measure without a lag, infinite where the records then do not overlap.
+        rivals: other lags and that measure there, best first.
     """
 
     lag_s: float
     T_first_second: Array
     miss_m: float
     known_m: float
-    rival_m: float
     decided_m: float
     at_zero_m: float
-
-    @property
-    def confidence(self) -> float:
-        """How many times worse the next best lag is."""
-        return self.rival_m / max(self.decided_m, 1e-9)
+    rivals: tuple[tuple[float, float], ...]
 
 
 def pair_of(first: OwnTrack, second: OwnTrack, T_known: Array) -> Pair | None:
@@ -107,22 +102,24 @@ def pair_of(first: OwnTrack, second: OwnTrack, T_known: Array) -> Pair | None:
     def size(fit: Fitted) -> float:
         return fit.known_m if by_known else fit.miss_m
 
-    best = min(found, key=size)
-    width = step / _STEPS_A_FRAME
-    for _ in range(_HALVINGS):
-        width *= 0.6
-        near = [_fitted(first, second, best.lag_s + s, T_known) for s in (-width, width)]
-        best = min([best, *(f for f in near if f is not None)], key=size)
-    rivals = [size(fit) for fit in found if abs(fit.lag_s - best.lag_s) > 2.0 * step]
-    return Pair(
-        best.lag_s,
-        best.T_first_second,
-        best.miss_m,
-        best.known_m,
-        min(rivals, default=float("inf")),
-        size(best),
-        float("inf") if zero is None else size(zero),
-    )
+    def refined(fit: Fitted) -> Fitted:
+        width = step / _STEPS_A_FRAME
+        for _ in range(_HALVINGS):
+            width *= 0.6
+            near = [_fitted(first, second, fit.lag_s + s, T_known) for s in (-width, width)]
+            fit = min([fit, *(f for f in near if f is not None)], key=size)
+        return fit
+
+    tried = sorted((refined(fit) for fit in found), key=size)
+    best = tried[0]
+    rivals: list[tuple[float, float]] = []
+    for fit in tried[1:]:
+        taken = (best.lag_s, *(lag for lag, _ in rivals))
+        if all(abs(fit.lag_s - lag) > 2.0 * step for lag in taken):
+            rivals.append((fit.lag_s, size(fit)))
+    at_zero = float("inf") if zero is None else size(zero)
+    parts = best.lag_s, best.T_first_second, best.miss_m, best.known_m
+    return Pair(*parts, size(best), at_zero, tuple(rivals))
 
 
 def _speeds(track: OwnTrack) -> tuple[Array, Array]:
@@ -185,22 +182,31 @@ class Fitted:
 def _fitted(first: OwnTrack, second: OwnTrack, lag: float, T_known: Array) -> Fitted | None:
     """The one motion that carries the second camera's poses onto the first's."""
     at = second.times_s + lag
-    right = np.searchsorted(first.times_s, at)
-    inside = (right > 0) & (right < len(first.times_s))
-    right = np.clip(right, 1, len(first.times_s) - 1)
-    gap = first.times_s[right] - first.times_s[right - 1]
-    inside &= gap < 1.5 * first.step_s
+    times = first.times_s
+    right = np.searchsorted(times, at)
+    inside = (right > 1) & (right < len(times) - 1)
+    four = np.clip(right, 2, len(times) - 2)[:, None] + np.arange(-2, 2)
+    inside &= np.diff(times[four], axis=1).max(axis=1) < 1.5 * first.step_s
     if inside.sum() < _LEAST_OVERLAP or np.ptp(at[inside]) < LEAST_OVERLAP_S:
         return None
-    share = ((at - first.times_s[right - 1]) / gap)[inside, None, None]
-    own = _points(second)[inside]
-    whole = _points(first)
-    seen = (1.0 - share) * whole[right[inside] - 1] + share * whole[right[inside]]
+    four, own = four[inside], _points(second)[inside]
+    weights = _cubic(times[four], at[inside])
+    seen = np.einsum("nk,nkpa->npa", weights, _points(first)[four])
     miss = _misses(rigid(own.reshape(-1, 3), seen.reshape(-1, 3)), own, seen)
     good = miss <= 2.0 * np.median(miss)
     T = rigid(own[good].reshape(-1, 3), seen[good].reshape(-1, 3))
     known = float(np.median(_misses(T_known, own, seen)))
     return Fitted(lag, float(np.median(_misses(T, own, seen))), known, T)
+
+
+def _cubic(times: Array, at: Array) -> Array:
+    """Weights of the cubic through samples at four times (n, 4), read at (n,)."""
+    weights = np.ones_like(times)
+    for i in range(4):
+        for j in range(4):
+            if i != j:
+                weights[:, i] *= (at - times[:, j]) / (times[:, i] - times[:, j])
+    return weights
 
 
 def _misses(T: Array, own: Array, seen: Array) -> Array:
