@@ -69,14 +69,19 @@ def likelihood(runs: list[SwingRun], start: Array, at: list[Motion] | None = Non
 
 
 def bound_of(motions: list[Motion], error_m: float) -> Array:
-    """Cramer-Rao standard deviations of the nine parameters, (9,).
+    """Cramer-Rao standard deviations of the nine parameters, (9,)."""
+    return np.sqrt(np.diag(covariance_bound_of(motions, error_m)))
+
+
+def covariance_bound_of(motions: list[Motion], error_m: float) -> Array:
+    """Cramer-Rao covariance of the nine parameters, (9, 9).
 
     Taken at a fit from the truth to noisy samples: without noise the residuals are the
     integrator's, whose colour the fit would take for a model error and enlarge its covariance.
     """
     runs = runs_of(motions, np.random.default_rng(0), NOISE_M, 0.0)
     told = [replace(run, lengths_std_m=error_m or KNOWN_LENGTHS_STD_M) for run in runs]
-    return likelihood(told, TRUE_INERTIA, motions).std
+    return likelihood(told, TRUE_INERTIA, motions).covariance[:9, :9]
 
 
 def one_draw(motions: list[Motion], seed: int, draw: int, error_m: float) -> dict[str, Any]:

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from freeswing.calib.board.board_pose import best_poses
 from freeswing.calib.camera.camera import Camera
 from freeswing.calib.camera.lens_models import Array
 from freeswing.calib.rig.reprojection import Scene
@@ -274,13 +273,3 @@ def _apart(cameras: tuple[Camera, ...], inside: list[int], outside: list[int]) -
         f"board in both, need {LEAST_SHARED}; film the board where one of {here} and one of "
         f"{there} see it at once, or survey base tags so that each of these cameras sees two"
     )
-
-
-def poses_of_views(cameras: tuple[Camera, ...], points: Array, views: Views) -> Array:
-    """Board pose of every view in its own camera, NaN where none fits, (n_views, 4, 4)."""
-    poses = np.full((len(views), 4, 4), np.nan)
-    for index, camera in enumerate(cameras):
-        own = views.camera == index
-        if own.any():
-            poses[own] = best_poses(camera, points, views.pixels[own])
-    return poses

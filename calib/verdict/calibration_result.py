@@ -50,12 +50,6 @@ class CameraCovariance:
         """Covariance of one camera's lens parameters, (k, k)."""
         return self.block([f"{camera.name}.{entry}" for entry in PARAMETER_NAMES[camera.model]])
 
-    def lens_and_pose(self, camera: Camera) -> Array:
-        """Joint covariance of one camera's lens parameters and (dt, dr), (k + 6, k + 6)."""
-        tangent = ("tx_m", "ty_m", "tz_m", "rx_rad", "ry_rad", "rz_rad")
-        entries = (*PARAMETER_NAMES[camera.model], *tangent)
-        return self.block([f"{camera.name}.{entry}" for entry in entries])
-
     def block(self, names: list[str]) -> Array:
         """The sub-matrix of the named parameters.
 

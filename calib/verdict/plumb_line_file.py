@@ -16,9 +16,13 @@ from freeswing.cdpr.files.documents import InputError, read_text
 CLICK_STD_PX = 0.5
 _COLUMNS = ("camera", "u_px", "v_px")
 _MOST_BYTES = 1 << 24
-_LEAST_LENGTH_STD = 20.0
-_WORST_SCATTER = 2.0
-_DEVIATIONS = 3.0
+# A string this many click deviations long has its direction to 1/20 rad: shorter ones say nothing.
+LEAST_LENGTH_STD = 20.0
+# Scatter of the clicks over their deviation: people misjudge that by a half; twice is a wrong
+# click.
+WORST_SCATTER = 2.0
+# Between the string and gravity_m_s2: by chance once in 90 where both are right.
+DEVIATIONS = 3.0
 
 
 def read_plumb_line(path: Path | str, cameras: Collection[str]) -> tuple[StringView, ...]:
@@ -68,7 +72,7 @@ def _numbers(row: dict[str, str | None], where: str) -> tuple[float, float, floa
 def _view(path: Path | str, camera: str, line: str, rows: Array) -> StringView:
     view = StringView(camera, line, rows[:, :2], rows[:, 2])
     length = float(np.linalg.norm(view.pixels[-1] - view.pixels[0]))
-    least = _LEAST_LENGTH_STD * float(view.std_px.max())
+    least = LEAST_LENGTH_STD * float(view.std_px.max())
     if length < least:
         raise InputError(
             f"{path}: {view}: {len(rows)} point(s), the first and the last {length:.1f} px apart, "
@@ -122,14 +126,14 @@ def _std_along(difference: Array, covariance: Array) -> float:
 
 def _judged(vertical: Vertical, angle: float, std: float, gravity: Array) -> tuple[str, str]:
     told = f"the plumb line is {1e3 * angle:.2f} mrad from gravity_m_s2 (deviation {1e3 * std:.2f})"
-    if vertical.scatter > _WORST_SCATTER:
+    if vertical.scatter > WORST_SCATTER:
         return "inconsistent", (
             f"{told}, but the clicked points scatter by {vertical.scatter:.1f} times their "
-            f"std_px about one vertical, more than {_WORST_SCATTER:g}: look for a wrong click, a "
+            f"std_px about one vertical, more than {WORST_SCATTER:g}: look for a wrong click, a "
             "string that swayed or touched something, or state a larger std_px"
         )
-    if angle <= _DEVIATIONS * std:
-        return "agrees", f"{told}: they agree within {_DEVIATIONS:g} deviations"
+    if angle <= DEVIATIONS * std:
+        return "agrees", f"{told}: they agree within {DEVIATIONS:g} deviations"
     vector = ", ".join(f"{value:.5f}" for value in gravity)
     turned = "the strings were clicked from the bottom up, or " if angle > np.pi / 2 else ""
     return "differs", f"{told}: {turned}set gravity_m_s2 = [{vector}] in robot.toml"

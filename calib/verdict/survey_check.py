@@ -11,9 +11,14 @@ from freeswing.calib.camera.lens_models import Array
 from freeswing.calib.rig.triangulation import triangulate
 from freeswing.calib.rig.views import FixedPoints
 
+# A board's squares and a survey's tape err by 0.1 to 0.2 % each; 0.5 % is one of them read wrong.
 SCALE_LIMIT = 0.005
+# Surveys are good to 1 or 2 mm. 5 mm is a tag that was taken for another, turned, or moved.
 TAG_LIMIT_M = 0.005
-_LEAST_TRIANGULATED = 4
+# Residual as a mirror image over that as it is: noise and one wrong tag spoil both alike.
+MIRRORED = 0.3
+# Four corners: one tag, as little as tells a mirror image from a turn.
+LEAST_TRIANGULATED = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +46,7 @@ def check_survey(cameras: tuple[Camera, ...], fixed: FixedPoints) -> SurveyCheck
     pixels[fixed.camera, fixed.point] = fixed.pixels
     points = triangulate(cameras, pixels)
     good = np.isfinite(points[:, 0])
-    if good.sum() < _LEAST_TRIANGULATED:
+    if good.sum() < LEAST_TRIANGULATED:
         return SurveyCheck(int(good.sum()), np.nan, np.nan, np.nan, ())
     survey, seen = fixed.points_base_m[good], points[good]
     residual, scale = _fit(survey, seen, mirror=False)
@@ -49,7 +54,7 @@ def check_survey(cameras: tuple[Camera, ...], fixed: FixedPoints) -> SurveyCheck
     rms, mirrored_rms = _rms(residual), _rms(mirrored)
     names = np.array(fixed.names)[good]
     reasons: list[str] = []
-    if mirrored_rms < 0.3 * rms and rms > TAG_LIMIT_M:
+    if mirrored_rms < MIRRORED * rms and rms > TAG_LIMIT_M:
         reasons.append(
             f"the surveyed base tags are a mirror image of what the cameras see (rigid fit "
             f"{1e3 * rms:.1f} mm, mirrored {1e3 * mirrored_rms:.1f} mm): the survey's axes are "
@@ -82,7 +87,7 @@ def _wrong_tags(names: np.ndarray, survey: Array, seen: Array) -> list[str]:
     for tag in dict.fromkeys(tags.tolist()):
         own = tags == tag
         others = ~own
-        base = own if others.sum() < _LEAST_TRIANGULATED else others
+        base = own if others.sum() < LEAST_TRIANGULATED else others
         moved = _placed(seen, survey[base], seen[base])
         error = _rms(moved[own] - survey[own])
         if error <= TAG_LIMIT_M or (base is others and _rms(moved[base] - survey[base]) > error):

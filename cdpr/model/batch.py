@@ -137,8 +137,3 @@ def only(function: Any, *outputs: int) -> Any:
     names = [function.name_out()[output] for output in outputs]
     parts = "_".join(str(output) for output in outputs)
     return function.factory(f"{function.name()}_only_{parts}", function.name_in(), names)
-
-
-def first_output(function: Any) -> Any:
-    """The function with its first output alone."""
-    return only(function, 0)

@@ -19,11 +19,16 @@ from freeswing.ident.estimate import Estimate
 from freeswing.ident.likelihood.likelihood import LikelihoodFit
 from freeswing.ident.likelihood.likelihood_run import predicted
 
-LEAST_EXPLAINED = 0.25  # of the variance of a run's motion
-LEAST_EXPLAINED_BY_NO_BODY = 0.75  # the same where the fit needs an inertia that no body has
-# Accelerations, unexplained root mean square of the best run, that FIDIM's equations may leave:
-WORST_ACCELERATION = 0.5  # where no fit of the motions stands beside it
-WORST_OF_NO_BODY = 0.3  # where no body has its inertia
+# Of the variance of a run's motion. Half is left to a swing whose losses were not declared, and
+# half of that is room; a curve that obeys no law is explained by chance alone.
+LEAST_EXPLAINED = 0.25
+# The same where the fit needs an inertia that no body has: then nothing speaks for it but its fit.
+LEAST_EXPLAINED_BY_NO_BODY = 0.75
+# Accelerations, unexplained root mean square of the best run, that FIDIM's equations may leave
+# where no fit of the motions stands beside it: a quarter of their variance.
+WORST_ACCELERATION = 0.5
+# And where no body has its inertia: a tenth of it.
+WORST_OF_NO_BODY = 0.3
 
 
 class LawlessError(ValueError):

@@ -11,6 +11,8 @@ from freeswing.cdpr.model.regressor import SwingMotion
 from freeswing.cdpr.robot import Array
 from freeswing.ident.signals.derivatives import Signals, UnusableRunError
 
+# Ten deviations of a length from poses good to half a millimetre: a drum that slipped or a cable
+# that hung through, which the doctor warned of from 3 mm on.
 LENGTH_LIMIT_M = 0.005
 STEEPEST_THETA_RAD = np.deg2rad(80.0)
 

@@ -29,9 +29,13 @@ from freeswing.ident.signals.motions import free_motion, full_motion
 
 Progress = Callable[[str, float], None]
 
+# Poses move this many times more than the free coordinates: noise of 0.1 mm becomes 2 mm, a tenth
+# of a usual swing.
 LARGEST_AMPLIFICATION = 20.0
 _LEAD_IN = 40
-_LEAST_SIGNAL = 5.0  # a swing's amplitude over the smoothed noise
+# A velocity over its smoothed noise: below, the equations' noise is larger than a fifth of
+# themselves.
+LEAST_SIGNAL = 5.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,10 +147,10 @@ def _checked_signals(run: SwingRun, settings: SignalSettings) -> Signals:
     with np.errstate(divide="ignore", invalid="ignore"):
         over = np.where(noise > 0.0, speed / noise, np.inf)
     best = int(np.argmax(over))
-    if not over[best] >= _LEAST_SIGNAL:
+    if not over[best] >= LEAST_SIGNAL:
         raise UnusableRunError(
             f"it hardly moves: its velocity is {over[best]:.1f} times the noise at most "
-            f"(in {signals.coordinates[best]}), {_LEAST_SIGNAL:g} times are needed; swing wider"
+            f"(in {signals.coordinates[best]}), {LEAST_SIGNAL:g} times are needed; swing wider"
         )
     return signals
 

@@ -73,6 +73,33 @@ HELD = (
         "tests/freeswing/doctor/test_doctor.py",
     ),
     Held(
+        "calib/verdict/survey_check.py",
+        ("SCALE_LIMIT", "TAG_LIMIT_M"),
+        "tests/calib/verdict/test_survey_limits.py",
+    ),
+    Held(
+        "calib/verdict/plumb_line_file.py",
+        ("LEAST_LENGTH_STD", "WORST_SCATTER", "DEVIATIONS"),
+        "tests/calib/verdict/test_survey_limits.py",
+    ),
+    Held(
+        "ident/judge/free_swing_law.py",
+        (
+            "LEAST_EXPLAINED", "LEAST_EXPLAINED_BY_NO_BODY", "WORST_ACCELERATION",
+            "WORST_OF_NO_BODY",
+        ),
+        "tests/ident/judge/test_limits.py",
+    ),
+    Held(
+        "ident/signals/window.py",
+        ("REFERENCE_S", "FOLLOWS", "GROWN"),
+        "tests/ident/signals/test_limits.py",
+    ),
+    Held("ident/signals/motions.py", ("LENGTH_LIMIT_M",), "tests/ident/signals/test_limits.py"),
+    Held("ident/signals/prepare.py", ("LEAST_SIGNAL",), "tests/ident/signals/test_limits.py"),
+    Held("vision/rig/correct_rig.py", ("SIGMAS",), "tests/vision/rig/test_rig_limits.py"),
+    Held("vision/rig/rig_effects.py", ("MOVED_PX", "LEAST_CLOCK_S", "LEAST_LINE_S"), "tests/vision/rig/test_rig_limits.py"),
+    Held(
         "freeswing/doctor/split.py", ("FEWEST_IDENTIFY",), "tests/freeswing/doctor/test_doctor.py"
     ),
 )  # fmt: skip

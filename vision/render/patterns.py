@@ -77,20 +77,6 @@ def plain_patch(
     return Patch(np.full((1, 1), reflectance), size_m, T_parent_patch, parent, shown_s)
 
 
-def pose_from_corners(corners_m: Array) -> Array:
-    """T_parent_tag of a square from its corners TL TR BR BL, (4, 3) -> (4, 4)."""
-    corners = np.asarray(corners_m, dtype=float)
-    right = corners[1] + corners[2] - corners[0] - corners[3]
-    up = corners[0] + corners[1] - corners[2] - corners[3]
-    x = right / np.linalg.norm(right)
-    z = np.cross(x, up)
-    z /= np.linalg.norm(z)
-    pose = np.eye(4)
-    pose[:3, :3] = np.column_stack([x, np.cross(z, x), z])
-    pose[:3, 3] = corners.mean(axis=0)
-    return pose
-
-
 def charuco_patch(
     squares: Sequence[int],
     square_m: float,

@@ -36,7 +36,9 @@ from freeswing.vision.rig.rig_kernels import CLOCK, LINE, PER_CAMERA, POSE
 
 Array = NDArray[np.float64]
 
-_SIGMAS = 6.0
+# A rig has two dozen numbers that could be off, deviations are good to some ten percent, and what
+# is changed for nothing spoils every pose: six of them leave no room for chance.
+SIGMAS = 6.0
 _STEPS = 3
 _LEAST_KNOWN = 20
 
@@ -165,15 +167,20 @@ def _estimate(
     poses, fit = fuse(current, watch, instants, start=poses, passes=2, rough=True)
     trial = rig_step(current, watch, poses, fit, with_lines, survey_std_m)
     lines = trial.changes[:, LINE]
-    real = np.abs(lines) > np.maximum(LEAST_LINE_S, _SIGMAS * trial.deviations[:, LINE])
+    real = is_real(lines, trial.deviations[:, LINE], LEAST_LINE_S)
     real &= np.abs(lines) < _longest_lines(current)
     if real.any():
         free[:, LINE] = real
         step = _iterate(current, watch, poses, fit, free, total, survey_std_m)
     clocks = total[:, CLOCK] - (np.median(total[:, CLOCK]) if n_c > 2 else 0.0)
     deviation = np.where(clock_free, step.deviations[:, CLOCK], step.deviations[:, CLOCK].max())
-    sure = np.abs(clocks) > np.maximum(LEAST_CLOCK_S, _SIGMAS * deviation)
+    sure = is_real(clocks, deviation, LEAST_CLOCK_S)
     return np.where(sure, clocks, 0.0), np.where(real, total[:, LINE], 0.0), step
+
+
+def is_real(values: Array, deviations: Array, least: float) -> NDArray[np.bool_]:
+    """Which values are surely not zero, and large enough to matter."""
+    return np.abs(values) > np.maximum(least, SIGMAS * deviations)
 
 
 def _iterate(

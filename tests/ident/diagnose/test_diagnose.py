@@ -69,10 +69,26 @@ def test_too_few_runs_are_refused_in_words(tmp_path):
         diagnose([*fitted, *checked], robot, workers=1, candidates=())
 
 
-def test_an_experiment_is_advised_for_any_group():
-    for group in (("gravity_tilt", "constant_force"), ("tether", "winch_creep")):
-        assert len(separating_experiment(group)) > 30
-    assert "payload" in separating_experiment(("gravity_tilt", "constant_force"))
+@pytest.mark.parametrize(
+    ("group", "advice"),
+    [
+        (("gravity_tilt", "constant_force"), "repeat some swings with a known payload"),
+        (("translational_drag", "quadratic_drag", "tether"), "let them die away"),
+        (("anchor_offset", "attachment_offset"), "equilibria spread over the whole workspace"),
+        (("winch_creep", "cable_length_bias"), "one run several times as long"),
+        (("tether", "winch_creep"), "record more runs, about other equilibria"),
+    ],
+)
+def test_the_experiment_that_a_group_shares_is_advised(group, advice):
+    told = separating_experiment(group)
+    assert advice in told, told
+    assert "; or " not in told, told
+
+
+def test_experiments_are_told_in_the_order_of_what_they_cost():
+    told = separating_experiment(("cable_elasticity", "winch_creep", "gravity_tilt"))
+    payload, long_run = (told.index(word) for word in ("known payload", "several times as long"))
+    assert payload < long_run, told
 
 
 def test_effect_values_come_with_their_deviations(tilted):

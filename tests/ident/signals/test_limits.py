@@ -1,0 +1,96 @@
+"""From which numbers on a stretch is a swing and a run is usable: both sides of each limit."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from freeswing.ident.signals import prepare
+from freeswing.ident.signals.derivatives import SignalSettings, UnusableRunError
+from freeswing.ident.signals.motions import mean_lengths
+from freeswing.ident.signals.window import free_window
+from tests.ident.swings import paper_model, swing
+
+RATE_RAD_S = 4.0
+
+
+def window_of(pushed, duration_s=12.0):
+    """The window of an oscillator whose acceleration is off by pushed(times)."""
+    times = np.arange(0.0, duration_s, 0.04)
+    value = 0.02 * np.sin(RATE_RAD_S * times)[:, None]
+    velocity = 0.02 * RATE_RAD_S * np.cos(RATE_RAD_S * times)[:, None]
+    acceleration = -(RATE_RAD_S**2) * value
+    size = np.sqrt(np.mean(acceleration**2))
+    off = size * pushed(times)[:, None]
+    return free_window(times, value, velocity, acceleration + off, np.ones(1))
+
+
+@pytest.mark.parametrize(("share", "is_swing"), [(0.33, True), (0.37, False)])
+def test_how_much_of_an_acceleration_may_not_follow_from_the_pose(share, is_swing) -> None:
+    """A shake at another frequency that is this share of the whole, root mean square."""
+    strength = share / np.sqrt(1.0 - share**2)
+    shaken = lambda times: strength * np.sqrt(2.0) * np.sin(25.0 * times)  # noqa: E731
+    if is_swing:
+        start, end = window_of(shaken)
+        assert end - start > 4.0, (start, end)
+    else:
+        with pytest.raises(ValueError, match=r"no free swing found: at best 3[67] %"):
+            window_of(shaken)
+
+
+@pytest.mark.parametrize(("push", "end_s"), [(0.44, 11.96), (0.52, 6.04)])
+def test_a_push_ends_the_free_motion(push, end_s) -> None:
+    """Half of it follows from the mean over 0.3 s, half from the passes that let go more."""
+    shaken = lambda times: push * np.sign(np.sin(25.0 * times + 0.3))  # noqa: E731
+    _, end = window_of(lambda times: np.where(times > 6.0, shaken(times), 0.0))
+    assert end == pytest.approx(end_s, abs=0.05), end
+
+
+@pytest.mark.parametrize(("duration_s", "long_enough"), [(4.2, True), (3.8, False)])
+def test_how_long_a_swing_must_be(duration_s, long_enough) -> None:
+    if long_enough:
+        start, end = window_of(np.zeros_like, duration_s)
+        assert end - start > 3.8, (start, end)
+    else:
+        with pytest.raises(ValueError, match="no unbroken 4 s"):
+            window_of(np.zeros_like, duration_s)
+
+
+@pytest.mark.parametrize(("off_m", "usable"), [(0.0048, True), (0.0052, False)])
+def test_lengths_that_vary(off_m, usable) -> None:
+    """One cable is off for an instant: the platform dips along the cable's slope."""
+    model = paper_model()
+    rest = swing(5).zetas[0]
+    poses = np.tile(rest, (1001, 1))
+    slope = _length(model, rest - [0, 0, 1e-5, 0, 0, 0])
+    slopes = (slope - _length(model, rest)) / 1e-5
+    poses[500, 2] -= off_m / np.abs(slopes).max()
+    signals = SimpleNamespace(values=poses)
+    if usable:
+        mean_lengths(model, signals)  # type: ignore[arg-type]
+    else:
+        with pytest.raises(UnusableRunError, match="limit 5 mm"):
+            mean_lengths(model, signals)  # type: ignore[arg-type]
+
+
+def _length(model, pose):
+    from freeswing.cdpr.model.batch import evaluate
+
+    return evaluate(model.lengths, pose, model.start_values)[0].ravel()
+
+
+@pytest.mark.parametrize(("over", "usable"), [(5.2, True), (4.8, False)])
+def test_motion_must_stand_out_of_its_noise(monkeypatch, over, usable) -> None:
+    velocities = np.tile([[0.01, 0.0]], (100, 1))
+    covariances = np.tile(np.diag([0.0, 0.0, 1.0, 1.0, 0.0, 0.0]) * (0.01 / over) ** 2, (100, 1, 1))
+    signals = SimpleNamespace(
+        coordinates=("x", "y"), velocities=velocities, covariances=covariances
+    )
+    monkeypatch.setattr(prepare, "signals_of", lambda *_: signals)
+    if usable:
+        assert prepare._checked_signals(None, SignalSettings()) is signals  # type: ignore[arg-type]
+    else:
+        with pytest.raises(UnusableRunError, match=r"is 4\.8 times the noise"):
+            prepare._checked_signals(None, SignalSettings())  # type: ignore[arg-type]
