@@ -52,7 +52,10 @@ def read_robot(path: Path | str) -> Robot:
     cables, points = [values for values, _ in read], [formulas for _, formulas in read]
     _check_cables(reader, cables)
     free = _read_free_coordinates(reader, len(cables))
-    platform = _read_platform(reader.child("platform", required=False), Path(path).parent)
+    attachments = np.array([values[3] for values in cables]).reshape(-1, 3)
+    platform = _read_platform(
+        reader.child("platform", required=False), Path(path).parent, _span(attachments)
+    )
     drive = None
     if driving is not None:
         motors = read_motors(driving, tables, named)
@@ -199,7 +202,14 @@ def _read_free_coordinates(reader: Reader, n_cables: int) -> tuple[str, ...] | N
     return names
 
 
-def _read_platform(reader: Reader | None, folder: Path) -> Platform:
+def _span(points: Array) -> float | None:
+    """The largest distance between two points (n, 3), None where there is none."""
+    if len(points) < 2 or not np.isfinite(points).all():
+        return None
+    return float(np.linalg.norm(points[:, None] - points[None], axis=-1).max()) or None
+
+
+def _read_platform(reader: Reader | None, folder: Path, span_m: float | None) -> Platform:
     if reader is None:
         return Platform()
     mass = reader.optional_number("mass_kg", above=0.0)
@@ -216,11 +226,11 @@ def _read_platform(reader: Reader | None, folder: Path) -> Platform:
     if mesh is None and (density is not None or unit is not None):
         reader.add("mesh", "missing; mesh_unit and density_kg_m3 say nothing without it")
     _check_inertia(reader, com, inertia)
-    needs_mesh = com is None or inertia is None or density is not None
-    if mesh and needs_mesh and not reader.problems:
+    if mesh and not reader.problems:  # read even where nothing is taken from it: it may be wrong
         try:
+            path = inside(folder, mesh)
             solid = platform_from_mesh(
-                inside(folder, mesh), unit or "m", mass_kg=mass, density_kg_m3=density
+                path, unit, mass_kg=mass, density_kg_m3=density, span_m=span_m
             )
         except InputError as error:
             reader.add("mesh", str(error))

@@ -5,6 +5,7 @@ import trimesh
 from freeswing.cdpr.files.documents import InputError
 from freeswing.cdpr.files.mesh import platform_from_mesh
 from freeswing.cdpr.files.robot_file import read_robot
+from tests.places import SAMPLES
 
 SIZE = np.array([0.4, 0.3, 0.1])
 CENTRE = np.array([0.02, -0.05, 0.2])
@@ -121,4 +122,77 @@ def test_a_robot_file_names_its_mesh_problem(tmp_path):
         read_robot(path)
     path.write_text(ROBOT.format(more="").replace("cad/body.stl", "../body.stl"))
     with pytest.raises(InputError, match=r"platform\.mesh: .*leads out of"):
+        read_robot(path)
+
+
+def _two_boxes(path, offset, invert=False, scale=1.0):
+    one, other = trimesh.creation.box((0.2, 0.2, 0.1)), trimesh.creation.box((0.1, 0.1, 0.05))
+    other.apply_translation(offset)
+    if invert:
+        other.invert()
+    both = trimesh.util.concatenate([one, other])
+    both.apply_scale(scale)
+    both.export(path)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("offset", "invert", "told"),
+    [
+        ([0.1, 0.0, 0.0], False, "bodies 1 and 2 of 2.*overlap"),
+        ([0.0, 0.0, 0.0], False, "overlap"),
+        ([0.4, 0.0, 0.0], True, "body 2 of 2, about \\(0.4, 0, 0\\) m, is inside out"),
+    ],
+)
+def test_bodies_that_overlap_or_are_inside_out_are_named(tmp_path, offset, invert, told):
+    path = _two_boxes(tmp_path / "two.stl", offset, invert)
+    with pytest.raises(InputError, match=told):
+        platform_from_mesh(path)
+
+
+def test_hollow_spaces_and_neighbours_are_bodies(tmp_path):
+    hollow = platform_from_mesh(
+        _two_boxes(tmp_path / "hollow.stl", [0.0, 0.0, 0.0], invert=True), density_kg_m3=1000.0
+    )
+    apart = platform_from_mesh(
+        _two_boxes(tmp_path / "apart.stl", [0.4, 0.0, 0.0]), density_kg_m3=1000.0
+    )
+    np.testing.assert_allclose([hollow.mass_kg, apart.mass_kg], [3.5, 4.5], rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("size", "unit", "told"),
+    [
+        (80.0, None, 'no mesh_unit .* mesh_unit = "mm" would make it 0.08 m'),
+        (0.4 * 8.2, None, 'mesh_unit = "in" would make it 0.0833 m'),
+        (0.4 * 31.0, "m", 'with mesh_unit = "m"'),
+        (0.4 / 31.0, "m", 'with mesh_unit = "m"'),
+    ],
+)
+def test_a_body_that_is_not_of_its_cables_size_has_its_unit_questioned(tmp_path, size, unit, told):
+    path = tmp_path / "body.stl"
+    trimesh.creation.box((size, size / 2, size / 2)).export(path)
+    with pytest.raises(InputError, match=told):
+        platform_from_mesh(path, unit, span_m=0.4)
+
+
+@pytest.mark.parametrize(("size", "unit"), [(0.4 * 7.8, None), (0.4 / 7.8, None), (0.4 * 29, "m")])
+def test_a_body_of_about_its_cables_size_is_believed(tmp_path, size, unit):
+    path = tmp_path / "body.stl"
+    trimesh.creation.box((size, size / 2, size / 2)).export(path)
+    assert platform_from_mesh(path, unit, span_m=0.4).com_m is not None
+
+
+def test_accents_in_a_header_are_read(tmp_path):
+    path = tmp_path / "latin.stl"
+    text = trimesh.creation.box((0.2, 0.2, 0.1)).export(file_type="stl_ascii")
+    path.write_bytes(text.replace("solid ", "solid Tr\u00e4ger ", 1).encode("latin-1"))
+    np.testing.assert_allclose(platform_from_mesh(path).com_m, 0.0, atol=1e-9)
+
+
+def test_a_mesh_that_nothing_is_taken_from_is_checked_too(tmp_path):
+    text = (SAMPLES / "three-cables" / "robot.toml").read_text()
+    path = tmp_path / "robot.toml"
+    path.write_text(text.replace("[platform]", '[platform]\nmesh = "/etc"', 1))
+    with pytest.raises(InputError, match="must be relative"):
         read_robot(path)
