@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from argparse import ArgumentParser, Namespace
+import math
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,6 +12,8 @@ if TYPE_CHECKING:
 
     from freeswing.session.session_file import Session
     from freeswing.workers.crew import Crew
+
+MOST_WORKERS = 1024  # more processes than any machine's cores: a mistyped number
 
 
 def add_session(parser: ArgumentParser) -> None:
@@ -28,13 +31,53 @@ def add_results(parser: ArgumentParser, usual: str) -> None:
 def add_workers(parser: ArgumentParser) -> None:
     """Who works side by side."""
     parser.add_argument(
-        "--workers", type=int, default=0, metavar="N", help="processes; default one a core"
+        "--workers", type=worker_count, default=0, metavar="N", help="processes; default one a core"
     )
     parser.add_argument(
         "--cluster",
         metavar="ADDRESS",
         help="hand recordings and refits to the Dask cluster whose scheduler is there",
     )
+
+
+def worker_count(text: str) -> int:
+    """A number of processes, at least one."""
+    count = int(text) if text.strip().isdecimal() else 0
+    if not 1 <= count <= MOST_WORKERS:
+        raise ArgumentTypeError(
+            f"{text!r}: give 1 to {MOST_WORKERS}, or leave it out for all cores"
+        )
+    return count
+
+
+def whole(text: str) -> int:
+    """A whole number, zero or above."""
+    if not text.strip().isdecimal():
+        raise ArgumentTypeError(f"{text!r}: give a whole number, 0 or above")
+    return int(text)
+
+
+def positive_whole(text: str) -> int:
+    """A whole number above zero."""
+    if whole(text) == 0:
+        raise ArgumentTypeError(f"{text!r}: give a whole number above 0")
+    return int(text)
+
+
+def positive(text: str) -> float:
+    """A finite number above zero."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not (math.isfinite(value) and value > 0.0):
+        raise ArgumentTypeError(f"{text!r}: give a finite number above 0")
+    return value
+
+
+def not_negative(text: str) -> float:
+    """A finite number, zero or above."""
+    return 0.0 if text.strip() in ("0", "0.0") else positive(text)
 
 
 def open_session(options: Namespace) -> Session:

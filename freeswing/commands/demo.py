@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from freeswing.commands.arguments import add_workers, crew_of
+from freeswing.commands.arguments import add_workers, crew_of, whole
 from freeswing.console import Console
 
 
@@ -18,7 +18,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         "--mocap", action="store_true", help="motion capture instead of cameras: quicker"
     )
     add_workers(parser)
-    parser.add_argument("--seed", type=int, default=1, help="another seed, another session")
+    parser.add_argument("--seed", type=whole, default=1, help="another seed, another session")
 
 
 def run(options: Namespace, console: Console) -> None:

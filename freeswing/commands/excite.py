@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from freeswing.commands.arguments import add_results
+from freeswing.commands.arguments import add_results, positive, positive_whole, whole
 from freeswing.console import Console
 
 
@@ -13,9 +13,11 @@ def add_arguments(parser: ArgumentParser) -> None:
     """The robot and the limits."""
     parser.add_argument("robot", metavar="ROBOT", help="robot.toml with nominal inertia and mass")
     add_results(parser, "ROBOT's folder/results")
-    parser.add_argument("--swings", type=int, default=12, metavar="N", help="default 12")
-    parser.add_argument("--samples", type=int, default=100, metavar="N", help="a swing (100)")
-    parser.add_argument("--duration-s", type=float, default=10.0, help="of a swing, default 10")
+    parser.add_argument("--swings", type=positive_whole, default=12, metavar="N", help="default 12")
+    parser.add_argument(
+        "--samples", type=positive_whole, default=100, metavar="N", help="a swing (100)"
+    )
+    parser.add_argument("--duration-s", type=positive, default=10.0, help="of a swing, default 10")
     parser.add_argument(
         "--tension-n",
         type=float,
@@ -24,12 +26,12 @@ def add_arguments(parser: ArgumentParser) -> None:
         metavar=("LOW", "HIGH"),
         help="cable tensions, default 20 200",
     )
-    parser.add_argument("--reach-m", type=float, default=0.1, help="displacement, default 0.1")
-    parser.add_argument("--mass-kg", type=float, help="instead of the robot file's")
-    parser.add_argument("--starts", type=int, default=30, metavar="N", help="default 30")
-    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--reach-m", type=positive, default=0.1, help="displacement, default 0.1")
+    parser.add_argument("--mass-kg", type=positive, help="instead of the robot file's")
+    parser.add_argument("--starts", type=positive_whole, default=30, metavar="N", help="default 30")
+    parser.add_argument("--seed", type=whole, default=0)
     parser.add_argument(
-        "--random", type=int, default=0, metavar="N", help="score N random plans beside the best"
+        "--random", type=whole, default=0, metavar="N", help="score N random plans beside the best"
     )
     parser.add_argument(
         "--winch",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING
 
-from freeswing.commands.arguments import add_session, open_session
+from freeswing.commands.arguments import add_session, open_session, positive
 from freeswing.console import Console
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     kinds.add_argument("--mjcf", dest="kind", action="store_const", const="mjcf")
     kinds.add_argument("--plain", dest="kind", action="store_const", const="plain", help="JSON")
     parser.add_argument(
-        "--mass-kg", type=float, help="mass, where neither payload runs nor robot.toml tell it"
+        "--mass-kg", type=positive, help="mass, where neither payload runs nor robot.toml tell it"
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from freeswing.commands.arguments import add_results
+from freeswing.commands.arguments import add_results, positive_whole, whole
 from freeswing.console import Console
 
 
@@ -27,9 +27,13 @@ def add_arguments(parser: ArgumentParser) -> None:
         help="write a simulated acquisition with its truth to DIR, ready for `home`",
     )
     parser.add_argument(
-        "--poses", type=int, default=61, metavar="N", help="static poses to simulate (61)"
+        "--poses",
+        type=positive_whole,
+        default=61,
+        metavar="N",
+        help="poses to simulate (61)",
     )
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the simulation (0)")
+    parser.add_argument("--seed", type=whole, default=0, metavar="N", help="of the simulation (0)")
 
 
 def run(options: Namespace, console: Console) -> None:

@@ -6,6 +6,7 @@ from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from freeswing.commands.arguments import not_negative, positive, whole
 from freeswing.commands.simulate_drive import add_drive_arguments, run_drive
 from freeswing.console import Console
 
@@ -34,12 +35,12 @@ def add_arguments(parser: ArgumentParser) -> None:
         metavar="PARAMETER=VALUE",
         help="value of an effect's parameter, such as rate_1_s=0.05",
     )
-    parser.add_argument("--amplitude-m", type=float, default=0.03, help="release, default 0.03")
-    parser.add_argument("--duration-s", type=float, default=10.0, help="default 10")
-    parser.add_argument("--rate-hz", type=float, help="default 100; of a driven robot 1000")
-    parser.add_argument("--noise-m", type=float, default=0.0, help="std of each coordinate")
-    parser.add_argument("--noise-rad", type=float, default=0.0, help="std of each angle")
-    parser.add_argument("--seed", type=int, default=0, help="decides the release and the noise")
+    parser.add_argument("--amplitude-m", type=positive, default=0.03, help="release, default 0.03")
+    parser.add_argument("--duration-s", type=positive, default=10.0, help="default 10")
+    parser.add_argument("--rate-hz", type=positive, help="default 100; of a driven robot 1000")
+    parser.add_argument("--noise-m", type=not_negative, default=0.0, help="std of each coordinate")
+    parser.add_argument("--noise-rad", type=not_negative, default=0.0, help="std of each angle")
+    parser.add_argument("--seed", type=whole, default=0, help="decides the release and the noise")
     add_drive_arguments(parser)
 
 

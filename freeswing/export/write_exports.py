@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
-from xml.etree.ElementTree import Element, SubElement, indent, tostring
+from xml.etree.ElementTree import Element, SubElement, fromstring, indent, tostring
 
 import numpy as np
 
+from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.robot import INERTIA_NAMES, Array, Robot
+
+_NOT_XML = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,17 +32,36 @@ class Inertia:
 
 
 def inertia_from(parameters: Mapping[str, float], mass_kg: float) -> Inertia:
-    """From specific inertia about P (`INERTIA_NAMES`) by Huygens-Steiner."""
+    """From specific inertia about P (`INERTIA_NAMES`) by Huygens-Steiner.
+
+    Raises:
+        DataError: where no body can have it (other programs refuse it too), with the moments.
+    """
     values = np.array([parameters[name] for name in INERTIA_NAMES])
     com, (xx, yy, zz, xy, xz, yz) = values[:3], values[3:]
     about_p = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     about_com = about_p - (com @ com * np.eye(3) - np.outer(com, com))
+    moments = np.linalg.eigvalsh(about_com)
+    if not (mass_kg > 0.0 and moments[0] > 0.0 and moments[0] + moments[1] >= moments[2]):
+        told = ", ".join(f"{mass_kg * value:.4g}" for value in moments)
+        raise DataError(
+            f"the principal moments about the centre of mass are {told} kg m2 (mass {mass_kg:g} "
+            "kg): no body can have them (each must be positive and at most the sum of the other "
+            "two), so nothing is exported; record more swings, or see identify --consistent"
+        )
     return Inertia(mass_kg, com, mass_kg * about_com)
 
 
 def urdf(robot: Robot, inertia: Inertia) -> str:
-    """One link whose frame is the platform's."""
-    root = Element("robot", name=robot.name)
+    """The platform's link, whose frame is the platform's, fixed to a root without mass.
+
+    Readers such as KDL ignore the inertia of a root link.
+    """
+    root = Element("robot", name=_named(robot.name))
+    SubElement(root, "link", name="root")
+    joint = SubElement(root, "joint", name="root_platform", type="fixed")
+    SubElement(joint, "parent", link="root")
+    SubElement(joint, "child", link="platform")
     inertial = SubElement(SubElement(root, "link", name="platform"), "inertial")
     SubElement(inertial, "origin", xyz=_numbers(inertia.com_m), rpy="0 0 0")
     SubElement(inertial, "mass", value=f"{inertia.mass_kg:.9g}")
@@ -51,12 +74,12 @@ def urdf(robot: Robot, inertia: Inertia) -> str:
 
 def mjcf(robot: Robot, inertia: Inertia) -> str:
     """A free body on spatial tendons from the pulleys' entry points (pulley radii are left out)."""
-    root = Element("mujoco", model=robot.name)
+    root = Element("mujoco", model=_named(robot.name))
     SubElement(root, "compiler", angle="radian")
     SubElement(root, "option", gravity=_numbers(robot.gravity_m_s2))
     world = SubElement(root, "worldbody")
     for cable in robot.cables:
-        SubElement(world, "site", name=f"entry {cable.name}", pos=_numbers(cable.entry_m))
+        SubElement(world, "site", name=f"entry {_named(cable.name)}", pos=_numbers(cable.entry_m))
     body = SubElement(world, "body", name="platform")
     SubElement(body, "freejoint")
     tensor = inertia.tensor_kg_m2
@@ -65,12 +88,12 @@ def mjcf(robot: Robot, inertia: Inertia) -> str:
     SubElement(body, "inertial", pos=_numbers(inertia.com_m), mass=mass, fullinertia=entries)
     for cable in robot.cables:
         place = _numbers(cable.attachment_m)
-        SubElement(body, "site", name=f"attachment {cable.name}", pos=place)
+        SubElement(body, "site", name=f"attachment {_named(cable.name)}", pos=place)
     tendons = SubElement(root, "tendon")
     for cable in robot.cables:
-        tendon = SubElement(tendons, "spatial", name=f"cable {cable.name}")
-        SubElement(tendon, "site", site=f"entry {cable.name}")
-        SubElement(tendon, "site", site=f"attachment {cable.name}")
+        tendon = SubElement(tendons, "spatial", name=f"cable {_named(cable.name)}")
+        SubElement(tendon, "site", site=f"entry {_named(cable.name)}")
+        SubElement(tendon, "site", site=f"attachment {_named(cable.name)}")
     return _text(root)
 
 
@@ -89,6 +112,20 @@ def _numbers(values: Array) -> str:
     return " ".join(f"{value:.9g}" for value in values)
 
 
+def _named(name: str) -> str:
+    """A name without the characters that XML 1.0 cannot hold."""
+    return _NOT_XML.sub("_", name)
+
+
 def _text(root: Element) -> str:
+    """The document, after it was read back: what other programs get is what was meant.
+
+    Raises:
+        ValueError: where the text does not parse to the same elements.
+    """
     indent(root)
-    return tostring(root, encoding="unicode") + "\n"
+    text = tostring(root, encoding="unicode") + "\n"
+    again = [(element.tag, element.attrib) for element in fromstring(text).iter()]
+    if again != [(element.tag, element.attrib) for element in root.iter()]:
+        raise ValueError(f"the written {root.tag} document does not read back as it was meant")
+    return text

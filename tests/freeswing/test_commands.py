@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import json
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from pathlib import Path
 
 import mujoco
 import numpy as np
 import pytest
 
-from freeswing.cdpr.files.documents import write_json
+from freeswing.cdpr.files.documents import DataError, write_json
+from freeswing.cdpr.files.robot_file import read_robot
 from freeswing.cdpr.files.trajectory_files import read_trajectory
 from freeswing.cdpr.robot import INERTIA_NAMES
+from freeswing.export.write_exports import inertia_from, urdf
 from freeswing.main import main
 from tests.places import SAMPLES
 
@@ -52,7 +55,6 @@ def test_simulate_takes_effects(tmp_path: Path) -> None:
     [
         (("--effect", "gremlins"), 2),
         (("--set", "rate_1_s=1"), 2),
-        (("--duration-s", "-1"), 2),
         (("--amplitude-m", "5"), 2),
     ],
 )
@@ -94,11 +96,27 @@ def test_exports_agree_with_mujoco(session: Path) -> None:
     np.testing.assert_allclose(model.body_ipos[1], [0.01, -0.02, 0.19], atol=1e-9)
     assert model.body_mass[1] == 5.0
     assert model.ntendon == 4
-    inertial = ET.parse(results / "platform.urdf").getroot().find("link/inertial")
+    root, platform = ET.parse(results / "platform.urdf").getroot().findall("link")
+    assert root.find("inertial") is None, "readers such as KDL ignore a root's inertia"
+    inertial = platform.find("inertial")
     assert inertial is not None
     tensor = inertial.find("inertia")
     assert tensor is not None
     assert float(str(tensor.get("ixx"))) == pytest.approx(plain["inertia_about_com_kg_m2"][0][0])
+
+
+def test_an_inertia_that_no_body_has_is_not_exported() -> None:
+    values = dict(zip(INERTIA_NAMES, (0, 0, 0, 0.01, 0.01, 0.0201, 0, 0, 0), strict=True))
+    with pytest.raises(DataError, match="no body can have them"):
+        inertia_from(values, 2.0)
+    just = {**values, "Izz_m2": 0.02}
+    assert inertia_from(just, 2.0).tensor_kg_m2[2, 2] == pytest.approx(0.04)
+
+
+def test_names_that_xml_cannot_hold_are_written_without_those_characters() -> None:
+    values = dict(zip(INERTIA_NAMES, (0, 0, 0, 0.01, 0.01, 0.015, 0, 0, 0), strict=True))
+    robot = replace(read_robot(ROBOT), name="arm\x01<&>")
+    assert ET.fromstring(urdf(robot, inertia_from(values, 2.0))).get("name") == "arm_<&>"
 
 
 def test_export_before_identify_is_1(session: Path, capsys: pytest.CaptureFixture[str]) -> None:
