@@ -9,12 +9,14 @@ from freeswing.cdpr.files.trajectory_c3d import read_c3d, write_c3d
 from freeswing.cdpr.files.trajectory_csv import read_csv, write_csv
 from freeswing.cdpr.files.trajectory_trc import read_trc, write_trc
 from freeswing.cdpr.files.trajectory_tum import read_tum, write_tum
-from freeswing.cdpr.measured.marker_recording import MarkerRecording, trajectory_from_markers
+from freeswing.cdpr.markers.from_recording import trajectory_from_markers
+from freeswing.cdpr.measured.marker_recording import MarkerRecording
 from freeswing.cdpr.measured.target import Target
 from freeswing.cdpr.measured.trajectory import Trajectory
 from freeswing.cdpr.robot import Robot
 
 __all__ = [
+    "holds_markers",
     "read_recording",
     "read_trajectory",
     "write_c3d",
@@ -58,6 +60,11 @@ def read_recording(path: Path | str) -> MarkerRecording:
     if suffix not in readers:
         raise InputError(f"{path}: holds no markers; name a .trc or .c3d file")
     return readers[suffix](path)
+
+
+def holds_markers(path: Path | str) -> bool:
+    """Whether a file's ending says that it holds markers."""
+    return Path(path).suffix.lower() in (".trc", ".c3d")
 
 
 def _suffix(path: Path | str) -> str:

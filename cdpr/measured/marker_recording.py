@@ -8,15 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.cdpr.files.problems import InputError
-from freeswing.cdpr.measured.rigid_fit import (
-    FEWEST_POINTS,
-    MarkerFit,
-    fit_markers,
-    is_planar_or_better,
-)
 from freeswing.cdpr.measured.target import Target
 from freeswing.cdpr.measured.trajectory import Trajectory
-from freeswing.cdpr.robot import Robot
 
 Array = NDArray[np.float64]
 
@@ -33,12 +26,14 @@ class MarkerRecording:
         names: labels, n_m of them, all different.
         positions_m: base frame, NaN where a marker is not seen, (n_t, n_m, 3).
         source: the file's name, for messages.
+        notes: what the reader took for what, one sentence each.
     """
 
     times_s: Array
     names: tuple[str, ...]
     positions_m: Array
     source: str = "recording"
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         times, positions = (np.array(a, dtype=np.float64) for a in (self.times_s, self.positions_m))
@@ -52,12 +47,22 @@ class MarkerRecording:
         if len(set(self.names)) < len(self.names):
             raise ValueError(f"names: {self.names} are not all different")
 
+    @property
+    def step_s(self) -> float:
+        """Median time between samples."""
+        return float(np.median(np.diff(self.times_s))) if len(self.times_s) > 1 else 0.0
+
     def column(self, name: str) -> int | None:
-        """Index of a marker, also where the file writes `subject:name`; None when absent."""
-        if name in self.names:
-            return self.names.index(name)
-        ends = [i for i, label in enumerate(self.names) if label.rpartition(":")[2] == name]
-        return ends[0] if len(ends) == 1 else None
+        """Index of a marker, also where the file writes `subject:name` or capitals; None if absent.
+
+        Of several that match alike none is taken.
+        """
+        plain = [label.rpartition(":")[2] for label in self.names]
+        folded = [label.casefold() for label in plain]
+        for labels, wanted in ((self.names, name), (plain, name), (folded, name.casefold())):
+            if wanted in labels:
+                return labels.index(wanted) if list(labels).count(wanted) == 1 else None
+        return None
 
     def select(self, names: tuple[str, ...]) -> MarkerRecording:
         """The named markers, NaN throughout for those that the recording does not hold."""
@@ -66,7 +71,7 @@ class MarkerRecording:
             column = self.column(name)
             if column is not None:
                 positions[:, i] = self.positions_m[:, column]
-        return MarkerRecording(self.times_s, names, positions, self.source)
+        return MarkerRecording(self.times_s, names, positions, self.source, self.notes)
 
 
 def recording_from_poses(trajectory: Trajectory, target: Target) -> MarkerRecording:
@@ -75,12 +80,6 @@ def recording_from_poses(trajectory: Trajectory, target: Target) -> MarkerRecord
     positions = moved + trajectory.positions()[:, None, :]
     source = trajectory.provenance or "trajectory"
     return MarkerRecording(trajectory.times_s, target.marker_names, positions, source)
-
-
-def fit_recording(recording: MarkerRecording, target: Target) -> MarkerFit:
-    """Poses by rigid fit of the target's markers; see `cdpr.measured.rigid_fit.fit_markers`."""
-    chosen = recording.select(target.marker_names)
-    return fit_markers(target.marker_positions_m, chosen.positions_m)
 
 
 def marker_position(recording: MarkerRecording, target: Target | None = None) -> Array:
@@ -103,43 +102,3 @@ def marker_position(recording: MarkerRecording, target: Target | None = None) ->
             "in the target file"
         )
     return recording.positions_m[:, column]
-
-
-def trajectory_from_markers(
-    recording: MarkerRecording, robot: Robot | None = None, target: Target | None = None
-) -> Trajectory:
-    """Poses where three markers or more fix them, else the reference point's free coordinates.
-
-    Raises:
-        InputError: when the recording's markers tell neither.
-        DataError: when no sample shows enough of them.
-    """
-    known = [m for m in target.markers if recording.column(m.name) is not None] if target else []
-    if is_planar_or_better(np.array([m.position_m for m in known])):
-        return _poses(recording, Target(markers=tuple(known)))
-    free = robot.free_coordinates if robot else None
-    coordinates = ("x", "y", "z") if free is None else free
-    angles = [name for name in coordinates if name not in ("x", "y", "z")]
-    if angles or not coordinates:
-        raise InputError(
-            f"{recording.source}: holds {len(known)} of the target's markers "
-            f"({', '.join(recording.names)[:200]}); a pose needs {FEWEST_POINTS} that are not on a "
-            "line: label them as in the target file"
-        )
-    columns = ["xyz".index(name) for name in coordinates]
-    values = marker_position(recording, target)[:, columns]
-    provenance = f"{recording.source}: reference marker alone"
-    return Trajectory(recording.times_s, coordinates, values, None, provenance)
-
-
-def _poses(recording: MarkerRecording, target: Target) -> Trajectory:
-    fit = fit_recording(recording, target)
-    change = float(np.linalg.norm(fit.layout_change_m, axis=1).max())
-    provenance = (
-        f"{recording.source}: rigid fit of {len(target.markers)} markers, "
-        f"noise {1e3 * fit.noise_std_m:.3g} mm, layout changed by up to {1e3 * change:.3g} mm"
-    )
-    covariances = fit.covariances if fit.noise_std_m > 0.0 else None
-    return Trajectory.from_poses(
-        recording.times_s, fit.positions_m, fit.rotations, covariances, provenance
-    )

@@ -62,14 +62,19 @@ def make(
 ) -> list[tuple[str, dict[str, Any]]]:
     """identification.json and motion.json as documents."""
     from freeswing.cdpr.files.documents import InputError
+    from freeswing.doctor.markers import marker_findings
     from freeswing.ident.identify import IdentifySettings, identify
     from freeswing.ident.likelihood.cable_ends import GeometryPriors
     from freeswing.ident.swing_places import swing_places
+    from freeswing.results.markers import marker_document
     from freeswing.results.motions import predicted_motions
     from freeswing.session.load_swings import load_robot, load_swings, load_target
+    from freeswing.session.marker_runs import read_marker_runs
 
     robot = load_robot(session)
-    swings = load_swings(session, robot, load_target(session))
+    target = load_target(session)
+    markers = read_marker_runs(session, target)
+    swings = load_swings(session, robot, target, markers)
     try:
         geometry = GeometryPriors(settings.get("entry_std_m"), settings.get("attachment_std_m"))
     except ValueError as error:
@@ -85,6 +90,8 @@ def make(
     document = found.document()
     document["swings"] = swing_places(robot, found)
     document["entries_m"] = robot.entries_m.tolist()
+    document["markers"] = marker_document(markers)
+    document["notes"] += [f.sentence() for f in marker_findings(markers) if f.level == "warning"]
     _summarise(document, found.best, console)
     for sentence in found.estimates[found.best].notes:
         console.say(f"  {sentence}")

@@ -10,6 +10,7 @@ from freeswing.cdpr.measured.target import Target
 from freeswing.cdpr.robot import Robot
 from freeswing.doctor.finding import Finding
 from freeswing.doctor.geometry import robot_findings
+from freeswing.doctor.markers import marker_findings
 from freeswing.doctor.motion import run_findings
 from freeswing.doctor.recordings import (
     calibration_findings,
@@ -19,6 +20,7 @@ from freeswing.doctor.recordings import (
 from freeswing.doctor.split import split_findings
 from freeswing.ident.runs import SwingRun
 from freeswing.session.load_swings import load_robot, load_swing, load_target, trajectory_path
+from freeswing.session.marker_runs import MarkerRuns, read_marker_runs
 from freeswing.session.session_file import Run, Session
 
 Progress = Callable[[str, float], None]
@@ -38,6 +40,9 @@ def _findings(session: Session, progress: Progress) -> Iterator[Finding]:
     if robot is not None:
         yield from robot_findings(robot)
     yield from calibration_findings(session)
+    progress("reading the markers", 0.0)
+    markers = read_marker_runs(session, target)
+    yield from marker_findings(markers)
     swings: list[SwingRun] = []
     for count, run in enumerate(session.runs):
         progress("examining the runs", count / len(session.runs))
@@ -45,19 +50,23 @@ def _findings(session: Session, progress: Progress) -> Iterator[Finding]:
             yield from video_findings(session, run)
             yield from footage_findings(f"run {run.name}", run.video, session.frame_rate_hz)
         if robot is not None:
-            swing = yield from _run(session, run, robot, target)
+            swing = yield from _run(session, run, robot, target, markers)
             swings += [] if swing is None else [swing]
     yield from split_findings(session, swings)
     progress("examining the runs", 1.0)
 
 
 def _run(
-    session: Session, run: Run, robot: Robot, target: Target | None
+    session: Session, run: Run, robot: Robot, target: Target | None, markers: MarkerRuns
 ) -> Generator[Finding, None, SwingRun | None]:
     if run.video is not None and not trajectory_path(session, run).is_file():
         yield Finding("note", f"run {run.name}", "not tracked yet", "run freeswing track")
         return None
-    swing = yield from _tried(f"run {run.name}", lambda: load_swing(session, run, robot, target))
+    if markers.layout_failure is not None and run.name in markers.failures:
+        return None
+    swing = yield from _tried(
+        f"run {run.name}", lambda: load_swing(session, run, robot, target, markers)
+    )
     if swing is not None:
         yield from run_findings(swing, robot, session.frame_rate_hz)
     return swing

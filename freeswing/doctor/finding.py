@@ -26,8 +26,12 @@ class Finding:
 
     def line(self) -> str:
         """The finding as one line."""
+        return f"{self.level:7} {self.sentence()}"
+
+    def sentence(self) -> str:
+        """The finding without its level."""
         ending = f"; {self.remedy}" if self.remedy else ""
-        return f"{self.level:7} {self.subject}: {self.text}{ending}"
+        return f"{self.subject}: {self.text}{ending}"
 
     def entry(self) -> dict[str, str]:
         """The finding for a result file."""

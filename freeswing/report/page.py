@@ -15,6 +15,7 @@ from freeswing.report.cameras import Cameras
 from freeswing.report.dropped import Dropped
 from freeswing.report.free_full import FreeAgainstFull
 from freeswing.report.ladder import EffectLadder
+from freeswing.report.markers import Markers
 from freeswing.report.material import Material
 from freeswing.report.motion import Motion
 from freeswing.report.provenance import Provenance
@@ -44,6 +45,7 @@ PANELS: tuple[Panel, ...] = (
     Motion(),
     Swings(),
     Cameras(),
+    Markers(),
     Dropped(),
     Provenance(),
 )

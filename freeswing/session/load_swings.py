@@ -14,6 +14,7 @@ from freeswing.cdpr.measured.target import Target, read_target
 from freeswing.cdpr.measured.trajectory import Trajectory
 from freeswing.cdpr.robot import Robot
 from freeswing.ident.runs import Payload, SwingRun
+from freeswing.session.marker_runs import MarkerRuns, read_marker_runs
 from freeswing.session.session_file import Run, Session
 
 
@@ -32,8 +33,16 @@ def trajectory_path(session: Session, run: Run) -> Path:
     return run.trajectory or session.tracks / f"{run.name}.csv"
 
 
-def load_swings(session: Session, robot: Robot, target: Target | None) -> tuple[SwingRun, ...]:
+def load_swings(
+    session: Session, robot: Robot, target: Target | None, markers: MarkerRuns | None = None
+) -> tuple[SwingRun, ...]:
     """All runs of a session with their trajectories.
+
+    Args:
+        session: whose runs.
+        robot: its robot.
+        target: what is on the platform.
+        markers: its marker recordings where they have been read.
 
     Raises:
         InputError: naming the run whose file is wrong, or a number of cable lengths that is not
@@ -41,7 +50,8 @@ def load_swings(session: Session, robot: Robot, target: Target | None) -> tuple[
         DataError: where a video has not been tracked yet.
     """
     errors = calibration_errors(session)
-    swings = (load_swing(session, run, robot, target) for run in session.runs)
+    markers = read_marker_runs(session, target) if markers is None else markers
+    swings = (load_swing(session, run, robot, target, markers) for run in session.runs)
     return tuple(replace(swing, pose_errors=errors.get(swing.name)) for swing in swings)
 
 
@@ -67,7 +77,9 @@ def calibration_errors(session: Session) -> dict[str, PoseErrors]:
     }
 
 
-def load_swing(session: Session, run: Run, robot: Robot, target: Target | None) -> SwingRun:
+def load_swing(
+    session: Session, run: Run, robot: Robot, target: Target | None, markers: MarkerRuns
+) -> SwingRun:
     """One run with its trajectory; see `load_swings`."""
     lengths = run.cable_lengths_m
     if lengths is not None and len(lengths) != robot.n_cables:
@@ -79,7 +91,7 @@ def load_swing(session: Session, run: Run, robot: Robot, target: Target | None) 
     return SwingRun(
         name=run.name,
         role="identify" if run.role == "identify" else "validate",
-        trajectory=load_trajectory(session, run, robot, target),
+        trajectory=load_trajectory(session, run, robot, target, markers),
         lengths_m=lengths,
         lengths_std_m=run.cable_lengths_std_m,
         window_s=run.window_s,
@@ -87,12 +99,16 @@ def load_swing(session: Session, run: Run, robot: Robot, target: Target | None) 
     )
 
 
-def load_trajectory(session: Session, run: Run, robot: Robot, target: Target | None) -> Trajectory:
+def load_trajectory(
+    session: Session, run: Run, robot: Robot, target: Target | None, markers: MarkerRuns
+) -> Trajectory:
     """A run's measured or tracked motion."""
     path = trajectory_path(session, run)
     if run.trajectory is None and not path.is_file():
         raise DataError(
             f"run {run.name}: its video has not been tracked yet; run freeswing track first"
         )
-    trajectory = read_trajectory(path, robot, target)
+    trajectory = markers.trajectory(run.name)
+    if trajectory is None:
+        trajectory = read_trajectory(path, robot, target)
     return replace(trajectory, provenance=trajectory.provenance or path.name)

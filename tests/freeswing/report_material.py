@@ -31,6 +31,7 @@ def whole_material(title: str = "lab-day-1") -> Material:
             "validation": [_validation(f"check-{k:02d}", rng) for k in range(8)],
             "swings": [_swing(k, rng) for k in range(12)],
             "entries_m": [[0.2, -1.3, 0.5], [2.3, -1.2, 0.5], [2.2, 1.0, 0.6], [0.1, 0.8, 0.5]],
+            "markers": _markers(),
             "provenance": {
                 "versions": {"freeswing": "0.1.0"},
                 "settings": {},
@@ -41,6 +42,25 @@ def whole_material(title: str = "lab-day-1") -> Material:
         motion={"format": "freeswing-motion/1", "runs": [_motion(k, rng) for k in range(5)]},
         notes=("warning run swing-03: 12 % of the samples are missing",),
     )
+
+
+def _markers() -> dict[str, Any]:
+    runs = [
+        {
+            "run": f"swing-{k:02d}",
+            "rigidity_um": [12.0 + k, 20.0, 740.0 if k == 1 else 25.0, None],
+            "left_out": ["front"] if k == 1 else [],
+            "all_um": 368.0 if k == 1 else 22.0,
+            "kept_um": 21.0,
+            "frame_std_mm": [0.06, 0.07, 0.05],
+            "frame_std_mrad": [0.5, 0.4, 0.3],
+            "correlation_s": 0.4,
+        }
+        for k in range(3)
+    ]
+    names = ["P", "left", "front", "right"]
+    off = [0.08, 0.2, 0.24, None]
+    return {"names": names, "off_target_mm": off, "run_std_mm": 0.16, "runs": runs}
 
 
 def _estimate(spread: float, rng: np.random.Generator) -> dict[str, Any]:

@@ -28,7 +28,7 @@ FLAGS = (
     "--enable-logging=stderr",
     "--v=0",
 )
-FIGURES = 10
+FIGURES = 11
 VOID = {"meta", "link", "br", "img", "hr", "input"}
 
 
@@ -78,7 +78,7 @@ def page() -> str:
 def test_sections_stand_in_reading_order(page: str) -> None:
     places = [page.index(f'<section id="{panel.name}">') for panel in PANELS]
     assert places == sorted(places)
-    order = "answer ladder free_full sigma motion swings cameras dropped provenance"
+    order = "answer ladder free_full sigma motion swings cameras markers dropped provenance"
     assert [panel.name for panel in PANELS] == order.split()
 
 

@@ -1,0 +1,77 @@
+"""A session's marker recordings, fitted together: one layout for all runs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from freeswing.cdpr.files.problems import DataError, InputError
+from freeswing.cdpr.files.trajectory_files import holds_markers, read_recording
+from freeswing.cdpr.markers.from_recording import fixes_poses
+from freeswing.cdpr.markers.layout import SessionLayout
+from freeswing.cdpr.markers.session import Examined, RunMarkers, common_layout, examine, place
+from freeswing.cdpr.measured.target import Target
+from freeswing.cdpr.measured.trajectory import Trajectory
+from freeswing.session.session_file import Session
+
+
+@dataclass(frozen=True, slots=True)
+class MarkerRuns:
+    """What the markers of each run gave, or why they gave nothing.
+
+    Attributes:
+        target: whose markers they are, None: the session has no marker recordings.
+        layout: the session's, None where there is none.
+        runs: by name.
+        failures: by name.
+        layout_failure: why there is no layout for any of them.
+    """
+
+    target: Target | None = None
+    layout: SessionLayout | None = None
+    runs: dict[str, RunMarkers] = field(default_factory=dict)
+    failures: dict[str, InputError | DataError] = field(default_factory=dict)
+    layout_failure: DataError | None = None
+
+    def trajectory(self, name: str) -> Trajectory | None:
+        """A run's poses, None where its recording holds no marker poses.
+
+        Raises:
+            InputError, DataError: why it has none.
+        """
+        if name in self.failures:
+            raise self.failures[name]
+        return self.runs[name].trajectory if name in self.runs else None
+
+
+def read_marker_runs(session: Session, target: Target | None) -> MarkerRuns:
+    """Read and fit every run that has a marker recording; nothing is raised here.
+
+    The layout is that of the identify runs alone, so that held-out runs stay held out.
+    """
+    if target is None or not target.markers:
+        return MarkerRuns()
+    examined: dict[str, Examined] = {}
+    failures: dict[str, InputError | DataError] = {}
+    for run in session.runs:
+        if run.trajectory is None or not holds_markers(run.trajectory):
+            continue
+        try:
+            recording = read_recording(run.trajectory)
+            if fixes_poses(recording, target):
+                examined[run.name] = examine(recording, target, run.window_s)
+        except (InputError, DataError) as failure:
+            failures[run.name] = failure
+    if not examined:
+        return MarkerRuns(failures=failures)
+    fitted = [run.name for run in session.runs if run.role == "identify" and run.name in examined]
+    try:
+        layout = common_layout(target, [examined[name] for name in fitted or examined])
+    except DataError as failure:
+        return MarkerRuns(target, None, {}, failures | dict.fromkeys(examined, failure), failure)
+    runs: dict[str, RunMarkers] = {}
+    for name, found in examined.items():
+        try:
+            runs[name] = place(found, layout)
+        except DataError as failure:
+            failures[name] = failure
+    return MarkerRuns(target, layout, runs, failures)
