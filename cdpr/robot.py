@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from freeswing.cdpr.tolerances import Tolerances
+
 if TYPE_CHECKING:
     from freeswing.cdpr.driven.drive import Drive
 
@@ -122,6 +124,7 @@ class Robot:
         platform: nominal inertia.
         cables: the n cables.
         drive: how motors move the cables; None where they hold them.
+        tolerances: how well all this is known.
     """
 
     name: str
@@ -132,6 +135,7 @@ class Robot:
     free_coordinates: tuple[str, ...] | None = None
     platform: Platform = field(default_factory=Platform)
     drive: Drive | None = None
+    tolerances: Tolerances = field(default_factory=Tolerances)
 
     def __post_init__(self) -> None:
         gravity = frozen_array(self.gravity_m_s2, (3,), "gravity_m_s2")

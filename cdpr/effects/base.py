@@ -144,9 +144,11 @@ class Recorded:
 
     Attributes:
         lengths: whether any run states its cable lengths.
+        slow_errors: whether any run's poses state how far they err together.
     """
 
     lengths: bool = True
+    slow_errors: bool = False
 
 
 class Clues(Protocol):
@@ -168,6 +170,9 @@ class Effect:
         on_driven: whether robots moved by motors may have it.
         on_free: whether free swings may have it.
         separated_by: experiments that set it apart from others which they set apart.
+        tolerance: which of `cdpr.tolerances.Tolerances` says how far its values may be from zero
+            where nobody has erred; "" where that is a hundredth or so of their plausible range.
+        nuisance: whether it is no claim about the robot but stands beside all that are.
     """
 
     name: str = ""
@@ -177,6 +182,8 @@ class Effect:
     stage: str = "force"  # "kinematics", "base" (gravity), "drive", "force" or "measurement"
     on_driven: bool = False
     on_free: bool = True
+    tolerance: str = ""
+    nuisance: bool = False
 
     @property
     def changes_measurement(self) -> bool:

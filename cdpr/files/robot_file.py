@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +27,7 @@ from freeswing.cdpr.files.drive_file import (
 )
 from freeswing.cdpr.files.mesh import METRES_PER_UNIT, platform_from_mesh
 from freeswing.cdpr.robot import POSE_COORDINATES, STANDARD_GRAVITY_M_S2, Cable, Platform, Robot
+from freeswing.cdpr.tolerances import Tolerances
 
 Array = NDArray[np.float64]
 
@@ -56,6 +58,7 @@ def read_robot(path: Path | str) -> Robot:
     platform = _read_platform(
         reader.child("platform", required=False), Path(path).parent, _span(attachments)
     )
+    tolerances = _read_tolerances(reader.child("tolerances", required=False))
     drive = None
     if driving is not None:
         motors = read_motors(driving, tables, named)
@@ -72,7 +75,18 @@ def read_robot(path: Path | str) -> Robot:
         free_coordinates=free,
         platform=platform,
         drive=drive,
+        tolerances=tolerances,
     )
+
+
+def _read_tolerances(reader: Reader | None) -> Tolerances:
+    """What a robot's own builders know better than the usual table."""
+    if reader is None:
+        return Tolerances()
+    given = {one.name: reader.optional_number(one.name, above=0.0) for one in fields(Tolerances)}
+    reader.finish()
+    known = {name: value for name, value in given.items() if value is not None}
+    return Tolerances() if reader.problems else Tolerances(**known)
 
 
 def _columns(points: list[Points]) -> Points:
@@ -111,10 +125,18 @@ def write_robot(path: Path | str, robot: Robot) -> None:
         "gravity_m_s2": robot.gravity_m_s2,
         "free_coordinates": "auto" if free is None else list(free),
         "platform": platform if any(v is not None for v in platform.values()) else None,
+        "tolerances": _own_tolerances(robot.tolerances) or None,
         **({} if robot.drive is None else drive_table(robot.drive)),
         "cables": cables,
     }
     dump_toml(path, table)
+
+
+def _own_tolerances(known: Tolerances) -> dict[str, float]:
+    """Those that differ from the usual ones."""
+    usual = Tolerances()
+    pairs = {one.name: getattr(known, one.name) for one in fields(Tolerances)}
+    return {name: value for name, value in pairs.items() if value != getattr(usual, name)}
 
 
 CableValues = tuple[str, Array, float, Array, Array, Array, Array]

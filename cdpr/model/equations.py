@@ -87,6 +87,7 @@ class Model:
             multipliers, (6,); its derivative by zeta, made symmetric, (6, 6).
         mass_matrix: (zeta, inertia, values) -> D^T M D / m (6, 6).
         energy: (zeta, rates, inertia, values) -> specific kinetic, potential energy of the weight.
+        correlations: of what is known beforehand of the values, (k, k); None: independent.
     """
 
     robot: Robot
@@ -106,6 +107,7 @@ class Model:
     lagrangian: Function
     mass_matrix: Function
     energy: Function
+    correlations: Array | None = None
 
     @property
     def own_values(self) -> IntArray:
@@ -127,6 +129,32 @@ class Model:
     def start_values(self) -> Array:
         """Values that leave the declared model as it is, (k,)."""
         return np.array([parameter.start for parameter in self.parameters])
+
+    @property
+    def prior_whitener(self) -> Array:
+        """Turns distances from `start_values` into independent ones of unit deviation, (k, k)."""
+        scaled = np.diag([1.0 / parameter.prior_std for parameter in self.parameters])
+        if self.correlations is None:
+            return scaled
+        return np.linalg.solve(np.linalg.cholesky(self.correlations), scaled)
+
+    def known(self, places: IntArray, values: Array, covariance: Array) -> Model:
+        """The model with some of its values known as a joint Gaussian.
+
+        Args:
+            places: among the values, (q,).
+            values: their means, (q,).
+            covariance: theirs, (q, q).
+        """
+        stds = np.sqrt(np.diag(covariance))
+        parameters = list(self.parameters)
+        for place, value, std in zip(places, values, stds, strict=True):
+            parameters[place] = parameters[place].known(float(value), float(std))
+        count = len(parameters)
+        together = np.eye(count) if self.correlations is None else self.correlations.copy()
+        together[places] = together[:, places] = 0.0
+        together[np.ix_(places, places)] = covariance / np.outer(stds, stds)
+        return replace(self, parameters=tuple(parameters), correlations=together)
 
 
 @dataclass(frozen=True, slots=True)

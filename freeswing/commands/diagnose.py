@@ -70,6 +70,8 @@ def _summarise(document: dict[str, Any], console: Console) -> None:
     for entry in document["accepted"]:
         values = ", ".join(f"{p['name']} {p['value']:.4g}" for p in entry["parameters"])
         console.say(f"  accepted: {entry['effect'].replace('_', ' ')} ({values})")
+        for sentence in seen_directions(entry.get("directions", [])):
+            console.say(f"    {sentence}")
     for sentence in verdict(Material("", diagnosis=document)):
         console.say(f"  {sentence}")
     before, after = document["before"], document["after"]
@@ -78,3 +80,21 @@ def _summarise(document: dict[str, Any], console: Console) -> None:
         f"{millimetres(after['prediction_rmse_m'])} after "
         f"(noise floor {millimetres(after['noise_floor_m'])})"
     )
+
+
+def seen_directions(directions: list[dict[str, Any]]) -> list[str]:
+    """Along which directions a displaced point is known best and worst, a sentence a point."""
+    points: dict[str, list[dict[str, Any]]] = {}
+    for one in directions:
+        points.setdefault(one["point"], []).append(one)
+    return [
+        f"{point}: known to {_along(ones[0])}, to {_along(ones[-1])}"
+        for point, ones in points.items()
+    ]
+
+
+def _along(one: dict[str, Any]) -> str:
+    from freeswing.report.words import millimetres
+
+    axis = ", ".join(f"{part:.2f}" for part in one["direction"])
+    return f"{millimetres(one['std_m'])} along ({axis})"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +12,9 @@ from freeswing.cdpr.effects import effect_named
 from freeswing.cdpr.robot import Array
 from freeswing.ident.diagnose.leave_one_out import Score
 from freeswing.ident.diagnose.refit import Refit, colour_of, plausible
+from freeswing.ident.diagnose.spectrum import independent_numbers
 from freeswing.ident.diagnose.variants import effect_of, inside
+from freeswing.ident.diagnose.weights import log_predictive, model_weights
 
 REFITTED = 4
 NEARLY_AS_GOOD = 0.5
@@ -32,6 +35,8 @@ SMALL_LEAD = 0.1
 SCATTERED = 1.0 / 3.0
 CONTRADICTED = 0.15
 SCANNED_FREQUENCIES = 400
+# Effects whose best mixture explains less than this of the excess are the nearest, not the cause.
+LEAST_SHARE_EXPLAINED = 0.75
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +50,7 @@ class Candidate:
         held_out_gain: share of the held-out excess over the noise that it removes.
         confounded_with: effects that held-out runs cannot tell from it.
         reason: a sentence.
+        probability: that it is missing, among those fitted and none of them.
     """
 
     effect: str
@@ -53,6 +59,7 @@ class Candidate:
     held_out_gain: float
     confounded_with: tuple[str, ...]
     reason: str
+    probability: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,11 +79,21 @@ class Decision:
     group: tuple[str, ...] = ()
 
 
-def promising(current: Refit, linear: dict[str, Score], colour: float) -> list[str]:
-    """The candidates worth fitting: those not far behind the linear best, by either measure.
+def promising(
+    current: Refit, linear: dict[str, Score], colour: float, tried: Collection[str] = ()
+) -> list[str]:
+    """The next candidates worth fitting, those nearest to the linear best first.
 
     Left-out runs rank well what is well determined; a tether or an offset has more unknowns than
-    a linear step settles beside a large residual, and shows in the likelihood first.
+    a linear step settles beside a large residual, and shows in the likelihood first. At first only
+    those that promise nearly as much as the best; once these were fitted, all that the screen does
+    not exclude follow: beside a large residual it ranks true effects sixth.
+
+    Args:
+        current: the fit without any.
+        linear: what each makes of the linear evidence.
+        colour: of the current residual.
+        tried: keys that were fitted.
     """
     held_out = {n: current.held_out - float(one.held_out.sum()) for n, one in linear.items()}
     likelihood = {
@@ -86,9 +103,21 @@ def promising(current: Refit, linear: dict[str, Score], colour: float) -> list[s
     chosen: list[str] = []
     for gains in (held_out, likelihood):
         ranked = _best_of_each(sorted(gains, key=lambda n: -gains[n]))
-        least = max(NEARLY_AS_GOOD * gains[ranked[0]], LEAST_GAIN)
-        chosen += [n for n in ranked[:REFITTED] if gains[n] > least and n not in chosen]
+        least = LEAST_GAIN if tried else max(NEARLY_AS_GOOD * gains[ranked[0]], LEAST_GAIN)
+        further = [n for n in ranked if gains[n] > least and n not in tried]
+        chosen += [n for n in further[:REFITTED] if n not in chosen]
     return chosen
+
+
+def settles(decision: Decision, current: Refit) -> bool:
+    """Whether what won may be the cause: it explains the excess, or reaches the noise nearly.
+
+    Else the nearest of those fitted may have won, and the others want fitting too.
+    """
+    if decision.winner is None:
+        return False
+    gain = _gain(current, decision.winner.held_out)
+    return gain >= LEAST_SHARE_EXPLAINED or excess_of(decision.winner) < LEAST_EXCESS_LATER
 
 
 def _best_of_each(ranked: list[str]) -> list[str]:
@@ -127,6 +156,7 @@ def decided(
         else:
             passed[name] = one
     key, group = _winner(passed, current, noise_scales)
+    chances = probabilities(current, tried, noise_scales)
     told = _best_of_each([key, *sorted(tried, key=lambda n: tried[n].held_out), *ranked])
     candidates = []
     for one in filter(None, told):
@@ -135,8 +165,29 @@ def decided(
         bic = delta_bic(current, known.score if known else linear[one], one, colour)
         gain = _gain(current, held_out)
         verdict, reason, others = _verdict(one, key, group, complaints, known, passed, gain)
-        candidates.append(Candidate(effect_of(one), verdict, float(bic), gain, others, reason))
+        chance = chances.get(effect_of(one), 0.0)
+        candidates.append(
+            Candidate(effect_of(one), verdict, float(bic), gain, others, reason, chance)
+        )
     return Decision(tuple(candidates), passed.get(key), key, group)
+
+
+def probabilities(current: Refit, tried: dict[str, Refit], noise_scales: Array) -> dict[str, float]:
+    """Probability of each fitted effect to be what is missing, by runs left out.
+
+    What remains to one is that of none of them.
+    """
+    counts, independent = (
+        current.evidence.counts,
+        independent_numbers(current.fit, noise_scales),
+    )
+    models = [current.score, *(one.score for one in tried.values())]
+    densities = [log_predictive(one.held_out, counts, independent) for one in models]
+    weights = model_weights(densities, [0, *(1 for _ in tried)])
+    found: dict[str, float] = {}
+    for key, weight in zip(tried, weights[1:], strict=True):
+        found[effect_of(key)] = found.get(effect_of(key), 0.0) + float(weight)
+    return found
 
 
 def delta_bic(current: Refit, one: Score, key: str, colour: float) -> float:

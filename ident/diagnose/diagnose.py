@@ -9,14 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from freeswing.cdpr.effects import Recorded, catalogue
+from freeswing.cdpr.effects import Recorded, catalogue, effect_named
 from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.model.equations import build_model
 from freeswing.cdpr.robot import INERTIA_NAMES, POSE_COORDINATES, Array, Robot
+from freeswing.ident.diagnose.answer.deviations import directions, honest_covariance
 from freeswing.ident.diagnose.base import base_fit, refuse_few
-from freeswing.ident.diagnose.decision import Candidate, excess_of
+from freeswing.ident.diagnose.decision import LEAST_SHARE_EXPLAINED, Candidate, excess_of
 from freeswing.ident.diagnose.experiments import separating_experiment
 from freeswing.ident.diagnose.heldout import HeldOut, held_out
+from freeswing.ident.diagnose.lengths.wrong_places import Kinematics
 from freeswing.ident.diagnose.refit import Refit
 from freeswing.ident.diagnose.screen import BASE
 from freeswing.ident.diagnose.search import Round, Search
@@ -35,9 +37,8 @@ from freeswing.ident.signals.prepare import PreparedRun, prepare_runs
 Progress = Callable[[str, float], None]
 
 FORMAT = "freeswing-diagnosis/1"
-# Effects whose best mixture explains less than this of the excess are the nearest, not the cause.
-# They show in the residuals, or in runs left out although each run by itself is followed well.
-LEAST_SHARE_EXPLAINED = 0.75
+# What is not the cause shows in the residuals, or in runs left out although each run by itself is
+# followed well.
 LARGEST_EXCESS_LEFT = 0.5
 
 
@@ -59,6 +60,8 @@ class Diagnosis:
         groups: for each effect of the final model, those that stand in its group.
         first: the fit without effects.
         final: the fit with all accepted effects.
+        spreads: covariances of the shared unknowns of both fits as they are told.
+        kinematics: what cable lengths along the runs say; None where poses were not measured.
         unexplained: what remains.
         notes: sentences about the session.
     """
@@ -68,6 +71,8 @@ class Diagnosis:
     groups: dict[str, tuple[str, ...]]
     first: LikelihoodFit
     final: LikelihoodFit
+    spreads: tuple[Array, Array]
+    kinematics: Kinematics | None
     unexplained: Unexplained
     notes: tuple[str, ...]
 
@@ -78,11 +83,11 @@ class Diagnosis:
             "format": FORMAT,
             "before": before,
             "candidates": [_candidate_entry(one) for one in self.candidates],
-            "accepted": _accepted(self.final, self.groups),
+            "accepted": _accepted(self.final, self.spreads[1], self.groups),
             "after": after,
             "share_closed": _share_closed(before, after),
-            "parameters_before": _parameters(self.first),
-            "parameters_after": _parameters(self.final),
+            "parameters_before": _parameters(self.first, self.spreads[0]),
+            "parameters_after": _parameters(self.final, self.spreads[1]),
             "parameters_moved_percent": _moved(self.first, self.final),
             "ladder": [
                 {"effects": list(rung.effects), **rung.held_out.document()} for rung in self.ladder
@@ -92,6 +97,7 @@ class Diagnosis:
                 "signature": self.unexplained.signature,
                 "evidence": self.unexplained.evidence,
             },
+            **({} if self.kinematics is None else {"lengths": self.kinematics.document()}),
             "notes": list(self.notes),
         }
 
@@ -137,12 +143,19 @@ def diagnose(
             "give at least one run that role"
         )
     noise_scales = _noise_scales([*fitted, *checked], free)
-    names = tuple(catalogue()) if candidates is None else candidates
     barred = _barred(fitted, robot)
+    nuisances = tuple(n for n, one in catalogue().items() if one.nuisance and n not in barred)
+    names = tuple(catalogue()) if candidates is None else candidates
+    names = tuple(name for name in names if not effect_named(name).nuisance)
     considered = tuple(name for name in names if name not in barred)
     starts = likelihood_starts(model, prepared, tuple(one.values for one in by_fidim.values()))
     base, fitted, dropped = base_fit(
-        model, fitted, free, starts, noise_scales, _part(progress, 0.05, 0.2)
+        build_model(robot, nuisances if full else ()),
+        fitted,
+        free,
+        starts,
+        noise_scales,
+        _part(progress, 0.05, 0.2),
     )
     search = Search(noise_scales, considered, workers, executor, _part(progress, 0.2, 0.85))
     last = search.run(base)
@@ -163,7 +176,8 @@ def diagnose(
         rest = unexplained(last.fit, fitted, full, noise_scales)
     ladder = _ladder(search, accepted, checked, free, _part(progress, 0.85, 0.95))
     final = _with_own_noise(last.fit, fitted)
-    first = final if not accepted else _with_own_noise(search.rounds[0].before.fit, fitted)
+    begun = search.rounds[0].before if accepted else last
+    first = final if not accepted else _with_own_noise(begun.fit, fitted)
     groups = {effect_of(one.decision.key): one.decision.group for one in accepted}
     if progress:
         progress("diagnosis", 1.0)
@@ -173,9 +187,16 @@ def diagnose(
         groups,
         first,
         final,
+        (honest_covariance(first, begun), honest_covariance(final, last)),
+        search.kinematics,
         rest,
         tuple(notes),
     )
+
+
+def claims(effects: tuple[str, ...]) -> tuple[str, ...]:
+    """Those that say something of the robot, without nuisances of the measurement."""
+    return tuple(name for name in effects if not effect_named(name).nuisance)
 
 
 def _part(progress: Progress | None, low: float, high: float) -> Progress | None:
@@ -207,7 +228,10 @@ def _noise_scales(runs: list[PreparedRun], free: tuple[str, ...] | None) -> Arra
 
 def _barred(runs: list[PreparedRun], robot: Robot) -> dict[str, str]:
     """Effects that these data cannot show, and why."""
-    recorded = Recorded(lengths=any(run.run.lengths_m is not None for run in runs))
+    recorded = Recorded(
+        lengths=any(run.run.lengths_m is not None for run in runs),
+        slow_errors=any(run.run.trajectory.slow is not None for run in runs),
+    )
     why = {name: effect.cannot_show(robot, recorded) for name, effect in catalogue().items()}
     return {name: words for name, words in why.items() if words}
 
@@ -247,7 +271,10 @@ def _ladder(
             progress("before and after", k / len(stages))
         found = stage.fit
         rungs.append(
-            Rung(stage.effects, held_out(found.model, runs, free, found.inertia, found.values))
+            Rung(
+                claims(stage.effects),
+                held_out(found.model, runs, free, found.inertia, found.values),
+            )
         )
     return tuple(rungs)
 
@@ -255,14 +282,15 @@ def _ladder(
 def _last_words(
     search: Search, final: tuple[str, ...], barred: dict[str, str], names: tuple[str, ...]
 ) -> tuple[Candidate, ...]:
-    """Each effect's verdict in the round that accepted it, else in the first."""
+    """Each effect's verdict in the round that accepted it, else in the last that looked at it."""
     words: dict[str, Candidate] = {}
     for one in search.rounds:
         stays = any(name in final for name in one.decision.group)
         for candidate in one.decision.candidates:
             if candidate.verdict != "rejected" and not stays:
                 candidate = replace(candidate, verdict="rejected", confounded_with=())
-            if candidate.effect not in words or candidate.verdict != "rejected":
+            known = words.get(candidate.effect)
+            if known is None or known.verdict == "rejected":
                 words[candidate.effect] = candidate
         for name in one.removed:
             why = f"superfluous since {effect_of(one.decision.key)} is in the model: removed again"
@@ -280,6 +308,7 @@ def _candidate_entry(one: Candidate) -> dict[str, Any]:
         "verdict": one.verdict,
         "delta_bic": one.delta_bic,
         "held_out_gain": one.held_out_gain,
+        "probability": one.probability,
         "confounded_with": list(one.confounded_with),
         "reason": one.reason,
     }
@@ -288,28 +317,35 @@ def _candidate_entry(one: Candidate) -> dict[str, Any]:
     return entry
 
 
-def _accepted(final: LikelihoodFit, groups: dict[str, tuple[str, ...]]) -> list[dict[str, Any]]:
+def _accepted(
+    final: LikelihoodFit, covariance: Array, groups: dict[str, tuple[str, ...]]
+) -> list[dict[str, Any]]:
     entries = []
-    for name in final.model.effects:
+    stds = np.sqrt(np.diag(covariance))
+    for name in claims(final.model.effects):
         where = final.model.place_of(name)
         rows = [
             {
                 "name": final.model.parameters[k].name,
                 "value": float(final.values[k]),
-                "std": float(final.std[BASE + k]),
+                "std": float(stds[BASE + k]),
             }
             for k in range(where.start, where.stop)
             if final.model.parameters[k].per_run or final.free[BASE + k]
         ]
         group = [other for other in groups.get(name, ()) if other != name]
-        entries.append({"effect": name, "parameters": rows, "confounded_with": group})
+        places = np.arange(where.start, where.stop)[final.free[BASE:][where]]
+        seen = directions(final.model, places, covariance[np.ix_(BASE + places, BASE + places)])
+        entry = {"effect": name, "parameters": rows, "confounded_with": group}
+        entries.append(entry | ({"directions": seen} if seen else {}))
     return entries
 
 
-def _parameters(found: LikelihoodFit) -> list[dict[str, Any]]:
+def _parameters(found: LikelihoodFit, covariance: Array) -> list[dict[str, Any]]:
+    stds = np.sqrt(np.diag(covariance))[:9]
     return [
         {"name": name, "value": float(value), "std": float(std)}
-        for name, value, std in zip(INERTIA_NAMES, found.inertia, found.std[:9], strict=True)
+        for name, value, std in zip(INERTIA_NAMES, found.inertia, stds, strict=True)
     ]
 
 

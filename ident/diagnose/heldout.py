@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from freeswing.cdpr.effects import effect_named
 from freeswing.cdpr.model.batch import evaluate
 from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.model.free_motion import free_basis
@@ -24,12 +25,15 @@ class HeldOutRun:
         sigma_perp: standard deviation of the internal dynamics' error (FIDIM 2022, eq. 50).
         prediction: of the whole run, its start state and lengths fitted; None where that fails.
         noise_floor_m: what the samples' own noise leaves.
+        offset: of the measured frame in this run, beside the prediction's error: shift in m and
+            turn in rad; None where poses do not say how far they err together.
     """
 
     run: str
     sigma_perp: float
     prediction: Prediction | None
     noise_floor_m: float
+    offset: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +62,7 @@ class HeldOut:
             "prediction_rmse_rad": _rms(turns),
             "sigma_perp_median": _median(sigmas),
             "prediction_median_m": _median(errors),
+            **self._offsets(),
             "runs": [
                 {
                     "run": run.run,
@@ -71,6 +76,14 @@ class HeldOut:
                 for run in self.runs
             ],
         }
+
+    def _offsets(self) -> dict[str, float | None]:
+        """Constant offsets of the runs' frames, apart from the swing's own error."""
+        known = [run.offset for run in self.runs if run.offset is not None]
+        if not known:
+            return {}
+        shifts, turns = zip(*known, strict=True)
+        return {"frame_shift_m": _rms(list(shifts)), "frame_turn_rad": _rms(list(turns))}
 
 
 def _rms(numbers: list[float]) -> float | None:
@@ -118,7 +131,20 @@ def _one(
     names = POSE_COORDINATES[:3] if free is None else free
     places = [run.signals.coordinates.index(n) for n in names if n in POSE_COORDINATES[:3]]
     floor = float(np.sqrt(np.mean(run.signals.noise_std[places] ** 2)))
-    return HeldOutRun(run.name, sigma, prediction, floor)
+    return HeldOutRun(run.name, sigma, prediction, floor, _offset(model, prediction))
+
+
+def _offset(model: Model, prediction: Prediction | None) -> tuple[float, float] | None:
+    """Root mean squares over the axes of what nuisances of the measurement were fitted to."""
+    nuisances = [name for name in model.effects if effect_named(name).nuisance]
+    if prediction is None or not nuisances:
+        return None
+    places = [k for n in nuisances for k in range(len(model.names))[model.place_of(n)]]
+    by_unit = {
+        unit: [prediction.values[k] for k in places if model.names[k].endswith(unit)]
+        for unit in ("_m", "_rad")
+    }
+    return _rms(by_unit["_m"]) or 0.0, _rms(by_unit["_rad"]) or 0.0
 
 
 def internal_error(model: Model, motion: SwingMotion, inertia: Array, values: Array) -> float:

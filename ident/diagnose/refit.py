@@ -30,7 +30,7 @@ class Refit:
     Attributes:
         fit: the fit.
         evidence: linear, at the fit, over inertia and effect values.
-        score: of that evidence: its held-out costs count.
+        score: of that evidence over what is estimated: its held-out costs count.
     """
 
     fit: LikelihoodFit
@@ -59,9 +59,9 @@ def colour_of(fit: LikelihoodFit, noise_scales: Array) -> float:
 
 
 def rescored(current: LikelihoodFit, noise_scales: Array, colour: float) -> Refit:
-    """Score a fit that is there already."""
+    """Score a fit that is there already, by the unknowns that it estimates."""
     linear = screen(current, (), noise_scales, colour=colour)
-    return Refit(current, linear.evidence, score(linear.evidence))
+    return Refit(current, linear.evidence, score(linear.evidence.subset(linear.base)))
 
 
 def refit(
@@ -108,25 +108,26 @@ def _joined(
     )
 
 
-def displaced(current: Refit, key: str, centre: Array, stds: Array, noise_scales: Array) -> Refit:
-    """A fit with a geometry in it that is known with standard deviations.
+def displaced(
+    current: Refit, key: str, centre: Array, covariance: Array, noise_scales: Array
+) -> Refit:
+    """A fit with a geometry in it that is known as a Gaussian.
 
     Args:
         current: the fit without it.
         key: of the geometry effect.
         centre: its values, (k,).
-        stds: of these, (k,): weights of a prior about them.
+        covariance: of these, (k, k): that of a prior about them.
         noise_scales: of metres and radians, (2,).
     """
     found, name = current.fit, effect_of(key)
     nothing = np.array([p.start for p in effect_named(name).parameters(found.model.robot)])
     scales = noise_scales * np.sqrt(colour_of(found, noise_scales))
     model, free, state = _joined(found, key, nothing, scales)
-    values, parameters = state.values.copy(), list(model.parameters)
+    values = state.values.copy()
     chosen = np.arange(len(values))[model.place_of(name)][inside(model.robot, key)]
-    for k, value, std in zip(chosen, centre, stds, strict=True):
-        values[k], parameters[k] = value, parameters[k].known(float(value), float(std))
-    known = replace(model, parameters=tuple(parameters))
+    values[chosen] = centre
+    known = model.known(chosen, centre, covariance)
     return polished(_fitted(known, found, replace(state, values=values), free), noise_scales)
 
 

@@ -103,11 +103,9 @@ def _amplitudes(model: Model, key: str) -> np.ndarray:
 
 def _priors(model: Model, values: Array) -> Array:
     """Each effect value is within its plausible range: a weak row each."""
-    count = BASE + len(values)
-    rows = np.zeros((len(values), count + 1))
-    for k, parameter in enumerate(model.parameters):
-        if parameter.per_run:
-            continue
-        rows[k, BASE + k] = 1.0 / parameter.prior_std
-        rows[k, -1] = (values[k] - parameter.start) / parameter.prior_std
+    rows = np.zeros((len(values), BASE + len(values) + 1))
+    whitener = model.prior_whitener
+    whitener[model.own_values] = 0.0
+    rows[:, BASE:-1] = whitener
+    rows[:, -1] = whitener @ (values - model.start_values)
     return rows

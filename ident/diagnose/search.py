@@ -8,6 +8,7 @@ range, and large enough to matter. Candidates that held-out runs cannot tell fro
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import AbstractContextManager, nullcontext
@@ -24,9 +25,10 @@ from freeswing.ident.diagnose.decision import (
     decided,
     excess_of,
     promising,
+    settles,
 )
-from freeswing.ident.diagnose.kinematics import displacements
 from freeswing.ident.diagnose.leave_one_out import score
+from freeswing.ident.diagnose.lengths.wrong_places import Kinematics, kinematics
 from freeswing.ident.diagnose.refit import (
     Refit,
     colour_of,
@@ -40,6 +42,7 @@ from freeswing.ident.diagnose.removal import is_no_worse, superfluous
 from freeswing.ident.diagnose.screen import BASE, Screen, screen
 from freeswing.ident.diagnose.spectrum import Residual, too_small
 from freeswing.ident.diagnose.variants import effect_of, inside, variants
+from freeswing.ident.lifeline import tie_to
 from freeswing.ident.likelihood.likelihood import LikelihoodFit
 
 Progress = Callable[[str, float], None]
@@ -75,6 +78,7 @@ class Search:
         workers: processes that fit candidates side by side.
         executor: fits them instead, such as a cluster's; left open.
         progress: told a label and a fraction.
+        kinematics: what cable lengths say, once they were asked.
     """
 
     noise_scales: Array
@@ -83,6 +87,7 @@ class Search:
     executor: Executor | None = None
     progress: Progress | None = None
     rounds: list[Round] = field(default_factory=list)
+    kinematics: Kinematics | None = None
 
     def run(self, base: LikelihoodFit) -> Refit:
         """Add effects to a base fit until none passes; the last fit."""
@@ -109,10 +114,13 @@ class Search:
             for key in variants(robot, name)
         ]
         self._tell("kinematics: lengths along the runs", 0.0)
-        for one in displacements(current.fit, keys, self.noise_scales):
+        self.kinematics = kinematics(current.fit, keys, self.noise_scales)
+        for one in self.kinematics.wrong if self.kinematics else ():
             self._tell(f"kinematics: {effect_of(one.key)}", 0.0)
-            after = displaced(current, one.key, one.values, one.stds, self.noise_scales)
-            word = Candidate(effect_of(one.key), "accepted", one.delta_bic, one.share, (), str(one))
+            after = displaced(current, one.key, one.values, one.covariance, self.noise_scales)
+            share = 1.0 - (one.after_m / one.before_m) ** 2
+            name, chance = effect_of(one.key), one.probability
+            word = Candidate(name, "accepted", one.delta_bic, share, (), str(one), chance)
             decision = Decision((word,), after, one.key, (effect_of(one.key),))
             self.rounds.append(Round(current, decision, by_lengths=True))
             current = after
@@ -131,9 +139,15 @@ class Search:
         colour = colour_of(current.fit, self.noise_scales)
         screens = self._screens(current.fit, left, colour)
         linear = {name: score(screens[name].with_candidate(name)) for name in left}
-        worth_fitting = promising(current, linear, colour)
-        tried = self._refits(current, screens, worth_fitting, index, colour)
-        decision = decided(current, linear, tried, bool(self.rounds), colour, self.noise_scales)
+        tried: dict[str, Refit] = {}
+        asked: list[str] = []
+        while True:
+            more = promising(current, linear, colour, asked)
+            tried |= self._refits(current, screens, more, index, colour)
+            asked += more
+            decision = decided(current, linear, tried, bool(self.rounds), colour, self.noise_scales)
+            if not more or settles(decision, current):
+                break
         if decision.winner is None:
             return Round(current, decision)
         # Ranking stopped early: the winner goes on to convergence.
@@ -208,7 +222,9 @@ class Search:
         """Who makes the calls; None for this process itself."""
         if self.executor is not None or self.workers < 2:
             return nullcontext(self.executor)
-        return ProcessPoolExecutor(self.workers, mp_context=get_context("fork"))
+        return ProcessPoolExecutor(
+            self.workers, get_context("fork"), initializer=tie_to, initargs=(os.getpid(),)
+        )
 
 
 def _kind(name: str, robot: Robot) -> tuple[bool, bool]:

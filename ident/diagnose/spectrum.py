@@ -22,6 +22,20 @@ def residual_powers(fit: LikelihoodFit, noise_scales: Array) -> Array:
     return np.array([np.mean(residuals(m, run, noise_scales) ** 2) for m, run in pairs])
 
 
+def independent_numbers(fit: LikelihoodFit, noise_scales: Array) -> Array:
+    """How many numbers of each run's residual move independently, (r,).
+
+    Participation numbers of the power over frequencies and coordinates: all of them for white
+    noise, a few where one mode of the swing holds it.
+    """
+    found = []
+    for motion, run in zip(fit.motions, fit.samples, strict=True):
+        power = np.abs(np.fft.rfft(residuals(motion, run, noise_scales), axis=0)) ** 2
+        # The periodogram of white noise scatters by its own mean: hence twice the number.
+        found.append(2.0 * power.sum() ** 2 / np.sum(power**2))
+    return np.array(found)
+
+
 def mean_log_spectrum(fit: LikelihoodFit, noise_scales: Array) -> tuple[Array, Array]:
     """Geometric mean over runs of the whitened residuals' power, one for white noise.
 

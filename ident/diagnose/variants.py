@@ -37,7 +37,12 @@ def extended(model: Model, names: Sequence[str]) -> Model:
     """A model with further effects; what is known of those that it has stays known."""
     more = build_model(model.robot, (*model.effects, *names))
     known = model.parameters
-    return replace(more, parameters=(*known, *more.parameters[len(known) :]))
+    parameters = (*known, *more.parameters[len(known) :])
+    together = model.correlations
+    if together is not None:
+        together = np.eye(len(parameters))
+        together[: len(known), : len(known)] = model.correlations
+    return replace(more, parameters=parameters, correlations=together)
 
 
 def reduced(model: Model, name: str) -> Model:
@@ -45,4 +50,8 @@ def reduced(model: Model, name: str) -> Model:
     where = model.place_of(name)
     fewer = build_model(model.robot, tuple(other for other in model.effects if other != name))
     kept = (*model.parameters[: where.start], *model.parameters[where.stop :])
-    return replace(fewer, parameters=kept)
+    together = model.correlations
+    if together is not None:
+        place = np.arange(len(model.parameters))[where]
+        together = np.delete(np.delete(together, place, axis=0), place, axis=1)
+    return replace(fewer, parameters=kept, correlations=together)

@@ -116,7 +116,8 @@ class Problem:
         self.estimate_scales = estimate_scales
         self.tolerance_m = tolerance_m
         self.prior_centre = model.start_values
-        self.prior_std = np.array([p.prior_std for p in parameters])
+        self.prior_whitener = model.prior_whitener
+        self.prior_whitener[model.own_values] = 0.0
         self.unit = np.concatenate([INERTIA_UNIT, [p.scale for p in parameters], self.loads.unit])
         far = [3.0 * INERTIA_UNIT, [(p.high - p.low) / 3.0 for p in parameters], self.loads.unit]
         self.farthest = np.concatenate(far)
@@ -159,10 +160,8 @@ class Problem:
         return self.loads.start() if state.loads is None else state.loads
 
     def prior(self, values: Array) -> Array:
-        """Distance of the effect values from where they do nothing, over their range, (k,)."""
-        prior = (values - self.prior_centre) / self.prior_std
-        prior[self.model.own_values] = 0.0
-        return prior
+        """Independent distances of unit deviation from what is known of the values, (k,)."""
+        return self.prior_whitener @ (values - self.prior_centre)
 
     def step(self, state: State, damping: float) -> Step:
         """A damped Gauss-Newton step at the motions of a state."""
@@ -198,7 +197,7 @@ class Problem:
 
     def shared_map(self, run: int, state: State) -> Array:
         """What a run sees, inertia with its payload and values, by the unknowns, (9 + k, p)."""
-        values = len(self.prior_std)
+        values = len(self.prior_centre)
         found = np.zeros((9 + values, len(self.free)))
         found[9:, 9 : 9 + values] = np.eye(values)
         slopes = self.loads.slopes(run, state.inertia, self.loads_of(state))
@@ -216,9 +215,10 @@ class Problem:
 
     def prior_rows(self, state: State) -> Array:
         """Rows of the priors of effect values and payloads, (k + u, p + 1)."""
-        std = np.concatenate([self.prior_std, self.loads.prior_std])
-        rows = np.zeros((len(std), len(self.free) + 1))
-        rows[:, 9:-1] = np.diag(1.0 / std)
+        values = len(self.prior_centre)
+        rows = np.zeros((len(self.free) - 9, len(self.free) + 1))
+        rows[:values, 9 : 9 + values] = self.prior_whitener
+        rows[values:, 9 + values : -1] = np.diag(1.0 / self.loads.prior_std)
         rows[:, -1] = np.concatenate(
             [self.prior(state.values), self.loads_of(state) / self.loads.prior_std]
         )

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from freeswing.cdpr.effects import effect_named
+from freeswing.cdpr.measured.slow_errors import SlowErrors
 from freeswing.cdpr.model.batch import evaluate, with_jacobian
 from freeswing.cdpr.model.free_motion import coordinate_indices
 from freeswing.cdpr.robot import POSE_COORDINATES, Array
@@ -39,6 +40,7 @@ class Samples:
         span_s: start and end of the window.
         payload: a known mass on the platform, or None.
         temper: factor on its noise, where the model is known to follow it worse than others.
+        slow: how far its poses err together, None where that is not known.
     """
 
     name: str
@@ -52,6 +54,7 @@ class Samples:
     span_s: tuple[float, float]
     payload: Payload | None = None
     temper: float = 1.0
+    slow: SlowErrors | None = None
 
     def until(self, end_s: float) -> Samples:
         """The samples up to a time."""

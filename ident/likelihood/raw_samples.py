@@ -49,6 +49,7 @@ def prepare(run: SwingRun, window_s: tuple[float, float]) -> Samples:
         lengths_std_m=max(std, SMALLEST_LENGTH_STD_M),
         span_s=(float(times[0]), float(times[-1])),
         payload=run.payload,
+        slow=inside.slow,
     )
 
 

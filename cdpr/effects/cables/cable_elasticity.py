@@ -21,6 +21,7 @@ class CableElasticity(Effect):
     name = "cable_elasticity"
     summary = "axial stretch of the cables and its damping"
     separated_by = (PAYLOAD, LONG_RUN)
+    tolerance = "stretch_s2_m"
     needs_tension = True
 
     def parameters(self, robot: Robot) -> tuple[Parameter, ...]:

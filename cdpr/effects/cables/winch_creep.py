@@ -15,6 +15,7 @@ class WinchCreep(Effect):
     name = "winch_creep"
     summary = "cables that slowly run out"
     separated_by = (LONG_RUN,)
+    tolerance = "creep_m_s"
     stage = "kinematics"
 
     def parameters(self, robot: Robot) -> tuple[Parameter, ...]:

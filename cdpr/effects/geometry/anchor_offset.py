@@ -16,6 +16,7 @@ class AnchorOffset(Effect):
     name = "anchor_offset"
     summary = "cable entry points that are not where they were declared"
     separated_by = (EQUILIBRIA,)
+    tolerance = "entry_m"
     stage = "kinematics"
     on_driven = True
 

@@ -16,6 +16,7 @@ class AttachmentOffset(Effect):
     name = "attachment_offset"
     summary = "attachment points that are not where they were declared"
     separated_by = (EQUILIBRIA,)
+    tolerance = "attachment_m"
     stage = "kinematics"
     on_driven = True
 

@@ -18,6 +18,7 @@ class PulleyAxis(Effect):
     name = "pulley_axis"
     summary = "swivel axes that do not point as declared"
     separated_by = (EQUILIBRIA,)
+    tolerance = "swivel_rad"
     stage = "kinematics"
 
     def parameters(self, robot: Robot) -> tuple[Parameter, ...]:

@@ -16,6 +16,7 @@ class PulleyRadius(Effect):
     name = "pulley_radius"
     summary = "pulley radii that are not as declared"
     separated_by = (EQUILIBRIA,)
+    tolerance = "pulley_radius_m"
     stage = "kinematics"
 
     def parameters(self, robot: Robot) -> tuple[Parameter, ...]:

@@ -19,6 +19,7 @@ class ClockOffset(Effect):
     name = "clock_offset"
     summary = "orientations that lag behind the positions"
     stage = "measurement"
+    tolerance = "clock_s"
 
     def parameters(self, robot: Robot) -> tuple[Parameter, ...]:
         """The delay."""

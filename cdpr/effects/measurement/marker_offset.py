@@ -15,6 +15,7 @@ class MarkerOffset(Effect):
     name = "marker_offset"
     summary = "the measured point is not P"
     separated_by = (EQUILIBRIA,)
+    tolerance = "reference_m"
     stage = "kinematics"
 
     def parameters(self, robot: Robot) -> tuple[Parameter, ...]:

@@ -95,6 +95,7 @@ TRANSLATED = {
     ),
 }
 ELSEWHERE = {
+    "platform_frame",
     "cable_elasticity",
     "winch_creep",
     "cable_length_bias",

@@ -5,8 +5,8 @@ import pytest
 
 from freeswing.ident.diagnose.decision import runs_worse
 from freeswing.ident.diagnose.diagnose import diagnose
-from freeswing.ident.diagnose.kinematics import displacements
 from freeswing.ident.diagnose.leave_one_out import Score
+from freeswing.ident.diagnose.lengths.wrong_places import kinematics
 from freeswing.ident.diagnose.outstanding_runs import OUTSTANDING, tempered
 from freeswing.ident.diagnose.refit import refit, without
 from freeswing.ident.diagnose.removal import is_no_worse, superfluous
@@ -60,7 +60,7 @@ def test_lengths_say_nothing_where_only_gravity_is_tilted(tmp_path):
     _, found = diagnosed(tmp_path, {"gravity_tilt": "large"}, 23, ())
     robot = found.final.model.robot
     keys = [key for name in POINTS for key in variants(robot, name)]
-    assert displacements(found.final, keys, WHITE) == []
+    assert kinematics(found.final, keys, WHITE).wrong == ()
 
 
 def test_an_effect_that_a_later_one_makes_superfluous_leaves(tmp_path):

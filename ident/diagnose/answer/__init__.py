@@ -1,0 +1,1 @@
+"""How a diagnosis is told: values with honest deviations, in the directions that data see."""

@@ -1,0 +1,75 @@
+"""Standard deviations that are printed, and what data see of a displaced point."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from freeswing.cdpr.model.equations import Model
+from freeswing.cdpr.robot import Array
+from freeswing.ident.diagnose.refit import Refit
+from freeswing.ident.likelihood.likelihood import LikelihoodFit
+
+AXES = ("x", "y", "z")
+
+
+def honest_covariance(found: LikelihoodFit, scored: Refit) -> Array:
+    """Covariance of the shared unknowns, (p, p): the larger of the posterior and the jackknife.
+
+    Each unknown's deviation is raised to the one that leaving out one run at a time gives; the
+    correlations stay those of the posterior.
+
+    Args:
+        found: the final fit.
+        scored: the fit of the search that it goes on from, with its left-out runs.
+    """
+    stds = found.std
+    free = np.flatnonzero(scored.fit.free)
+    jackknife = np.zeros(len(stds))
+    jackknife[free] = scored.score.jackknife_std
+    safe = np.where(stds > 0.0, stds, 1.0)
+    factors = np.where(np.isfinite(stds), np.maximum(1.0, jackknife / safe), 1.0)
+    return found.covariance * np.outer(factors, factors)
+
+
+def directions(model: Model, places: np.ndarray, covariance: Array) -> list[dict[str, Any]]:
+    """Along which directions of a point's displacement its value is known, and how well.
+
+    Args:
+        model: with the effect.
+        places: of the effect's estimated values among the model's, (k,).
+        covariance: of these, (k, k).
+
+    Returns:
+        For each cable's (or the platform's) three coordinates: the unit vector that the data see
+        best first, with its standard deviation; empty for values that are no points.
+    """
+    told = []
+    names = [model.parameters[k].name for k in places]
+    for first in range(len(names) - 2):
+        stem, axis, unit = _axis_of(names[first])
+        wanted = [f"{stem}_{one}_{unit}" for one in AXES]
+        if axis != "x" or names[first : first + 3] != wanted:
+            continue
+        block = covariance[first : first + 3, first : first + 3]
+        if not np.isfinite(block).all():
+            continue
+        sizes, axes = np.linalg.eigh(block)
+        told += [
+            {
+                "point": stem,
+                "direction": vector.tolist(),
+                f"std_{unit}": float(np.sqrt(max(size, 0.0))),
+            }
+            for size, vector in zip(sizes, axes.T, strict=True)
+        ]
+    return told
+
+
+def _axis_of(name: str) -> tuple[str, str, str]:
+    """Stem, axis and unit of `offset_2_x_m`; the axis is "" where there is none."""
+    parts = name.split("_")
+    if len(parts) < 3 or parts[-2] not in AXES:
+        return name, "", ""
+    return "_".join(parts[:-2]), parts[-2], parts[-1]

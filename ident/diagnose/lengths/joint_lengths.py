@@ -1,0 +1,219 @@
+"""One joint model of all that changes cable lengths, its posterior over what is grossly wrong.
+
+Anchors, attachments, radii, axes, what is measured, creep and stretch stand side by side. Each
+block of them is either as declared, within its tolerance, or grossly off; every set of up to
+`MOST_WRONG` gross blocks is weighed by its evidence, which is closed form in a linear problem.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from freeswing.cdpr.robot import Array
+from freeswing.ident.diagnose.lengths.length_noise import repetition, slow_size
+from freeswing.ident.diagnose.lengths.length_rows import LengthRows
+
+MOST_WRONG = 3
+# One block in thirty is off in a robot that somebody has measured: a dozen blocks, a third of all
+# robots with something wrong.
+CHANCE_OF_WRONG = 1.0 / 30.0
+
+
+@dataclass(frozen=True, slots=True)
+class Blocks:
+    """Which unknowns belong together.
+
+    Attributes:
+        columns: places of each block's unknowns among the shared ones.
+        tolerance: standard deviation of each unknown where all is as declared, (p,).
+        gross: and where its block is wrong, (p,).
+    """
+
+    columns: dict[str, np.ndarray]
+    tolerance: Array
+    gross: Array
+
+    def spread(self, wrong: Sequence[str]) -> Array:
+        """Prior standard deviations with some blocks wrong, (p,)."""
+        found = self.tolerance.copy()
+        for key in wrong:
+            found[self.columns[key]] = self.gross[self.columns[key]]
+        return found
+
+
+@dataclass(frozen=True, slots=True)
+class Normal:
+    """Normal equations of each run after its own unknowns were eliminated.
+
+    Attributes:
+        matrices: (r, p, p).
+        rights: (r, p).
+        squares: of what is left with all unknowns at zero, (r,).
+        rows: of the runs.
+        size: of the slow errors.
+        repetition: see `length_noise.repetition`.
+    """
+
+    matrices: Array
+    rights: Array
+    squares: Array
+    rows: tuple[LengthRows, ...]
+    size: float
+    repetition: float
+
+    def variation_m(self, values: Array) -> float:
+        """What unknowns (p,) leave of the lengths' variation along the runs, root mean square."""
+        weighed = self.size * float(np.sqrt(self.repetition))
+        left = [_left(one, _reduced(one, weighed), values) for one in self.rows]
+        return float(np.sqrt(np.mean(np.concatenate([rest.reshape(-1) for rest in left]) ** 2)))
+
+
+@dataclass(frozen=True, slots=True)
+class Solved:
+    """A Gaussian of the shared unknowns.
+
+    Attributes:
+        values: (p,).
+        covariance: (p, p).
+        log_evidence: up to a constant that all sets share.
+    """
+
+    values: Array
+    covariance: Array
+    log_evidence: float
+
+
+def normal_equations(rows: Sequence[LengthRows], widest: Array) -> Normal:
+    """Normal equations with slow errors as large, and as repetitive, as what is left asks for.
+
+    Args:
+        rows: of all runs.
+        widest: prior standard deviations with everything wrong, (p,).
+    """
+    least = max(one.least_size for one in rows)
+    size, repeats = least, 1.0
+    freedom = float(sum(one.right.size - one.own.shape[2] for one in rows)) - len(widest)
+    if freedom <= 0.0:
+        raise ValueError("too few samples for the unknowns of the geometry")
+    for _ in range(3):
+        found = [_reduced(one, size * np.sqrt(repeats)) for one in rows]
+        solution = solved(_summed(found), widest)
+        left = [_left(one, part, solution.values) for one, part in zip(rows, found, strict=True)]
+        estimated = slow_size(rows, left, freedom)
+        white = [_whitened(one, estimated, rest) for one, rest in zip(rows, left, strict=True)]
+        repeated = estimated**2 * (repetition(white) if estimated > 0.0 else 1.0)
+        size, repeats = max(least, float(np.sqrt(repeated))), 1.0
+    found = [_reduced(one, size * np.sqrt(repeats)) for one in rows]
+    matrices = np.array([part.matrix for part in found])
+    rights, squares = np.array([p.right for p in found]), np.array([p.square for p in found])
+    return Normal(matrices, rights, squares, tuple(rows), size, repeats)
+
+
+def solved(summed: tuple[Array, Array, float], spread: Array) -> Solved:
+    """The Gaussian of the unknowns from summed normal equations and independent priors."""
+    matrix, right, square = summed
+    scaled = matrix * np.outer(spread, spread) + np.eye(len(spread))
+    factor = np.linalg.cholesky(scaled)
+    half = np.linalg.solve(factor, spread * right)
+    inverse = np.linalg.inv(factor) * spread
+    values = -inverse.T @ half
+    evidence = -0.5 * (square - float(half @ half)) - float(np.log(np.diag(factor)).sum())
+    return Solved(values, inverse.T @ inverse, evidence)
+
+
+def total(normal: Normal, without: int | None = None) -> tuple[Array, Array, float]:
+    """Sums over the runs, one of them left out or not."""
+    kept = np.arange(len(normal.rights)) != (-1 if without is None else without)
+    return (
+        normal.matrices[kept].sum(axis=0),
+        normal.rights[kept].sum(axis=0),
+        float(normal.squares[kept].sum()),
+    )
+
+
+def set_probabilities(normal: Normal, blocks: Blocks) -> dict[tuple[str, ...], float]:
+    """Posterior probability of each set of blocks that is wrong."""
+    summed = total(normal)
+    seen = np.diag(summed[0]) > 0.0
+    keys = tuple(key for key, where in blocks.columns.items() if seen[where].all())
+    logs: dict[tuple[str, ...], float] = {}
+    odds = np.log(CHANCE_OF_WRONG / (1.0 - CHANCE_OF_WRONG))
+    for count in range(min(MOST_WRONG, len(keys)) + 1):
+        for wrong in combinations(keys, count):
+            logs[wrong] = solved(summed, blocks.spread(wrong)).log_evidence + count * odds
+    highest = max(logs.values())
+    weights = {wrong: float(np.exp(log - highest)) for wrong, log in logs.items()}
+    whole = sum(weights.values())
+    return {wrong: weight / whole for wrong, weight in weights.items()}
+
+
+def log_odds(normal: Normal, blocks: Blocks, wrong: Sequence[str], key: str) -> float:
+    """Log of the evidence for a block's being wrong beside the others of a set."""
+    summed, others = total(normal), [one for one in wrong if one != key]
+    with_it = solved(summed, blocks.spread(wrong)).log_evidence
+    return with_it - solved(summed, blocks.spread(others)).log_evidence
+
+
+def honest_covariance(normal: Normal, spread: Array, found: Solved) -> Array:
+    """The larger, in every direction, of the posterior's covariance and of that over runs.
+
+    How the runs' scores differ gives a covariance without any model of the noise (a sandwich, the
+    jackknife to first order). Where it is the smaller one the posterior stays.
+    """
+    scores = normal.matrices @ found.values + normal.rights
+    scores = scores - scores.mean(axis=0)
+    count = len(scores)
+    between = count / max(count - 1.0, 1.0) * scores.T @ scores
+    root = np.linalg.cholesky(found.covariance + 1e-12 * np.diag(spread**2))
+    sizes, axes = np.linalg.eigh(root.T @ between @ root)
+    turned = root @ axes
+    return (turned * np.maximum(sizes, 1.0)) @ turned.T
+
+
+@dataclass(frozen=True, slots=True)
+class _Part:
+    matrix: Array
+    right: Array
+    square: float
+    own: Array
+    own_inverse: Array
+    weights: Array
+
+
+def _reduced(rows: LengthRows, size: float) -> _Part:
+    """Normal equations without a run's own unknowns: its lengths free, its frame of unit prior."""
+    weights = np.linalg.inv(rows.white + size**2 * rows.slow)
+    n, n_own = rows.right.shape[1], rows.own.shape[2]
+    everything = np.concatenate([rows.own, rows.shared, rows.right[..., None]], axis=2)
+    gram = np.einsum("bia,bij,bjc->ac", everything, weights, everything, optimize=True)
+    prior = np.zeros(n_own)
+    prior[n:] = 1.0
+    own = gram[:n_own, :n_own] + np.diag(prior)
+    inverse = np.linalg.inv(own)
+    rest = gram[n_own:, n_own:] - gram[n_own:, :n_own] @ inverse @ gram[:n_own, n_own:]
+    return _Part(rest[:-1, :-1], rest[:-1, -1], float(rest[-1, -1]), gram, inverse, weights)
+
+
+def _summed(parts: Sequence[_Part]) -> tuple[Array, Array, float]:
+    return (
+        np.sum([part.matrix for part in parts], axis=0),
+        np.sum([part.right for part in parts], axis=0),
+        float(sum(part.square for part in parts)),
+    )
+
+
+def _left(rows: LengthRows, part: _Part, values: Array) -> Array:
+    """What the shared unknowns and the run's own ones leave of its lengths, (b, n)."""
+    n_own = rows.own.shape[2]
+    change = np.concatenate([values, [1.0]])
+    own = -part.own_inverse @ (part.own[:n_own, n_own:] @ change)
+    return rows.right + rows.shared @ values + rows.own @ own
+
+
+def _whitened(rows: LengthRows, size: float, left: Array) -> Array:
+    factor = np.linalg.cholesky(rows.white + size**2 * rows.slow)
+    return np.linalg.solve(factor, left[..., None])[..., 0]

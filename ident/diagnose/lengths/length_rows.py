@@ -1,0 +1,129 @@
+"""One run's cable lengths as linear equations of all that may be wrong with them.
+
+With the unknowns v: l(z, g) - what effects such as stretch and creep add = a constant of the run,
+where z is the measured pose less what effects on the measurement, the run's platform frame and
+noise add.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from freeswing.cdpr.model.batch import evaluate, with_jacobian
+from freeswing.cdpr.model.equations import Model
+from freeswing.cdpr.robot import Array
+from freeswing.cdpr.rotation import angle_rate_matrix, matrix_from_angles
+from freeswing.cdpr.simulation.free_swing import Motion
+from freeswing.ident.likelihood.likelihood_run import Samples
+
+# Slow errors follow the swing (up to some 2 Hz): means over a tenth of a second lose none of them.
+BLOCK_S = 0.1
+# The shape of slow errors: half-hidden markers and tags move poses by a tenth of a millimetre, the
+# pulley's run-out and the seat in its groove a length by a few. Their size is estimated, and at
+# least so much: below it the small print of every error decides what is wrong. On real recordings
+# the residual of a general enough model is a tenth of it, and pulleys had to be a quarter
+# turn off to reach it.
+DRIFT_M, DRIFT_RAD, RUN_OUT_M = 1e-4, 5e-4, 3e-4
+LEAST_SIZE = 1.0
+# Poses that say nothing of slow errors are believed, but never below 20 micrometres.
+LEAST_SIZE_UNSTATED = 0.2
+
+
+@dataclass(frozen=True, slots=True)
+class LengthRows:
+    """Means over blocks of a run's equations own u + shared v + right = noise.
+
+    Attributes:
+        run: its name.
+        own: by the run's constants: lengths, then its frame in standard deviations, (b, n, o).
+        shared: by the unknowns that all runs share, (b, n, p).
+        right: lengths less their mean, with the unknowns at zero, (b, n).
+        white: covariance of the white noise, (b, n, n).
+        slow: of slow errors of unit size, (b, n, n).
+        least_size: of the slow errors.
+    """
+
+    run: str
+    own: Array
+    shared: Array
+    right: Array
+    white: Array
+    slow: Array
+    least_size: float
+
+
+def length_rows(
+    model: Model,
+    motion: Motion,
+    samples: Samples,
+    noise_scales: Array,
+    values: Array,
+    patterns: dict[str, Array],
+) -> LengthRows:
+    """A run's equations, linearised at values of the geometry.
+
+    Args:
+        model: with all effects that displace or measure; its values come first among the shared
+            unknowns, then those of the patterns.
+        motion: of the run, for rates and tensions.
+        samples: its poses.
+        noise_scales: of metres and radians, (2,).
+        values: at which to linearise, (k,); those of measurement effects at zero.
+        patterns: how other effects would make lengths vary, (n_t, n, k) each.
+    """
+    zetas, times = samples.values, samples.times_s
+    n = model.robot.n_cables
+    lengths, slopes = evaluate(with_jacobian(model.lengths, (0, 1)), zetas, values)
+    by_pose, by_values = slopes[:, :, :6], slopes[:, :, 6:]
+    rates = motion.at(times)[1]
+    shown = evaluate(
+        with_jacobian(model.measured, (4,)), times, zetas, rates, motion.inertia, model.start_values
+    )[1]
+    geometry = by_values - by_pose @ shown
+    turn = np.linalg.inv(angle_rate_matrix(zetas[:, 3:]))
+    by_twist = np.concatenate([by_pose[:, :, :3], by_pose[:, :, 3:] @ turn], axis=2)
+    rotations = matrix_from_angles(zetas[:, 3:])
+    in_platform = np.concatenate([by_twist[..., :3] @ rotations, by_twist[..., 3:] @ rotations], 2)
+    shared = np.concatenate([geometry, *(-pattern for pattern in patterns.values())], axis=2)
+    right = lengths - np.einsum("tck,k->tc", by_values, values)
+    blocks = _blocks(times)
+    noise = by_twist @ np.linalg.inv(samples.whitener) * noise_scales[samples.groups]
+    drift = np.diag([DRIFT_M**2] * 3 + [DRIFT_RAD**2] * 3)
+    own = [np.broadcast_to(np.eye(n), (len(times), n, n))]
+    least = LEAST_SIZE_UNSTATED
+    if samples.slow is not None:
+        least = LEAST_SIZE
+        drift = drift + samples.slow.drift_covariance
+        own.append(in_platform @ _root(samples.slow.frame_covariance))
+    mean_in_platform = _means(in_platform, blocks)
+    counts = np.bincount(blocks)[:, None, None]
+    return LengthRows(
+        samples.name,
+        _means(np.concatenate(own, axis=2), blocks),
+        _means(shared, blocks),
+        _means(right - right.mean(axis=0), blocks),
+        _means(noise @ np.swapaxes(noise, 1, 2), blocks) / counts,
+        mean_in_platform @ drift @ np.swapaxes(mean_in_platform, 1, 2) + RUN_OUT_M**2 * np.eye(n),
+        least,
+    )
+
+
+def _blocks(times_s: Array) -> np.ndarray:
+    """Which block each sample belongs to, (n,), without empty ones."""
+    raw = ((times_s - times_s[0]) / BLOCK_S).astype(np.int64)
+    return np.unique(raw, return_inverse=True)[1]
+
+
+def _means(values: Array, blocks: np.ndarray) -> Array:
+    flat = values.reshape(len(values), -1)
+    starts = np.flatnonzero(np.diff(blocks, prepend=-1))
+    sums = np.add.reduceat(flat, starts, axis=0)
+    return (sums / np.bincount(blocks)[:, None]).reshape(-1, *values.shape[1:])
+
+
+def _root(covariance: Array) -> Array:
+    """A factor of a positive semi-definite matrix."""
+    sizes, axes = np.linalg.eigh(covariance)
+    return axes * np.sqrt(np.maximum(sizes, 0.0))
