@@ -35,6 +35,8 @@ from freeswing.ident.signals.prepare import (
 )
 
 Weighting = Literal["published", "covariance"]
+# Two standard deviations: what the swings themselves leave open.
+REACH = 2.0
 _THINNED = 10  # samples skipped where only an impression of the regressor's noise is wanted
 
 
@@ -65,7 +67,7 @@ def fidim_estimates(
             continue
         try:
             raw = fidim([regressor(model, motion_of(run, full)) for run in unloaded])
-            slack = _slack_runs(model, prepared, raw.values, full)
+            slack = _slack_runs(model, prepared, within_reach(raw), full)
             if slack:
                 prepared = without(prepared, slack)
                 unloaded = usable(prepared, full, None)
@@ -154,8 +156,20 @@ def _mass(
         return None
 
 
-def _slack_runs(model: Model, prepared: PreparedRuns, inertia: Array, full: bool) -> dict[str, str]:
-    """Runs along which a cable pushes, by the estimated inertia: name and sentence."""
+def within_reach(raw: FidimEstimate) -> Array:
+    """The estimate and what lies `REACH` deviations off along its principal axes, (19, 9)."""
+    sizes, axes = np.linalg.eigh(raw.solution.covariance)
+    steps = REACH * (axes * np.sqrt(np.maximum(sizes, 0.0))).T
+    return np.concatenate([raw.values[None], raw.values + steps, raw.values - steps])
+
+
+def _slack_runs(
+    model: Model, prepared: PreparedRuns, inertias: Array, full: bool
+) -> dict[str, str]:
+    """Runs along which a cable pushes by every inertia that the swings allow: name and sentence.
+
+    An inertia that they do not determine may make any cable push, and proves nothing.
+    """
     slack = {}
     for run in prepared.runs:
         # Measured poses settle it; free coordinates only where there is nothing better.
@@ -164,8 +178,8 @@ def _slack_runs(model: Model, prepared: PreparedRuns, inertia: Array, full: bool
         motion = run.full if full else run.free
         if motion is None or run.run.payload is not None:
             continue
-        lowest, cable = lowest_tension(model, motion, inertia)
-        if lowest < 0.0:
+        lowest, cable = lowest_tension(model, motion, inertias[0])
+        if lowest < 0.0 and all(lowest_tension(model, motion, one)[0] < 0.0 for one in inertias):
             slack[run.name] = (
                 f"cable {cable} goes slack: its tension falls to {lowest:.2f} N per kg of platform"
             )
