@@ -130,32 +130,6 @@ class Model:
         """Values that leave the declared model as it is, (k,)."""
         return np.array([parameter.start for parameter in self.parameters])
 
-    @property
-    def prior_whitener(self) -> Array:
-        """Turns distances from `start_values` into independent ones of unit deviation, (k, k)."""
-        scaled = np.diag([1.0 / parameter.prior_std for parameter in self.parameters])
-        if self.correlations is None:
-            return scaled
-        return np.linalg.solve(np.linalg.cholesky(self.correlations), scaled)
-
-    def known(self, places: IntArray, values: Array, covariance: Array) -> Model:
-        """The model with some of its values known as a joint Gaussian.
-
-        Args:
-            places: among the values, (q,).
-            values: their means, (q,).
-            covariance: theirs, (q, q).
-        """
-        stds = np.sqrt(np.diag(covariance))
-        parameters = list(self.parameters)
-        for place, value, std in zip(places, values, stds, strict=True):
-            parameters[place] = parameters[place].known(float(value), float(std))
-        count = len(parameters)
-        together = np.eye(count) if self.correlations is None else self.correlations.copy()
-        together[places] = together[:, places] = 0.0
-        together[np.ix_(places, places)] = covariance / np.outer(stds, stds)
-        return replace(self, parameters=tuple(parameters), correlations=together)
-
 
 @dataclass(frozen=True, slots=True)
 class _Symbols:

@@ -160,20 +160,7 @@ def diagnose(
     search = Search(noise_scales, considered, workers, executor, _part(progress, 0.2, 0.85))
     last = search.run(base)
     notes = [*session_notes(model, prepared, {}), *dropped]
-    share = _share_explained(search, last)
-    rest = unexplained(last.fit, fitted, full, noise_scales)
-    accepted = [one for one in search.rounds if one.decision.winner is not None]
-    settled = [one for one in accepted if one.by_lengths]
-    follows_badly = rest.present or excess_of(last) > LARGEST_EXCESS_LEFT
-    if len(accepted) > len(settled) and follows_badly and share < LEAST_SHARE_EXPLAINED:
-        doubtful = [effect_of(one.decision.key) for one in accepted if not one.by_lengths]
-        notes.append(
-            f"{', '.join(doubtful)} would remove only {100 * share:.0f} % of the excess: the "
-            "nearest candidates, not the cause; not accepted"
-        )
-        last = accepted[len(settled)].before
-        accepted = settled
-        rest = unexplained(last.fit, fitted, full, noise_scales)
+    last, accepted, rest = _believed(search, last, fitted, full, notes)
     ladder = _ladder(search, accepted, checked, free, _part(progress, 0.85, 0.95))
     final = _with_own_noise(last.fit, fitted)
     begun = search.rounds[0].before if accepted else last
@@ -192,6 +179,29 @@ def diagnose(
         rest,
         tuple(notes),
     )
+
+
+def _believed(
+    search: Search, last: Refit, fitted: list[PreparedRun], full: bool, notes: list[str]
+) -> tuple[Refit, list[Round], Unexplained]:
+    """The last fit, the rounds that count and what remains, without what is but the nearest.
+
+    Effects that leave much of what follows the motion are not the cause; a note says which.
+    """
+    share = _share_explained(search, last)
+    rest = unexplained(last.fit, fitted, full, search.noise_scales)
+    accepted = [one for one in search.rounds if one.decision.winner is not None]
+    settled = [one for one in accepted if one.by_lengths]
+    follows_badly = rest.present or excess_of(last) > LARGEST_EXCESS_LEFT
+    if len(accepted) == len(settled) or not follows_badly or share >= LEAST_SHARE_EXPLAINED:
+        return last, accepted, rest
+    doubtful = [effect_of(one.decision.key) for one in accepted if not one.by_lengths]
+    notes.append(
+        f"{', '.join(doubtful)} would remove only {100 * share:.0f} % of the excess: the "
+        "nearest candidates, not the cause; not accepted"
+    )
+    last = accepted[len(settled)].before
+    return last, settled, unexplained(last.fit, fitted, full, search.noise_scales)
 
 
 def claims(effects: tuple[str, ...]) -> tuple[str, ...]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from freeswing.cdpr.effects import effect_named
 from freeswing.cdpr.model.equations import Model
+from freeswing.cdpr.model.known_values import with_known
 from freeswing.cdpr.robot import Array
 from freeswing.ident.diagnose.leave_one_out import Evidence, Score, score
 from freeswing.ident.diagnose.outstanding_runs import tempered
@@ -127,7 +128,7 @@ def displaced(
     values = state.values.copy()
     chosen = np.arange(len(values))[model.place_of(name)][inside(model.robot, key)]
     values[chosen] = centre
-    known = model.known(chosen, centre, covariance)
+    known = with_known(model, chosen, centre, covariance)
     return polished(_fitted(known, found, replace(state, values=values), free), noise_scales)
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from freeswing.cdpr.model.equations import Model
+from freeswing.cdpr.model.known_values import prior_whitener
 from freeswing.cdpr.robot import Array
 from freeswing.cdpr.simulation.sensitivity import linearise
 from freeswing.ident.diagnose.leave_one_out import Evidence
@@ -104,7 +105,7 @@ def _amplitudes(model: Model, key: str) -> np.ndarray:
 def _priors(model: Model, values: Array) -> Array:
     """Each effect value is within its plausible range: a weak row each."""
     rows = np.zeros((len(values), BASE + len(values) + 1))
-    whitener = model.prior_whitener
+    whitener = prior_whitener(model)
     whitener[model.own_values] = 0.0
     rows[:, BASE:-1] = whitener
     rows[:, -1] = whitener @ (values - model.start_values)

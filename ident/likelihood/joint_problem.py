@@ -9,6 +9,7 @@ import numpy as np
 
 from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.model.free_motion import admissible_rates
+from freeswing.cdpr.model.known_values import prior_whitener
 from freeswing.cdpr.robot import Array
 from freeswing.cdpr.simulation.free_swing import Motion, simulate
 from freeswing.cdpr.simulation.sensitivity import linearise
@@ -116,7 +117,7 @@ class Problem:
         self.estimate_scales = estimate_scales
         self.tolerance_m = tolerance_m
         self.prior_centre = model.start_values
-        self.prior_whitener = model.prior_whitener
+        self.prior_whitener = prior_whitener(model)
         self.prior_whitener[model.own_values] = 0.0
         self.unit = np.concatenate([INERTIA_UNIT, [p.scale for p in parameters], self.loads.unit])
         far = [3.0 * INERTIA_UNIT, [(p.high - p.low) / 3.0 for p in parameters], self.loads.unit]

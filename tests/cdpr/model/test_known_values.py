@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from freeswing.cdpr.model.equations import build_model
+from freeswing.cdpr.model.known_values import prior_whitener, with_known
 from freeswing.ident.diagnose.variants import extended, reduced
 from tests.oracle.robots import declared_robot
 
@@ -14,12 +15,12 @@ PLACES = np.array([3, 4, 5])
 def known():
     model = build_model(declared_robot("three-cable"), ("attachment_offset",))
     root = 1e-3 * np.array([[1.0, 0.0, 0.0], [2.0, 1.0, 0.0], [-1.0, 0.5, 0.3]])
-    return model.known(PLACES, np.array([1e-3, -2e-3, 3e-3]), root @ root.T), root @ root.T
+    return with_known(model, PLACES, np.array([1e-3, -2e-3, 3e-3]), root @ root.T), root @ root.T
 
 
 def test_the_whitener_makes_the_joint_prior_of_unit_deviation(known):
     model, covariance = known
-    whitener = model.prior_whitener
+    whitener = prior_whitener(model)
     precision = (whitener.T @ whitener)[np.ix_(PLACES, PLACES)]
     assert np.linalg.inv(precision) == pytest.approx(covariance, rel=1e-9)
     assert model.start_values[PLACES] == pytest.approx([1e-3, -2e-3, 3e-3])
@@ -30,7 +31,7 @@ def test_what_is_known_stays_known_in_larger_and_smaller_models(known):
     model, covariance = known
     larger = extended(model, ("translational_drag",))
     for one in (larger, reduced(larger, "translational_drag")):
-        whitener = one.prior_whitener
+        whitener = prior_whitener(one)
         precision = (whitener.T @ whitener)[np.ix_(PLACES, PLACES)]
         assert np.linalg.inv(precision) == pytest.approx(covariance, rel=1e-9)
     assert reduced(larger, "attachment_offset").correlations.shape == (2, 2)
