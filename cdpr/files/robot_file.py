@@ -83,7 +83,10 @@ def _read_tolerances(reader: Reader | None) -> Tolerances:
     """What a robot's own builders know better than the usual table."""
     if reader is None:
         return Tolerances()
-    given = {one.name: reader.optional_number(one.name, above=0.0) for one in fields(Tolerances)}
+    given = {
+        one.name: reader.optional_number(one.name, above=1.0 if one.name == "gross" else 0.0)
+        for one in fields(Tolerances)
+    }
     reader.finish()
     known = {name: value for name, value in given.items() if value is not None}
     return Tolerances() if reader.problems else Tolerances(**known)

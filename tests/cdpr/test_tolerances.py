@@ -35,7 +35,10 @@ def test_robot_toml_overrides_some_and_keeps_the_others(tmp_path):
 def test_a_wrong_tolerance_names_file_and_key(tmp_path):
     path = tmp_path / "robot.toml"
     write_robot(path, declared_robot("three-cable"))
-    path.write_text(path.read_text() + "\n[tolerances]\nentry_m = -0.001\nentyr_m = 0.1\n")
+    path.write_text(
+        path.read_text() + "\n[tolerances]\nentry_m = -0.001\nentyr_m = 0.1\ngross = 0.5\n"
+    )
     with pytest.raises(InputError, match=r"entry_m") as caught:
         read_robot(path)
     assert "entyr_m" in str(caught.value)
+    assert "gross" in str(caught.value)
