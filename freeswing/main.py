@@ -29,6 +29,9 @@ COMMANDS = (
     "board",
     "home",
     "excite",
+    "design",
+    "servo",
+    "tensions",
 )
 DONE, NO_RESULT, WRONG_INPUT, INTERRUPTED = 0, 1, 2, 130
 

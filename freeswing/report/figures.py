@@ -40,6 +40,11 @@ _STYLE: Any = {
 }
 
 
+def figure_style() -> dict[str, Any]:
+    """The one style, for figures that are files of their own."""
+    return dict(_STYLE)
+
+
 def figure(
     draw: Callable[[Figure], None], width_in: float, height_in: float, caption: str
 ) -> Markup:

@@ -11,6 +11,8 @@ from freeswing.servo.synthesis.state_space import Array, Complex, StateSpace, cl
 
 # Five decades around the rates of cable robots; 400 a decade place a crossing to 0.3 %.
 RATES_RAD_S = np.geomspace(1e-2, 1e3, 2001)
+# Where what is left at rest is read: an integrator has its pole on 0 itself.
+AT_REST_RAD_S = 1e-6
 MINUS_3_DB = 1.0 / np.sqrt(2.0)
 
 
@@ -54,7 +56,7 @@ def examine(plant: StateSpace, controller: StateSpace, delay_s: float = 0.0) -> 
     """
     stable = close(bare(plant).plant, controller).is_stable()
     margin = delay_margin(plant, controller) if stable else 0.0
-    S = sensitivity(plant, controller, RATES_RAD_S, delay_s)
+    S = sensitivity(plant, controller, np.r_[AT_REST_RAD_S, RATES_RAD_S], delay_s)
     return Loop(stable and margin > delay_s, _half(S[:, :3, :3]), _half(S[:, 3:, 3:]), margin)
 
 
@@ -95,5 +97,5 @@ def _sensitivity(open_loop: Complex, rates: Array, delay_s: float) -> Complex:
 def _half(S: Complex) -> Half:
     largest = np.linalg.norm(S, 2, axis=(1, 2))
     above = np.flatnonzero(largest >= MINUS_3_DB)
-    bandwidth = 0.0 if len(above) == 0 or above[0] == 0 else float(RATES_RAD_S[above[0]])
+    bandwidth = 0.0 if len(above) == 0 or above[0] <= 1 else float(RATES_RAD_S[above[0] - 1])
     return Half(bandwidth, float(1.0 / largest.max()), float(largest[0]))

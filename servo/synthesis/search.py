@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-
-import numpy as np
 
 from freeswing.servo.synthesis.norm import hinf_norm
 from freeswing.servo.synthesis.riccati import (
@@ -52,7 +51,9 @@ def synthesise(
     n = normalise(problem)
     bottom, top, why = _bracket(n)
     while top - bottom > tolerance * top:
-        middle = np.sqrt(bottom * top) if bottom > 0.0 and top > 2 * bottom else (bottom + top) / 2
+        middle = (
+            math.sqrt(bottom * top) if bottom > 0.0 and top > 2 * bottom else (bottom + top) / 2
+        )
         solution = solve_at(n, middle)
         if solution.why is None:
             top = middle

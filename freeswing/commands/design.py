@@ -1,0 +1,151 @@
+"""Design a vision controller for a driven robot: H-infinity, and others beside it."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from freeswing.commands.arguments import add_results
+from freeswing.console import Console
+
+if TYPE_CHECKING:
+    from freeswing.servo.design.controller import Controller
+    from freeswing.servo.files.weights_file import Goals
+
+METHODS = ("hinf", "lqg", "pid", "joint-pid", "all")
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Robot, weights, method, where, how large."""
+    parser.add_argument(
+        "robot", metavar="ROBOT", help="robot.toml of a driven robot, or its folder"
+    )
+    parser.add_argument(
+        "--weights", metavar="FILE", help="weights.toml; without it the paper's, as corrected"
+    )
+    parser.add_argument("--method", choices=METHODS, default="hinf", help="default hinf")
+    parser.add_argument(
+        "--at",
+        type=float,
+        nargs=6,
+        default=(0.0,) * 6,
+        metavar=("X", "Y", "Z", "R", "P", "YAW"),
+        help="pose to design about, m and rad (the centre)",
+    )
+    parser.add_argument(
+        "--order", type=int, metavar="N", help="reduce the H-infinity controller to N states"
+    )
+    parser.add_argument(
+        "--robustness",
+        action="store_true",
+        help="also the margins over the workspace and over 200 draws of the robot's numbers",
+    )
+    add_results(parser, "ROBOT's folder/results")
+
+
+def run(options: Namespace, console: Console) -> None:
+    """Design, examine, write controller.json and what goes with it."""
+    from freeswing.cdpr.files.documents import DataError, InputError, write_json
+    from freeswing.servo.design.family import METHODS as FAMILY
+    from freeswing.servo.design.hinf import AssumptionError
+    from freeswing.servo.design.offer import Order, offer
+    from freeswing.servo.driven_file import read_driven
+    from freeswing.servo.files.weights_file import USUAL, Goals, read_weights
+
+    path, model = read_driven(options.robot)
+    goals = Goals(USUAL, None) if options.weights is None else read_weights(options.weights)
+    if options.order is not None and options.order < 1:
+        raise InputError(f"--order {options.order}: at least 1 state")
+    folder = path.parent / "results" if options.results is None else Path(options.results)
+    wanted = FAMILY if options.method == "all" else (options.method,)
+    order = Order(goals, tuple(options.at), options.order)
+    documents = {}
+    for k, method in enumerate(wanted):
+        console.progress("design", k / len(wanted))
+        try:
+            found = offer(model, method, order)
+        except AssumptionError as error:
+            raise InputError(f"{options.weights or path}: {error}") from error
+        except ValueError as error:
+            raise DataError(f"{path}: {method}: {error}") from error
+        documents[method] = _write(folder, found, method == wanted[0])
+        _say(console, found, goals)
+    result = folder / "controller.json"
+    if options.robustness:
+        _robustness(console, model, order, folder)
+    if options.method == "all":
+        write_json(folder / "controllers.json", _table(documents))
+    _figures(folder, model, goals, order)
+    console.say(str(result))
+    console.show_file(result)
+
+
+def _write(folder: Path, found: Controller, is_first: bool) -> dict:
+    from freeswing.cdpr.files.documents import replace_file, write_json
+    from freeswing.servo.files.controller_file import c_header, mat_bytes, npz_bytes, to_document
+
+    name = "controller" if is_first else f"controller-{found.method}"
+    document = to_document(found)
+    write_json(folder / f"{name}.json", document)
+    replace_file(folder / f"{name}.npz", npz_bytes(found))
+    replace_file(folder / f"{name}.mat", mat_bytes(found))
+    replace_file(folder / f"{name}.h", c_header(found).encode())
+    return document
+
+
+def _table(documents: dict) -> dict:
+    keys = ("gamma", "order", "margins", "bandwidth_rad_s", "delay_margin_s", "with_delay")
+    rows = {method: {key: d.get(key) for key in keys} for method, d in documents.items()}
+    return {"format": "freeswing-controllers/1", "controllers": rows}
+
+
+def _say(console: Console, found: Controller, goals: Goals) -> None:
+    loop, late = found.undelayed, found.delayed
+    if "gamma" in found.facts:
+        console.say(
+            f"{found.method}: gamma {found.facts['gamma']:.4f} at best, "
+            f"{found.facts['gamma_backed_off']:.4f} asked for, {found.facts['norm']:.4f} reached; "
+            f"order {found.sampled.order}"
+        )
+    else:
+        speeds = ", ".join(f"{value:.2f}" for value in found.facts.values())
+        console.say(f"{found.method}: speeds {speeds} rad/s; order {found.sampled.order}")
+    console.say(
+        f"bandwidth {loop.position.bandwidth_rad_s:.2f} rad/s (position), "
+        f"{loop.orientation.bandwidth_rad_s:.2f} rad/s (orientation); modulus margins "
+        f"{loop.position.modulus_margin:.3f}, {loop.orientation.modulus_margin:.3f}; at rest "
+        f"{100 * loop.position.static_error:.3g}, {100 * loop.orientation.static_error:.3g} % left"
+    )
+    known = "designed in" if goals.camera or found.method != "hinf" else "not in the design"
+    console.say(
+        f"delay margin {1e3 * loop.delay_margin_s:.1f} ms; at {1e3 * found.delay_s:.1f} ms "
+        f"({known}) margins {late.position.modulus_margin:.3f}, "
+        f"{late.orientation.modulus_margin:.3f}"
+    )
+    for warning in found.warnings:
+        console.complain(f"warning: {found.method}: {warning}")
+
+
+def _robustness(console: Console, model, order, folder: Path) -> None:
+    from freeswing.cdpr.files.documents import write_json
+    from freeswing.servo.design.robustness import survey_document
+
+    document = survey_document(model, order, console.progress)
+    write_json(folder / "robustness.json", document)
+    for line in document["sentences"]:
+        console.say(line)
+
+
+def _figures(folder: Path, model, goals: Goals, order) -> None:
+    from freeswing.cdpr.files.documents import replace_file
+    from freeswing.report.servo_figures import controller_gains, templates
+    from freeswing.servo.design.offer import offer
+
+    found = offer(model, "hinf", order)
+    plant = order.plant(model)
+    for name, svg in (
+        ("controller-gains.svg", controller_gains(found)),
+        ("controller-templates.svg", templates(found, plant, goals.weights)),
+    ):
+        replace_file(folder / name, svg.encode())

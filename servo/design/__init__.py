@@ -1,0 +1,1 @@
+"""Controllers of one robot, each from its linear model, tuned by one rule and held against it."""

@@ -1,0 +1,1 @@
+"""The control loop around the nonlinear robot: camera, controller, tensions, motors, friction."""
