@@ -98,7 +98,11 @@ HELD = (
     Held("ident/signals/motions.py", ("LENGTH_LIMIT_M",), "tests/ident/signals/test_limits.py"),
     Held("ident/signals/prepare.py", ("LEAST_SIGNAL",), "tests/ident/signals/test_limits.py"),
     Held("vision/rig/correct_rig.py", ("SIGMAS",), "tests/vision/rig/test_rig_limits.py"),
-    Held("vision/rig/rig_effects.py", ("MOVED_PX", "LEAST_CLOCK_S", "LEAST_LINE_S"), "tests/vision/rig/test_rig_limits.py"),
+    Held(
+        "vision/rig/rig_effects.py",
+        ("MOVED_PX", "LEAST_CLOCK_S", "LEAST_LINE_S"),
+        "tests/vision/rig/test_rig_limits.py",
+    ),
     Held(
         "freeswing/doctor/split.py", ("FEWEST_IDENTIFY",), "tests/freeswing/doctor/test_doctor.py"
     ),
