@@ -14,7 +14,13 @@ from freeswing.cdpr.rotation import matrix_from_quaternion, quaternion_from_matr
 
 Array = NDArray[np.float64]
 
+SMALLEST_M = 1e-4
+LARGEST_TAG_M = 3.0  # a tag wider than a room's wall; 5 mm taken for metres is above it
+LARGEST_MARKER_M = 0.5
 QUATERNION_TOLERANCE = 1e-3
+SMALLEST_M = 1e-4
+LARGEST_TAG_M = 3.0  # no room has a wider one; 5 mm taken for metres is above it
+LARGEST_MARKER_M = 0.5
 UNIT_CORNERS = 0.5 * np.array([[-1.0, 1, 0, 0], [1, 1, 0, 0], [1, -1, 0, 0], [-1, -1, 0, 0]])
 
 
@@ -143,6 +149,7 @@ def _read_tag_values(reader: Reader) -> tuple[str, int, float, Array, Array]:
         reader.unit_vector("q_platform_tag", 4, QUATERNION_TOLERANCE),
         reader.vector("t_platform_tag_m", 3),
     )
+    _question_size(reader, "size_m", values[2], LARGEST_TAG_M)
     reader.finish()
     return values
 
@@ -153,8 +160,16 @@ def _read_marker_values(reader: Reader) -> tuple[str, Array, float | None]:
         reader.vector("position_m", 3),
         reader.optional_number("diameter_m", above=0.0),
     )
+    _question_size(reader, "diameter_m", values[2], LARGEST_MARKER_M)
     reader.finish()
     return values
+
+
+def _question_size(reader: Reader, key: str, size_m: float | None, largest_m: float) -> None:
+    """Record a size that no printed tag and no marker has."""
+    if size_m and np.isfinite(size_m) and not SMALLEST_M <= size_m <= largest_m:
+        likely = f": millimetres? {size_m / 1e3:g} m then" if size_m > largest_m else ""
+        reader.add(key, f"{size_m:g} m, expected {SMALLEST_M:g} to {largest_m:g} m{likely}")
 
 
 def _add_repeats(problems: Problems, key: str, names: list[str]) -> None:

@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import hashlib
 import io
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from zipfile import BadZipFile, ZipFile
+from typing import Any
+from zipfile import ZIP_STORED, BadZipFile, ZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,8 @@ from freeswing.vision.look.watched_target import Watch
 Array = NDArray[np.float64]
 
 FRAMES_A_PIECE = 400
+# 400 frames of a hundred tags are 27 MB; a larger piece, or a packed one, is none of ours.
+MOST_PIECE_BYTES = 256 * 2**20
 _VERSION = b"freeswing-sightings/3"
 
 
@@ -128,12 +131,54 @@ def save_piece(path: Path, piece: Piece, follower: Follower) -> None:
 
 
 def is_whole(path: Path) -> bool:
-    """Whether a piece is there and undamaged; one that is not is made again."""
+    """Whether a piece is there and what `save_piece` writes; one that is not is made again."""
     try:
         with ZipFile(path) as archive:
-            return archive.testzip() is None
-    except (BadZipFile, OSError):
+            infos = archive.infolist()
+            plain = all(info.compress_type == ZIP_STORED for info in infos)
+            if not plain or sum(info.file_size for info in infos) > MOST_PIECE_BYTES:
+                return False
+            if archive.testzip() is not None:
+                return False
+        with np.load(path, allow_pickle=False) as data:
+            return _is_consistent(data)
+    except (BadZipFile, OSError, KeyError, ValueError, EOFError, NotImplementedError):
         return False
+
+
+def _is_consistent(data: Mapping[str, NDArray[Any]]) -> bool:
+    """Whether all members are there, of shapes that belong together, and finite where known."""
+    frames, seen = len(data["numbers"]), len(data["frame_of"])
+    past, base, before = (
+        len(data[name]) for name in ("past_times", "base_things", "before_things")
+    )
+    shapes = {
+        "numbers": (frames,),
+        "stamps_s": (frames,),
+        "status": (frames,),
+        "poses": (frames, 12),
+        "frame_of": (seen,),
+        "things": (seen,),
+        "rays": (seen, 8),
+        "covariances": (seen, 8, 8),
+        "rows_px": (seen, 4),
+        "quality": (seen, 2),
+        "past_times": (past,),
+        "past_rotations": (past, 3, 3),
+        "past_positions": (past, 3),
+        "base_things": (base,),
+        "base_rays": (base, 4, 2),
+        "before_things": (before,),
+        "before": (before, 4),
+        "counters": (2,),
+    }
+    known = ("stamps_s", "past_times", "past_rotations", "past_positions")
+    return (
+        all(data[name].shape == shape for name, shape in shapes.items())
+        and all(data[name].dtype.kind in "iuf" for name in shapes)
+        and all(np.isfinite(data[name]).all() for name in known)
+        and bool(((data["frame_of"] >= 0) & (data["frame_of"] < max(frames, 1))).all())
+    )
 
 
 def load_piece(path: Path) -> Piece:

@@ -11,9 +11,10 @@ from freeswing.cdpr.rotation import exp_rotation, transform
 
 def test_round_trip(tmp_path):
     pose = transform(exp_rotation(np.array([0.3, -2.0, 0.7])), np.array([0.1, 1 / 3, 2.0]))
+    fisheye = np.array([2000, 2001, 2240, 1680, 0.1, 0.02, -0.03, 0.004]) / 7
     written = (
         Camera("left", (1280, 1024), "PINHOLE", np.array([1e3, 1 / 3 + 999, 640, 512]), pose),
-        Camera("right", (640, 480), "OPENCV_FISHEYE", np.arange(1, 9) / 7, pose, -1.5e-4, 1e-5),
+        Camera("right", (640, 480), "OPENCV_FISHEYE", fisheye, pose, -1.5e-4, 1e-5),
     )
     write_cameras(tmp_path / "cameras.toml", written)
     read = read_cameras(tmp_path / "cameras.toml")
@@ -44,6 +45,15 @@ t_camera_base_m = [0.0, 0.0, 0.0]
         ("[1.0, 0.0, 0.0, 0.0]", "[1.0, 1.0, 0.0, 0.0]", "length is 1.41"),
         ("[0.0, 0.0, 0.0]", "[0.0, 0.0, inf]", "t_camera_base_m"),
         ("[1280, 1024]", "[1280.5, 1024]", "size_px"),
+        ("1000.0, 1000.0, 639.5", "127.0, 1000.0, 639.5", "expected 0.1 to 100 times"),
+        ("1000.0, 1000.0, 639.5", "1000.0, 128001.0, 639.5", "expected 0.1 to 100 times"),
+        ("639.5, 511.5", "639.5, 1537.0", "far outside the image"),
+        ("639.5, 511.5", "-641.0, 511.5", "far outside the image"),
+        (
+            '"PINHOLE"\nparams = [1000.0, 1000.0, 639.5, 511.5]',
+            '"OPENCV"\nparams = [1000.0, 1000.0, 639.5, 511.5, -3.0, 0.0, 0.0, 0.0]',
+            "folds the image over",
+        ),
         ('name = "a"', 'title = "a"', "title"),
         ("cameras/1", "cameras/2", "cameras/2"),
         ("[[cameras]]", "[[kameras]]", "cameras: missing"),
@@ -54,6 +64,20 @@ def test_nonsense_is_named(tmp_path, old, new, named):
     path.write_text(GOOD.replace(old, new))
     with pytest.raises(InputError, match=named):
         read_cameras(path)
+
+
+@pytest.mark.parametrize(
+    "lens",
+    [
+        'PINHOLE"\nparams = [129.0, 127999.0, 1919.0, -511.0]',
+        'OPENCV"\nparams = [1000.0, 1000.0, 639.5, 511.5, -0.45, 0.2, 0.0, 0.0]',
+        'OPENCV_FISHEYE"\nparams = [330.0, 330.0, 639.5, 511.5, 0.1, -0.02, 0.0, 0.0]',
+    ],
+)
+def test_unusual_lenses_are_believed(tmp_path, lens):
+    path = tmp_path / "cameras.toml"
+    path.write_text(GOOD.replace('PINHOLE"\nparams = [1000.0, 1000.0, 639.5, 511.5]', lens))
+    assert read_cameras(path)[0].model == lens.partition('"')[0]
 
 
 def test_all_problems_at_once_and_twins(tmp_path):

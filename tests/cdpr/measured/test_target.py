@@ -67,6 +67,14 @@ def test_what_is_written_reads_back(tmp_path_factory, seed):
         ("id = 1", "id = 1.5", "tags[2].id: 1.5 is not a whole number"),
         ("id = 1", "id = -1", "tags[2].id: -1 must be >= 0"),
         ("= 0.08", "= 0", "tags[1].size_m: 0 must be > 0"),
+        (
+            "= 0.08",
+            "= 80",
+            "80 m, expected 0.0001 to 3 m: millimetres? 0.08 m then",
+        ),
+        ("= 0.08", "= 3.01", "tags[1].size_m: 3.01 m"),
+        ("= 0.08", "= 0.00009", "tags[1].size_m: 9e-05 m"),
+        ("0.012", "12", "markers[1].diameter_m: 12 m, expected 0.0001 to 0.5 m: millimetres?"),
         ("[1, 0, 0, 0]", "[2, 0, 0, 0]", "tags[1].q_platform_tag: its length is 2"),
         ("[1, 0, 0, 0]", "[1, 0, 0]", "tags[1].q_platform_tag: 3 entries"),
         ("0.012", "-0.012", "markers[1].diameter_m: -0.012 must be > 0"),
@@ -78,6 +86,11 @@ def test_each_mistake_is_named(tmp_path, old, new, message):
     with pytest.raises(InputError) as caught:
         read_target(written(tmp_path, TEXT.replace(old, new, 1)))
     assert message in str(caught.value)
+
+
+@pytest.mark.parametrize(("old", "new"), [("= 0.08", "= 2.99"), ("0.012", "0.49")])
+def test_unusual_sizes_are_believed(tmp_path, old, new):
+    assert read_target(written(tmp_path, TEXT.replace(old, new, 1))).tags
 
 
 def test_an_empty_target_is_refused(tmp_path):
