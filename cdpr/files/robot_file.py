@@ -238,6 +238,7 @@ def _read_platform(reader: Reader | None, folder: Path, span_m: float | None) ->
     if reader is None:
         return Platform()
     mass = reader.optional_number("mass_kg", above=0.0)
+    reader.optional_number("mass_std_kg", above=0.0)  # of benches, which read it for themselves
     density = reader.optional_number("density_kg_m3", above=0.0)
     com = reader.optional_vector("com_m", 3)
     inertia = reader.optional_vector("specific_inertia_m2", 6)

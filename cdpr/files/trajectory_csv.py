@@ -5,7 +5,7 @@ An empty cell is a missing sample; optional columns tell the noise (`cdpr.files.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -41,6 +41,7 @@ Array = NDArray[np.float64]
 POSE_COLUMNS = ("x_m", "y_m", "z_m", *QUATERNION)
 QUATERNION_TOLERANCE = 0.02
 _ROWS_AT_ONCE = 2000
+WIDEST_SWING_RAD = 2.5  # from one side to the other: more than any hanging platform turns freely
 
 
 def read_csv(path: Path | str, free_coordinates: tuple[str, ...] | None = None) -> Trajectory:
@@ -165,12 +166,35 @@ def _plain_coordinates(
     coordinates: tuple[str, ...],
 ) -> Trajectory:
     values = np.stack([columns[column_name(name)] for name in coordinates], axis=1)
+    question_unit(path, dict(zip(coordinates, values.T, strict=True)))
     is_known = np.asarray(np.isfinite(values).all(axis=1))
     covariances = read_noise(path, table, columns, coordinates, is_known)
     if covariances is not None:
         covariances = rotation_noise(coordinates, values, covariances)
     provenance = f"{Path(path).name}: measured {', '.join(coordinates)}"
     return Trajectory(columns["t_s"], coordinates, values, covariances, provenance)
+
+
+def question_unit(path: Path | str, columns: Mapping[str, Array]) -> None:
+    """Angles of a size that no swing has are questioned by name.
+
+    Args:
+        path: the file, for the message.
+        columns: values by coordinate, (n,) each.
+
+    Raises:
+        InputError: naming file, column, its size and the likely unit.
+    """
+    for name in POSE_COORDINATES[3:]:
+        known = columns[name][np.isfinite(columns[name])] if name in columns else np.zeros(0)
+        spread = float(np.ptp(known)) if len(known) else 0.0
+        if spread > WIDEST_SWING_RAD:
+            raise InputError(
+                f"{path}: {column_name(name)} swings over {spread:.3g} rad "
+                f"({np.degrees(spread):.0f} degrees), a hanging platform over "
+                f"{WIDEST_SWING_RAD:g} at most: is the column in degrees? Write it in radians "
+                "(degrees x 0.0174533)"
+            )
 
 
 def _selected(

@@ -9,6 +9,7 @@ from freeswing.commands.arguments import add_session, open_session
 from freeswing.console import Console
 
 if TYPE_CHECKING:
+    from freeswing.cdpr.robot import Robot
     from freeswing.session.session_file import Session
     from freeswing.workers.crew import Crew
 
@@ -68,10 +69,13 @@ def make(
     from freeswing.ident.swing_places import swing_places
     from freeswing.results.markers import marker_document
     from freeswing.results.motions import predicted_motions
+    from freeswing.session.load_bench import is_bench
     from freeswing.session.load_swings import load_robot, load_swings, load_target
     from freeswing.session.marker_runs import read_marker_runs
 
     robot = load_robot(session)
+    if is_bench(session, robot):
+        return _make_bench(session, console, robot)
     target = load_target(session)
     markers = read_marker_runs(session, target)
     swings = load_swings(session, robot, target, markers)
@@ -96,6 +100,23 @@ def make(
     for sentence in found.estimates[found.best].notes:
         console.say(f"  {sentence}")
     return [("identification.json", document), ("motion.json", predicted_motions(found))]
+
+
+def _make_bench(
+    session: Session, console: Console, robot: Robot
+) -> list[tuple[str, dict[str, Any]]]:
+    """The same of a bench: all its runs in one fit."""
+    from freeswing.ident.bench.identify_bench import identify_bench
+    from freeswing.results.bench_words import bench_lines
+    from freeswing.session.load_bench import load_bench
+    from freeswing.session.load_swings import load_target
+
+    document = identify_bench(load_bench(session, robot, load_target(session)), robot).document()
+    document["entries_m"] = robot.entries_m.tolist()
+    for line in bench_lines(document):
+        console.say(line)
+    motion = {"format": "freeswing-motion/1", "runs": []}
+    return [("identification.json", document), ("motion.json", motion)]
 
 
 def _summarise(document: dict[str, Any], best: str, console: Console) -> None:

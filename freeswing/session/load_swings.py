@@ -87,7 +87,8 @@ def load_swing(
             f"{session.path}: run {run.name}: cable_lengths_m has {len(lengths)} numbers, "
             f"the robot has {robot.n_cables} cables"
         )
-    payload = run.payload and Payload(run.payload.mass_kg, run.payload.position_m)
+    first = run.payloads[0] if run.payloads else None
+    payload = first and Payload(first.mass_kg, first.position_m)
     return SwingRun(
         name=run.name,
         role="identify" if run.role == "identify" else "validate",

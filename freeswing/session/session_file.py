@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,6 +12,15 @@ from numpy.typing import NDArray
 
 from freeswing.cdpr.files.documents import InputError, Problems, Reader, inside, load_toml
 from freeswing.cdpr.robot import frozen_array
+from freeswing.ident.bench.channels import Channel
+from freeswing.ident.bench.runs import KnownBody, Load, Placed
+from freeswing.session.bench_keys import (
+    check_loads,
+    read_channels,
+    read_loads,
+    read_payloads,
+    read_placed,
+)
 
 Array = NDArray[np.float64]
 
@@ -63,17 +71,6 @@ class CalibrationSource:
 
 
 @dataclass(frozen=True, slots=True)
-class Payload:
-    """A known mass added for a run, its centre of mass in the platform frame, (3,)."""
-
-    mass_kg: float
-    position_m: Array
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "position_m", frozen_array(self.position_m, (3,), "position_m"))
-
-
-@dataclass(frozen=True, slots=True)
 class Run:
     """One recorded swing: a video folder or a trajectory file, and what is known of it.
 
@@ -85,7 +82,8 @@ class Run:
         cable_lengths_m: lengths held by the locked actuators, (n,), or None.
         cable_lengths_std_m: their standard deviation, or None.
         window_s: start and end of the free motion, or None: found by the program.
-        payload: a known added mass, or None.
+        payloads: known masses on the platform.
+        loads: objects to be measured, as they lie on it.
     """
 
     name: str
@@ -95,7 +93,8 @@ class Run:
     cable_lengths_m: Array | None = None
     cable_lengths_std_m: float | None = None
     window_s: tuple[float, float] | None = None
-    payload: Payload | None = None
+    payloads: tuple[KnownBody, ...] = ()
+    loads: tuple[Placed, ...] = ()
 
     def __post_init__(self) -> None:
         if self.cable_lengths_m is not None:
@@ -117,6 +116,8 @@ class Session:
         frame_rate_hz: nominal rate of the recordings, or None.
         calibration: calibration recordings, or None.
         runs: the recorded swings.
+        channels: uncalibrated signals that runs may hold.
+        loads: objects to be measured.
         results: folder that takes everything the commands write.
     """
 
@@ -129,6 +130,8 @@ class Session:
     frame_rate_hz: float | None = None
     calibration: CalibrationSource | None = None
     runs: tuple[Run, ...] = field(default=())
+    channels: tuple[Channel, ...] = ()
+    loads: tuple[Load, ...] = ()
 
     @property
     def folder(self) -> Path:
@@ -175,6 +178,8 @@ def read_session(path: Path | str, results: Path | str | None = None) -> Session
         raise InputError(f"{path}: {len(tables)} runs, more than the {MOST_RUNS} read here")
     runs = tuple(_read_run(table, paths) for table in tables)
     _check_runs(reader, runs)
+    channels, loads = read_channels(reader), read_loads(reader)
+    check_loads(reader, loads, [(run.name, run.loads) for run in runs])
     reader.finish()
     problems.raise_if_any(path)
     folder = path.parent / "results" if results is None else Path(results)
@@ -182,7 +187,9 @@ def read_session(path: Path | str, results: Path | str | None = None) -> Session
     beside = folder / "cameras.toml"
     if results is not None and (beside.is_file() or not cameras.is_file()):
         cameras = beside
-    return Session(path, name, robot, folder, cameras, target, rate, calibration, runs)
+    return Session(
+        path, name, robot, folder, cameras, target, rate, calibration, runs, channels, loads
+    )
 
 
 def _refuse_ways_out(home: Path, results: Path) -> None:
@@ -298,8 +305,7 @@ def _read_run(reader: Reader, paths: _Paths) -> Run:
     lengths = reader.optional_vector("cable_lengths_m", None)
     lengths_std = reader.optional_number("cable_lengths_std_m", above=0.0)
     window = reader.optional_vector("window_s", 2)
-    table = reader.child("payload", required=False)
-    payload = None if table is None else _read_payload(table)
+    payloads, loads = read_payloads(reader), read_placed(reader)
     reader.finish()
     if name and not _is_file_stem(name):
         reader.add("name", f"{name[:40]!r} becomes a file name: letters, digits, . _ - only")
@@ -321,16 +327,9 @@ def _read_run(reader: Reader, paths: _Paths) -> Run:
         lengths if has_numbers else None,
         lengths_std,
         None if window is None else (float(window[0]), float(window[1])),
-        payload,
+        payloads,
+        loads,
     )
-
-
-def _read_payload(reader: Reader) -> Payload | None:
-    mass = reader.number("mass_kg", above=0.0)
-    position = reader.vector("position_m", 3)
-    reader.finish()
-    readable = math.isfinite(mass) and np.isfinite(position).all()
-    return Payload(mass, position) if readable else None
 
 
 def _is_file_stem(name: str) -> bool:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -27,10 +27,13 @@ class Swing(Protocol):
     def name(self) -> str:
         """Of the run, for messages."""
 
-    def residuals(self, values: Mapping[str, Array]) -> Array:
-        """Whitened residuals (m,) at the values of the blocks; ValueError: no motion there."""
+    def simulated(self, values: Mapping[str, Array]) -> Any:
+        """What is costly at the values of the blocks, once; ValueError: no motion there."""
 
-    def linearised(self, values: Mapping[str, Array]) -> tuple[Array, dict[str, Array]]:
+    def residuals(self, values: Mapping[str, Array], made: Any) -> Array:
+        """Whitened residuals (m,) at values, of which `made` was simulated."""
+
+    def linearised(self, values: Mapping[str, Array], made: Any) -> tuple[Array, dict[str, Array]]:
         """The same with their slopes (m, size) by block; a block left out has none."""
 
 
@@ -108,6 +111,12 @@ class _Step:
     singular_values: Array
     gain: float
 
+    @property
+    def longest(self) -> float:
+        """Largest change of an unknown, in its scale."""
+        changes = (*self.shared.values(), *self.own.values())
+        return max(float(np.abs(change).max(initial=0.0)) for change in changes)
+
 
 def fit(swings: Sequence[Swing], unknowns: Unknowns, how: How | None = None) -> Solution:
     """Minimise the sum of squares of all runs' residuals and the unknowns' prior distances.
@@ -123,17 +132,21 @@ def fit(swings: Sequence[Swing], unknowns: Unknowns, how: How | None = None) -> 
     how = how or How()
     if not swings:
         raise ValueError("no run to fit")
-    cost, damping, taken = _cost(swings, unknowns), 0.0, 0
+    made = _simulated(swings, unknowns)
+    cost, damping, taken = _cost(swings, unknowns, made), 0.0, 0
     reason, converged = f"stopped after {how.steps} steps", False
-    parts = _linearised(swings, unknowns)
+    parts = _linearised(swings, unknowns, made)
     while taken < how.steps:
         taken += 1
         step = _step(parts, unknowns, damping)
+        while step.longest > how.farthest and damping < LARGEST_DAMPING:
+            damping = max(FIRST_DAMPING, 10.0 * damping)
+            step = _step(parts, unknowns, damping)
         if damping == 0.0 and step.gain < how.tolerance:
             reason, converged = f"converged: a step would gain {step.gain:.2g}", True
             break
         trial = _moved(unknowns, step, how.farthest)
-        lower = _cost_or_infinite(swings, trial)
+        lower, made = _cost_or_infinite(swings, trial)
         if lower > cost * (1.0 + 1e-12):
             damping = max(FIRST_DAMPING, 10.0 * damping)
             if damping > LARGEST_DAMPING:
@@ -141,36 +154,41 @@ def fit(swings: Sequence[Swing], unknowns: Unknowns, how: How | None = None) -> 
                 break
             continue
         gained, unknowns, cost = cost - lower, trial, lower
-        parts = _linearised(swings, unknowns)
-        damping = 0.0 if damping < 2.0 * FIRST_DAMPING else damping / 10.0
-        if gained < how.tolerance and damping == 0.0:
+        parts = _linearised(swings, unknowns, made)
+        damping = 0.0 if damping < FIRST_DAMPING else damping / 3.0
+        if gained < how.tolerance and step.gain < 10.0 * how.tolerance:
             reason, converged = f"converged: the last step gained {gained:.2g}", True
             break
     return _packed(parts, unknowns, cost, taken, reason, converged)
 
 
-def _cost(swings: Sequence[Swing], unknowns: Unknowns) -> float:
+def _simulated(swings: Sequence[Swing], unknowns: Unknowns) -> list[Any]:
+    return [swing.simulated(unknowns.of_run(run)) for run, swing in enumerate(swings)]
+
+
+def _cost(swings: Sequence[Swing], unknowns: Unknowns, made: Sequence[Any]) -> float:
     total = sum(float(np.sum(block.pull(block.value)[0] ** 2)) for block in unknowns.blocks)
-    for run, swing in enumerate(swings):
-        total += float(np.sum(swing.residuals(unknowns.of_run(run)) ** 2))
+    for run, (swing, one) in enumerate(zip(swings, made, strict=True)):
+        total += float(np.sum(swing.residuals(unknowns.of_run(run), one) ** 2))
     return total
 
 
-def _cost_or_infinite(swings: Sequence[Swing], unknowns: Unknowns) -> float:
+def _cost_or_infinite(swings: Sequence[Swing], unknowns: Unknowns) -> tuple[float, list[Any]]:
     try:
-        return _cost(swings, unknowns)
+        made = _simulated(swings, unknowns)
+        return _cost(swings, unknowns, made), made
     except (ValueError, np.linalg.LinAlgError):
-        return np.inf
+        return np.inf, []
 
 
 Part = tuple[Array, Array, Array]  # residuals, slopes by own unknowns, slopes by shared ones
 
 
-def _linearised(swings: Sequence[Swing], unknowns: Unknowns) -> list[Part]:
+def _linearised(swings: Sequence[Swing], unknowns: Unknowns, made: Sequence[Any]) -> list[Part]:
     """Residuals and slopes of every run in scaled unknowns, the priors of its own included."""
     found = []
-    for run, swing in enumerate(swings):
-        residuals, slopes = swing.linearised(unknowns.of_run(run))
+    for run, (swing, one) in enumerate(zip(swings, made, strict=True)):
+        residuals, slopes = swing.linearised(unknowns.of_run(run), one)
         sides = []
         for blocks in (unknowns.own, unknowns.shared):
             columns = [_columns(block, slopes, len(residuals)) for block in blocks]
@@ -253,11 +271,9 @@ def _by_block(blocks: Sequence[Unknown], scaled: Array) -> dict[str, Array]:
 
 
 def _moved(unknowns: Unknowns, step: _Step, farthest: float) -> Unknowns:
-    changes = {**step.shared, **step.own}
-    longest = max(np.abs(change).max(initial=0.0) for change in changes.values())
-    share = min(1.0, farthest / max(longest, 1e-300))
+    share = min(1.0, farthest / max(step.longest, 1e-300))
     moves = {}
-    for name, change in changes.items():
+    for name, change in {**step.shared, **step.own}.items():
         block = unknowns.block(name)
         moves[name] = block.value + share * block.scale * change
     return unknowns.moved(moves)

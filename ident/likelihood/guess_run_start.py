@@ -10,9 +10,10 @@ import numpy as np
 
 from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.model.free_motion import assemble
-from freeswing.cdpr.model.statics import Equilibrium, equilibrium_at_lengths, modes, random_poses
+from freeswing.cdpr.model.statics import Equilibrium, modes
 from freeswing.cdpr.robot import POSE_COORDINATES, Array
 from freeswing.ident.likelihood.likelihood_run import Samples
+from freeswing.ident.likelihood.rest_pose import rest_near
 
 SMOOTHED_S = (0.1, 0.15, 0.2, 0.3, 0.4)
 SMOOTHED_DEGREE = 4
@@ -20,7 +21,6 @@ LEAST_SMOOTHED = 8  # samples
 SMOOTH = 2.0  # times the residual over the shortest span up to which a longer one still follows
 MODAL_S = 1.5
 LEAD_IN = 40
-EQUILIBRIUM_STARTS = 40
 
 
 def first_state(model: Model, samples: Samples, inertia: Array) -> Array:
@@ -42,28 +42,13 @@ def first_state(model: Model, samples: Samples, inertia: Array) -> Array:
             "cable_lengths_m is not given: give the lengths that the winches held, or measure "
             "full poses"
         )
-    rest = taut_equilibrium(model, samples.lengths_m, inertia, samples.name)
+    means = samples.values.mean(axis=0)
+    columns, lengths = samples.columns, samples.lengths_m
+    rest = rest_near(model, lengths, inertia, columns, means, samples.name)
     try:
         return _assembled_start(model, samples, rest)
     except (ValueError, np.linalg.LinAlgError):
         return _modal_start(model, samples, rest, inertia)
-
-
-def taut_equilibrium(model: Model, lengths_m: Array, inertia: Array, run: str) -> Equilibrium:
-    """A stable equilibrium with all cables taut at given lengths.
-
-    Raises:
-        ValueError: when none is found, naming the run.
-    """
-    generator = np.random.default_rng(0)
-    for start in random_poses(model, generator, EQUILIBRIUM_STARTS):
-        rest = equilibrium_at_lengths(model, lengths_m, start, inertia)
-        if rest is not None and rest.stable and rest.taut:
-            return rest
-    raise ValueError(
-        f"run {run}: no stable equilibrium with taut cables at lengths {np.round(lengths_m, 4)} "
-        "m: check cable_lengths_m and the robot's geometry"
-    )
 
 
 def _smoothed_start(times_s: Array, values: Array) -> tuple[Array, Array]:

@@ -17,7 +17,7 @@ from freeswing.cdpr.model.free_motion import (
 )
 from freeswing.cdpr.model.regressor import SwingMotion
 from freeswing.cdpr.robot import POSE_COORDINATES, Array, Robot
-from freeswing.ident.likelihood.guess_run_start import taut_equilibrium
+from freeswing.ident.likelihood.rest_pose import rest_near
 from freeswing.ident.runs import DroppedRun, Payload, SwingRun
 from freeswing.ident.signals.derivatives import (
     Signals,
@@ -225,7 +225,8 @@ def _amplified_sentence(free: tuple[str, ...], amount: float) -> str:
 def _start_pose(model: Model, signals: Signals, lengths_m: Array) -> Array:
     """The pose at the first sample of free coordinates, from the equilibrium at these lengths."""
     inertia = guessed_inertia(model.robot)
-    rest = taut_equilibrium(model, lengths_m, inertia, signals.run).zeta
+    columns, means = coordinate_indices(signals.coordinates), signals.values.mean(axis=0)
+    rest = rest_near(model, lengths_m, inertia, columns, means, signals.run).zeta
     # From rest to the first sample in small steps, so as to stay in the same assembly mode.
     home = rest[coordinate_indices(signals.coordinates)]
     path = home + np.linspace(0.0, 1.0, _LEAD_IN)[:, None] * (signals.values[0] - home)

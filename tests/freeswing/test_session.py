@@ -70,8 +70,8 @@ def test_every_key_is_read(tmp_path: Path) -> None:
     assert swing.cable_lengths_m is not None
     np.testing.assert_array_equal(swing.cable_lengths_m, [1.66, 1.86, 1.68, 1.41])
     assert (swing.window_s, swing.cable_lengths_std_m) == ((8.0, 18.0), 0.0005)
-    assert check.payload is not None
-    assert (check.role, check.payload.mass_kg) == ("validate", 1.0)
+    assert len(check.payloads) == 1
+    assert (check.role, check.payloads[0].mass_kg) == ("validate", 1.0)
     assert session.video_runs == (swing,)
 
 

@@ -11,7 +11,7 @@ from freeswing.cdpr.model.equations import Model, build_model
 from freeswing.cdpr.model.free_motion import assemble
 from freeswing.cdpr.robot import POSE_COORDINATES, Array
 from freeswing.cdpr.simulation.free_swing import Motion, simulate
-from freeswing.ident.likelihood.guess_run_start import taut_equilibrium
+from freeswing.ident.likelihood.rest_pose import taut_equilibrium
 from freeswing.ident.runs import Payload, SwingRun
 from tests.oracle.robots import declared_robot
 

@@ -15,7 +15,7 @@ from freeswing.cdpr.measured.trajectory import Trajectory
 from freeswing.cdpr.model.free_motion import assemble
 from freeswing.cdpr.robot import POSE_COORDINATES, Array
 from freeswing.ident.identify import IdentifySettings, identify
-from freeswing.ident.likelihood.guess_run_start import taut_equilibrium
+from freeswing.ident.likelihood.rest_pose import taut_equilibrium
 from freeswing.ident.runs import SwingRun
 from freeswing.main import main
 from tests.ident.swings import (

@@ -22,17 +22,20 @@ class Decay:
     times: np.ndarray
     values: np.ndarray
 
-    def residuals(self, values: Mapping[str, np.ndarray]) -> np.ndarray:
+    def simulated(self, values: Mapping[str, np.ndarray]) -> None:
+        return None
+
+    def residuals(self, values: Mapping[str, np.ndarray], made: None) -> np.ndarray:
         told = values["amplitude"][0] * np.exp(-values["rate"][0] * self.times)
         return (told - self.values) / STD
 
     def linearised(
-        self, values: Mapping[str, np.ndarray]
+        self, values: Mapping[str, np.ndarray], made: None
     ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
         shape = np.exp(-values["rate"][0] * self.times)
         slope = -values["amplitude"][0] * self.times * shape
         by = {"amplitude": shape[:, None] / STD, "rate": slope[:, None] / STD}
-        return self.residuals(values), by
+        return self.residuals(values, made), by
 
 
 def decays(noise: float, seed: int = 0) -> list[Decay]:
@@ -71,7 +74,7 @@ def test_the_covariance_is_that_of_all_unknowns_together() -> None:
     found = fit(runs, blocks, How(tolerance=1e-12))
     whole = np.zeros((3 * 40 + 1, 4))
     for k, run in enumerate(runs):
-        slopes = run.linearised(found.unknowns.of_run(k))[1]
+        slopes = run.linearised(found.unknowns.of_run(k), None)[1]
         whole[40 * k : 40 * k + 40, 0] = slopes["rate"][:, 0]
         whole[40 * k : 40 * k + 40, 1 + k] = slopes["amplitude"][:, 0]
     whole[-1, 0] = 1.0 / 0.01

@@ -1,0 +1,44 @@
+"""A bench's result in words, for the console and the report."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from freeswing.report.words import number
+
+HALF_WIDTH_95 = 1.959964
+
+
+def bench_lines(document: Mapping[str, Any]) -> list[str]:
+    """What `identify` says of a bench: bodies, the classic formula, held-out runs, notes."""
+    lines = ["all runs of the bench in one fit, ± 95 %"]
+    for one in document["objects"]:
+        lines.append(f"{one['name']}")
+        lines += [f"  {object_row(row)}" for row in one["parameters"]]
+    for row in document["classic"]:
+        lines.append(f"  classic formula, {row['run']}: {classic_row(row)}")
+    for row in document["validation"]:
+        lines.append(
+            f"  {row['run']}: predicted {row['column']} off by {number(row['prediction_rmse'])} "
+            f"(noise {number(row['noise_floor'])})"
+        )
+    return [*lines, *(f"  note: {note}" for note in document["notes"])]
+
+
+def object_row(row: Mapping[str, Any]) -> str:
+    """One parameter of a body."""
+    if row["value"] is None:
+        return f"{row['name']:14} not told by these runs"
+    half = HALF_WIDTH_95 * row["std"]
+    weak = "" if row["identifiable"] else "  as given: these runs tell no more"
+    return f"{row['name']:14} {number(row['value'], 5)} ± {number(half, 2)}{weak}"
+
+
+def classic_row(row: Mapping[str, Any]) -> str:
+    """The classic formula's value beside the fit's, and why they differ."""
+    told = [f"{one['what']} {one['percent']:+.2f} %" for one in row["reasons"]]
+    return (
+        f"{number(row['Izz_kg_m2'], 5)} kg m2 against {number(row['fitted_Izz_kg_m2'], 5)} "
+        f"({row['off_percent']:+.2f} %; {'; '.join(told)})"
+    )

@@ -1,0 +1,127 @@
+"""A session's runs as those of a bench, where it is one."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+import numpy as np
+
+from freeswing.cdpr.files.documents import InputError
+from freeswing.cdpr.files.signal_csv import coordinates_in, header_of, read_signals
+from freeswing.cdpr.measured.target import Target
+from freeswing.cdpr.measured.trajectory import angle_noise
+from freeswing.cdpr.robot import POSE_COORDINATES, Robot
+from freeswing.ident.bench.runs import Bench, BenchRun, Signal
+from freeswing.session.load_swings import load_trajectory
+from freeswing.session.session_file import Run, Session
+
+PARALLEL_RAD = 0.02  # wires that lean towards each other by less hang parallel
+
+
+def is_bench(session: Session, robot: Robot) -> bool:
+    """Whether a session is one of a bench: what only the joint fit of all its runs can use.
+
+    Channels, loads, payloads with extent, runs that measure less than the free coordinates, or
+    parallel wires, on which no swing tells all nine inertial parameters.
+    """
+    if session.channels or session.loads:
+        return True
+    if any(len(run.payloads) > 1 or run.loads for run in session.runs):
+        return True
+    if any(body.inertia_kg_m2.any() for run in session.runs for body in run.payloads):
+        return True
+    return hangs_parallel(robot) or any(_is_partial(run, robot) for run in session.runs)
+
+
+def hangs_parallel(robot: Robot) -> bool:
+    """Whether two or three wires without pulleys hang parallel, as of a bench.
+
+    Their entries and attachments are then the same figure, up to a turn and a shift.
+    """
+    if robot.n_cables not in (2, 3) or robot.radii_m.any():
+        return False
+    above = robot.entries_m - robot.entries_m.mean(axis=0)
+    below = robot.attachments_m - robot.attachments_m.mean(axis=0)
+    down = robot.gravity_m_s2 / np.linalg.norm(robot.gravity_m_s2)
+    if np.abs(above @ down).max() > PARALLEL_RAD * np.abs(above).max():
+        return False
+    sides = [_sides(points) for points in (above, below)]
+    return bool(np.abs(sides[0] - sides[1]).max() < PARALLEL_RAD * sides[0].max())
+
+
+def _sides(points: np.ndarray) -> np.ndarray:
+    return np.linalg.norm(points[:, None] - points[None], axis=2)
+
+
+def _is_partial(run: Run, robot: Robot) -> bool:
+    path = run.trajectory
+    if path is None or path.suffix.lower() != ".csv":
+        return False
+    measured = coordinates_in(header_of(path))
+    return 0 < len(measured) < 6 - robot.n_cables
+
+
+def load_bench(session: Session, robot: Robot, target: Target | None) -> Bench:
+    """All runs with their signals.
+
+    Raises:
+        InputError: naming the file that is wrong, a channel whose column no run holds, or a number
+            of wire lengths that is not the robot's.
+    """
+    columns = tuple(channel.column for channel in session.channels)
+    runs = tuple(_load_run(session, run, robot, target, columns) for run in session.runs)
+    seen = {signal.column for run in runs for signal in run.signals}
+    for channel in session.channels:
+        if channel.column not in seen:
+            raise InputError(
+                f"{session.path}: channels: {channel.name}: column {channel.column!r} is in none "
+                f"of the trajectory files, which hold {', '.join(sorted(seen))}"
+            )
+    return Bench(runs, session.channels, session.loads, _mass_std(session.robot))
+
+
+def _load_run(
+    session: Session, run: Run, robot: Robot, target: Target | None, columns: tuple[str, ...]
+) -> BenchRun:
+    lengths = run.cable_lengths_m
+    if lengths is not None and len(lengths) != robot.n_cables:
+        raise InputError(
+            f"{session.path}: run {run.name}: cable_lengths_m has {len(lengths)} numbers, "
+            f"the robot has {robot.n_cables} cables"
+        )
+    if run.trajectory is not None and run.trajectory.suffix.lower() == ".csv":
+        table = read_signals(run.trajectory, columns)
+        times = table.times_s
+        signals = tuple(
+            Signal(name, values, table.stds.get(name)) for name, values in table.values.items()
+        )
+    else:
+        trajectory = load_trajectory(session, run, robot, target)
+        times, noise = trajectory.times_s, None
+        if trajectory.covariances is not None:
+            turned = angle_noise(trajectory.coordinates, trajectory.values, trajectory.covariances)
+            noise = np.sqrt(np.diagonal(turned, axis1=1, axis2=2))
+        signals = tuple(
+            Signal(name, trajectory.values[:, k], None if noise is None else noise[:, k])
+            for k, name in enumerate(trajectory.coordinates)
+            if name in POSE_COORDINATES
+        )
+    return BenchRun(
+        name=run.name,
+        role="identify" if run.role == "identify" else "validate",
+        times_s=times,
+        signals=signals,
+        lengths_m=lengths,
+        lengths_std_m=run.cable_lengths_std_m,
+        window_s=run.window_s,
+        payloads=run.payloads,
+        loads=run.loads,
+    )
+
+
+def _mass_std(path: Path) -> float | None:
+    """`mass_std_kg` of a robot file, which has been read and found right before."""
+    platform = tomllib.loads(path.read_text(encoding="utf-8")).get("platform", {})
+    given = platform.get("mass_std_kg")
+    return None if given is None else float(given)

@@ -1,0 +1,429 @@
+"""A bench session as unknowns and swings: what is looked for, what is known of it beforehand."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from freeswing.cdpr.model.equations import Model
+from freeswing.cdpr.robot import POSE_COORDINATES, Array, Robot
+from freeswing.ident.bench.averaged import averaged
+from freeswing.ident.bench.begin import Glimpse, best_size, first_gains, glimpse, sight, thinned
+from freeswing.ident.bench.channels import Channel
+from freeswing.ident.bench.chart import Chart
+from freeswing.ident.bench.objects import body_of, moments, specific
+from freeswing.ident.bench.runs import Bench, BenchRun, Load
+from freeswing.ident.bench.swing import BenchSwing, Column, Riding
+from freeswing.ident.likelihood.unknowns import Gaussian, Unknown, Unknowns
+from freeswing.ident.signals.prepare import guessed_inertia
+
+EFFECTS = ("rotational_drag", "translational_drag")  # air is never absent
+UNIT_NOISE_M, UNIT_NOISE_RAD = 1e-4, 5e-4
+UNSTATED_LENGTH_STD_M = 1e-3
+EACH_LENGTH = 1e-4  # of a wire's length: what weights stretch and rehanging shifts
+SWAY_RAD = 0.02  # unseen sway after a twist by hand: a degree
+UNSEEN_RAD = 0.3  # an angle that no column measures directly
+SEEN_RAD = 0.5  # where it is measured the samples say all: nothing is assumed
+WIDE_COM = 0.3  # of the attachments' spread: a body lies or hangs among its wires
+UPRIGHT = 0.9  # of gravity along a platform axis: along it the centre may hang far down
+CENTRED_COM = 0.05  # the same of a platform, across: its wires share the weight to a tenth
+WIDE_TENSOR = 2.0  # of mass x spread^2: twice a hoop through the wires
+WIDE_MASS = 0.5  # of the declared mass, where payloads are to say it
+BENT = 2.0  # squares of a channel per rad, over its gain: a wall hit at 45 degrees
+TWICE_BENT = 4.0  # cubes likewise
+UNKNOWN_GAIN = 0.5  # of a gain guessed from a usual twist
+OWN_LEVER = 2.0  # gains for sway over that for yaw, 1/m: a dot on a wall half a metre away
+OFFSET = 10.0  # times a channel's spread
+SCANNED_RUNS = 4
+FOLLOWED_RIDGE = 1e-4  # of the motion's variance: coordinates that hardly move get no large gain
+
+
+Gains = Mapping[str, Array]
+
+
+@dataclass(frozen=True, slots=True)
+class Assembled:
+    """A fit made ready.
+
+    Attributes:
+        swings: one a run.
+        unknowns: with their first values.
+        prior: the same before anything was fitted, for what rests on the prior alone.
+        runs: as recorded, in the order of the swings.
+    """
+
+    swings: tuple[BenchSwing, ...]
+    unknowns: Unknowns
+    runs: tuple[BenchRun, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Guess:
+    """First bodies: the platform's and every load's `OBJECT_NAMES` values."""
+
+    platform: Array
+    loads: Mapping[str, Array]
+
+    def total(self, run: BenchRun) -> Array:
+        """Moments about P of all that a run carries, (10,)."""
+        found = moments(self.platform)
+        for one in run.payloads:
+            found = found + moments(one.body)
+        for placed in run.loads:
+            found = found + moments(self.loads[placed.load], placed.turn, placed.shift_m)
+        return found
+
+
+def extent(robot: Robot) -> float:
+    """How far the attachments spread, root mean square, at least 5 cm."""
+    off = robot.attachments_m - robot.attachments_m.mean(axis=0)
+    return max(0.05, float(np.sqrt(np.mean(np.sum(off**2, axis=1)))))
+
+
+def columns_of(run: BenchRun, channels: Sequence[Channel]) -> tuple[Column, ...]:
+    """A run's signals as columns of the fit: coordinates, and the channels that it holds."""
+    by_column = {channel.column: channel for channel in channels}
+    found = []
+    for signal in run.signals:
+        if signal.is_coordinate:
+            place = POSE_COORDINATES.index(signal.column)
+            unit = UNIT_NOISE_M if place < 3 else UNIT_NOISE_RAD
+            std = np.full(len(signal.values), unit) if signal.std is None else signal.std
+            found.append(Column(signal.column, signal.values, std, coordinate=place))
+        elif signal.column in by_column:
+            channel = by_column[signal.column]
+            spread = float(np.nanstd(signal.values)) or 1.0
+            std = np.full(len(signal.values), 0.02 * spread) if signal.std is None else signal.std
+            found.append(Column(channel.name, signal.values, std, channel=channel))
+    return tuple(found)
+
+
+def first_guess(
+    model: Model,
+    bench: Bench,
+    runs: Sequence[BenchRun],
+    columns: Sequence[tuple[Column, ...]],
+    gains: Gains,
+) -> Guess:
+    """The platform's tensor, then every load's, by what their runs' first seconds say."""
+    robot = model.robot
+    mass = robot.platform.mass_kg or 1.0
+    start = body_of(mass, guessed_inertia(robot))
+    loads = {load.name: _guessed_load(load, robot) for load in bench.loads}
+    guess = Guess(start, loads)
+    without = [k for k, run in enumerate(runs) if not run.loads]
+    if without:
+        size = _scanned(model, guess, runs, columns, without, gains, "platform")
+        guess = _resized(guess, "platform", size)
+    for load in bench.loads:
+        mine = [k for k, run in enumerate(runs) if [one.load for one in run.loads] == [load.name]]
+        if mine:
+            size = _scanned(model, guess, runs, columns, mine, gains, load.name)
+            guess = _resized(guess, load.name, size)
+    return guess
+
+
+def _scanned(
+    model: Model,
+    guess: Guess,
+    runs: Sequence[BenchRun],
+    columns: Sequence[tuple[Column, ...]],
+    which: Sequence[int],
+    gains: Gains,
+    name: str,
+) -> float:
+    chosen = thinned(which, SCANNED_RUNS)
+    views = [
+        sight(
+            model,
+            runs[k].name,
+            _lengths(runs[k]),
+            specific(guess.total(runs[k])),
+            runs[k].times_s,
+            columns[k],
+            gains,
+        )
+        for k in chosen
+    ]
+
+    def inertia_of(index: int, size: float) -> Array:
+        return specific(_resized(guess, name, size).total(runs[chosen[index]]))
+
+    return best_size(model, views, inertia_of)
+
+
+def _resized(guess: Guess, name: str, size: float) -> Guess:
+    factors = np.concatenate([np.ones(4), np.full(6, size)])
+    if name == "platform":
+        return replace(guess, platform=guess.platform * factors)
+    return replace(guess, loads={**guess.loads, name: guess.loads[name] * factors})
+
+
+def _guessed_load(load: Load, robot: Robot) -> Array:
+    com = np.zeros(3) if load.com_m is None else load.com_m
+    size = 0.1 * load.mass_kg * extent(robot) ** 2
+    return np.concatenate([[load.mass_kg], com, [size, size, size, 0.0, 0.0, 0.0]])
+
+
+def _lengths(run: BenchRun) -> Array:
+    if run.lengths_m is None:
+        raise ValueError(
+            f"run {run.name}: it measures less than a pose and cable_lengths_m is not given: give "
+            "the wires' lengths"
+        )
+    return run.lengths_m
+
+
+def assembled(model: Model, bench: Bench, runs: Sequence[BenchRun]) -> Assembled:
+    """The fit of some runs, ready to start.
+
+    Raises:
+        ValueError: when no motion of a run can be started, naming it.
+    """
+    runs = [averaged(run) for run in runs]
+    columns = [columns_of(run, bench.channels) for run in runs]
+    gains = {
+        channel.name: first_gains(channel, held)
+        for channel in bench.channels
+        if (held := [one for seen in columns for one in seen if one.channel == channel])
+    }
+    guess = first_guess(model, bench, runs, columns, gains)
+    wires = _wire_groups(runs)
+    swings, glimpses = [], []
+    for run, seen, name in zip(runs, columns, wires, strict=True):
+        inertia = specific(guess.total(run))
+        view = sight(model, run.name, _lengths(run), inertia, run.times_s, seen, gains)
+        first = glimpse(model, view, inertia)
+        swings.append(_swing(model, run, seen, first, name))
+        glimpses.append(first)
+    unknowns = _unknowns(model, bench, runs, swings, glimpses, guess, gains)
+    return Assembled(tuple(swings), unknowns, tuple(runs))
+
+
+def _wire_groups(runs: Sequence[BenchRun]) -> list[str]:
+    """Runs that state the same lengths hang on the same wires, and share what is wrong there."""
+    groups: dict[tuple[float, ...], str] = {}
+    for run in runs:
+        groups.setdefault(tuple(_lengths(run)), f"wires.{len(groups) + 1}")
+    return [groups[tuple(_lengths(run))] for run in runs]
+
+
+def _swing(
+    model: Model, run: BenchRun, columns: tuple[Column, ...], first: Glimpse, wires: str
+) -> BenchSwing:
+    noisy = []
+    for column, left in zip(columns, first.residuals, strict=True):
+        guessed = column.channel is not None and len(set(column.std)) == 1
+        std = np.full(len(column.std), left) if guessed and left > 0.0 else column.std
+        noisy.append(replace(column, std=std))
+    riding = [Riding("platform", np.eye(3), np.zeros(3))]
+    riding += [Riding(f"load.{one.load}", one.turn, one.shift_m) for one in run.loads]
+    known = sum((moments(one.body) for one in run.payloads), np.zeros(10))
+    chart = Chart.about(model, first.rest.zeta)
+    return BenchSwing(
+        name=run.name,
+        model=model,
+        times_s=run.times_s,
+        columns=tuple(noisy),
+        lengths_m=_lengths(run),
+        wires=wires,
+        rest=first.rest.zeta,
+        chart=chart,
+        riding=tuple(riding),
+        known=known,
+        loose=_loose(columns, _lengths(run)),
+    )
+
+
+def _unknowns(
+    model: Model,
+    bench: Bench,
+    runs: Sequence[BenchRun],
+    swings: Sequence[BenchSwing],
+    glimpses: Sequence[Glimpse],
+    guess: Guess,
+    gains: Gains,
+) -> Unknowns:
+    robot = model.robot
+    blocks = [_platform(robot, bench, runs, guess)]
+    blocks += [_load(bench.load(name), robot, body) for name, body in guess.loads.items()]
+    blocks.append(_effects(model, len(runs)))
+    for name in dict.fromkeys(swing.wires for swing in swings):
+        run = runs[[swing.wires for swing in swings].index(name)]
+        std = run.lengths_std_m or UNSTATED_LENGTH_STD_M
+        blocks.append(_centred(name, np.zeros(robot.n_cables), std, "cable_lengths_std_m"))
+    each = EACH_LENGTH * float(np.mean([_lengths(run) for run in runs]))
+    zero = np.zeros((len(runs), robot.n_cables))
+    blocks.append(_centred("wires_each", zero, each, "wires between runs", each_run=True))
+    blocks.append(_starts(swings, glimpses))
+    for channel in bench.channels:
+        if channel.name in gains:
+            blocks += _channel_blocks(channel, swings, glimpses, gains[channel.name])
+    return Unknowns(tuple(blocks))
+
+
+def _platform(robot: Robot, bench: Bench, runs: Sequence[BenchRun], guess: Guess) -> Unknown:
+    mass, size = guess.platform[0], extent(robot)
+    payload = any(run.payloads for run in runs)
+    std = bench.mass_std_kg or (WIDE_MASS * mass if payload else None)
+    wide = wide_body(mass, size)
+    down = np.abs(robot.gravity_m_s2) / np.linalg.norm(robot.gravity_m_s2)
+    wide[:3] *= np.where(down > UPRIGHT, 1.0, CENTRED_COM / WIDE_COM)
+    spread = np.concatenate([[std or 1.0], wide])
+    mean = np.concatenate([guess.platform[:7], np.zeros(3)])
+    estimated = np.array([std is not None] + [True] * 9)
+    scale = np.concatenate([[0.1 * mass], 0.5 * wide])
+    prior = Gaussian(mean, spread, "a body of the attachments' spread")
+    return Unknown("platform", guess.platform, scale, prior, estimated)
+
+
+def wide_body(mass_kg: float, extent_m: float) -> Array:
+    """Prior spread of centre and tensor of a body of which nothing but its size is known, (9,)."""
+    return np.concatenate(
+        [np.full(3, WIDE_COM * extent_m), np.full(6, WIDE_TENSOR * mass_kg * extent_m**2)]
+    )
+
+
+def _load(load: Load, robot: Robot, body: Array) -> Unknown:
+    wide = wide_body(load.mass_kg, extent(robot))
+    if load.com_std_m is not None:
+        wide[:3] = load.com_std_m
+    mass_std = load.mass_std_kg or 0.0
+    spread = np.concatenate([[mass_std or 1.0], wide])
+    mean = np.concatenate([body[:7], np.zeros(3)])
+    estimated = np.array([mass_std > 0.0] + [True] * 9)
+    scale = np.concatenate([[mass_std or 1.0], 0.5 * wide])
+    return Unknown(
+        f"load.{load.name}", body, scale, Gaussian(mean, spread, "session.toml"), estimated
+    )
+
+
+def _effects(model: Model, runs: int) -> Unknown:
+    """Drag, which each run has for itself: what it acts on differs with the load."""
+    start = model.start_values
+    spread = np.array([parameter.prior_std for parameter in model.parameters])
+    scale = np.array([parameter.scale for parameter in model.parameters])
+    rates = np.array([parameter.amplitude for parameter in model.parameters])
+    values = np.tile(start, (runs, 1))
+    prior = Gaussian(start, spread, "plausible drag")
+    return Unknown("effects", values, scale, prior, rates, each_run=True)
+
+
+def _centred(name: str, values: Array, std: float, source: str, each_run: bool = False) -> Unknown:
+    spread = np.full(values.shape[-1], std)
+    return Unknown(name, values, spread, Gaussian(0.0 * spread, spread, source), each_run=each_run)
+
+
+def _starts(swings: Sequence[BenchSwing], glimpses: Sequence[Glimpse]) -> Unknown:
+    values = np.array(
+        [
+            swing.chart.numbers(first.zeta, first.rates)
+            for swing, first in zip(swings, glimpses, strict=True)
+        ]
+    )
+    spread = np.full(values.shape[1], SEEN_RAD)
+    spread[len(spread) // 2 :] *= 2.0 * np.pi  # turned round once a second
+    prior = Gaussian(np.zeros(len(spread)), spread, "a swing")
+    return Unknown("start", values, 0.2 * spread, prior, each_run=True)
+
+
+def _loose(columns: Sequence[Column], lengths_m: Array) -> Array:
+    """How far coordinates that no column measures directly may be from rest, (6,)."""
+    seen = [column.coordinate for column in columns if column.coordinate is not None]
+    found = np.repeat([SWAY_RAD * float(np.mean(lengths_m)), UNSEEN_RAD], 3)
+    found[seen] = np.inf
+    return found
+
+
+def _channel_blocks(
+    channel: Channel, swings: Sequence[BenchSwing], glimpses: Sequence[Glimpse], gains: Array
+) -> list[Unknown]:
+    """The offset of every run, and the gains with what is known of them."""
+    mine = [column for swing in swings for column in swing.columns if column.channel == channel]
+    spread = max(float(np.nanstd(column.values)) for column in mine)
+    offsets = np.zeros((len(swings), 1))
+    for run, swing in enumerate(swings):
+        for column in swing.columns:
+            if column.channel == channel:
+                offsets[run] = np.nanmean(column.values)
+    loose = Gaussian(
+        np.array([offsets.mean()]),
+        np.array([OFFSET * spread + np.ptp(offsets) + 1e-9]),
+        "unknown zero",
+    )
+    if any(swing.columns[0].channel != channel for swing in swings) and not channel.gains:
+        gains = _followed_gains(channel, swings, glimpses, gains)
+    std = gain_spread(channel, gains)
+    exact = np.array(
+        [
+            len(term) == 1
+            and channel.coordinates[term[0]] in channel.gains
+            and channel.coordinates[term[0]] not in channel.gains_std
+            for term in channel.terms
+        ]
+    )
+    mean = np.where(
+        [
+            len(term) == 1
+            and (
+                channel.coordinates[term[0]] in channel.gains
+                or channel.coordinates[term[0]] == channel.main_coordinate
+            )
+            for term in channel.terms
+        ],
+        gains,
+        0.0,
+    )
+    prior = Gaussian(mean, std, "gains" if channel.gains else "a usual twist")
+    values = np.tile(gains, (len(swings), 1)) if channel.per_run else gains
+    return [
+        Unknown(f"offset.{channel.name}", offsets, np.array([spread]), loose, each_run=True),
+        Unknown(
+            f"channel.{channel.name}",
+            values,
+            std,
+            prior,
+            ~exact,
+            each_run=channel.per_run,
+        ),
+    ]
+
+
+def _followed_gains(
+    channel: Channel, swings: Sequence[BenchSwing], glimpses: Sequence[Glimpse], gains: Array
+) -> Array:
+    """Linear gains by which a channel follows the motion that other columns tell, (terms,)."""
+    rows, right, linear = [], [], len(channel.coordinates)
+    for swing, first in zip(swings, glimpses, strict=True):
+        for place, column in enumerate(swing.columns):
+            if column.channel == channel:
+                moved, values = first.moved[:, channel.columns], first.values[:, place]
+                known = np.isfinite(values)
+                rows.append((moved - moved.mean(axis=0))[known])
+                right.append(values[known] - values[known].mean())
+    design, told = np.vstack(rows), np.concatenate(right)
+    held = np.sqrt(FOLLOWED_RIDGE * len(told)) * np.abs(design).max() * np.eye(linear)
+    found = np.linalg.lstsq(
+        np.vstack([design, held]), np.append(told, np.zeros(linear)), rcond=None
+    )[0]
+    return np.concatenate([found, np.zeros(len(gains) - linear)])
+
+
+def gain_spread(channel: Channel, gains: Array) -> Array:
+    """Prior standard deviations of a channel's terms, (terms,)."""
+    place = channel.coordinates.index(channel.main_coordinate)
+    main = abs(float(gains[place])) or 1.0
+    found = []
+    for term in channel.terms:
+        levers = sum(channel.coordinates[k] in POSE_COORDINATES[:3] for k in term)
+        size = main * OWN_LEVER**levers * (1.0, BENT, TWICE_BENT)[len(term) - 1]
+        if len(term) == 1:
+            name = channel.coordinates[term[0]]
+            if name in channel.gains:
+                size = channel.gains_std.get(name, 1e-6 * abs(channel.gains[name]) + 1e-12)
+            elif name == channel.coordinates[place]:
+                size = UNKNOWN_GAIN * main
+        found.append(size)
+    return np.array(found)

@@ -1,0 +1,159 @@
+"""The classic formula of bifilar and trifilar benches beside the fit, and why it differs.
+
+I = m g R r T^2 / (4 pi^2 L): equal wires, the centre of mass in their middle, small angles, no sway
+(du Bois, Lieven, Adhikari, Error analysis in trifilar inertia measurements, 2009, eq. 1).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from freeswing.cdpr.robot import Array
+from freeswing.ident.bench.objects import moments
+from freeswing.ident.bench.solve import Solved
+from freeswing.ident.bench.swing import IZZ, BenchSwing, Column
+
+LEAST_PERIODS = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class ClassicRun:
+    """One run by the formula.
+
+    Attributes:
+        run: its name.
+        period_s: of the yaw.
+        izz_kg_m2: by the formula, of platform and all it carries.
+        fitted_kg_m2: by the fit, about P.
+        reasons: what of the difference is from what, in per cent, by sentence.
+    """
+
+    run: str
+    period_s: float
+    izz_kg_m2: float
+    fitted_kg_m2: float
+    reasons: tuple[tuple[str, float], ...]
+
+    @property
+    def off_percent(self) -> float:
+        """By how much the formula is above the fit."""
+        return 100.0 * (self.izz_kg_m2 / self.fitted_kg_m2 - 1.0)
+
+    def document(self) -> dict[str, Any]:
+        """The entry of `classic` in results/identification.json."""
+        return {
+            "run": self.run,
+            "period_s": self.period_s,
+            "Izz_kg_m2": self.izz_kg_m2,
+            "fitted_Izz_kg_m2": self.fitted_kg_m2,
+            "off_percent": self.off_percent,
+            "reasons": [{"what": what, "percent": share} for what, share in self.reasons],
+        }
+
+
+def classic_runs(solved: Solved, declared_kg: float | None) -> list[ClassicRun]:
+    """The formula for every run in which yaw can be seen, with the declared mass and lengths."""
+    found = []
+    for index, swing in enumerate(solved.swings):
+        period = period_of(swing)
+        if period is None:
+            continue
+        values = solved.solution.unknowns.of_run(index)
+        total = swing.total(values)
+        added = total[0] - values["platform"][0]
+        mass = total[0] if declared_kg is None else declared_kg + added
+        top, bottom, length = radii(swing)
+        gravity = float(np.linalg.norm(swing.model.robot.gravity_m_s2))
+        izz = mass * gravity * top * bottom / length * (period / (2.0 * np.pi)) ** 2
+        reasons = _reasons(swing, values, total, mass)
+        found.append(ClassicRun(swing.name, period, float(izz), float(total[IZZ]), reasons))
+    return found
+
+
+def radii(swing: BenchSwing) -> tuple[float, float, float]:
+    """Radii of the wires' upper and lower ends about their middle, and the mean length."""
+    robot = swing.model.robot
+    sizes = []
+    for points in (robot.entries_m, robot.attachments_m):
+        off = points - points.mean(axis=0)
+        sizes.append(float(np.sqrt(np.mean(np.sum(off**2, axis=1)))))
+    return sizes[0], sizes[1], float(np.mean(swing.lengths_m))
+
+
+def period_of(swing: BenchSwing) -> float | None:
+    """Period of yaw in the column that shows it, by one sine; None: too short or not there."""
+    column = next((one for one in swing.columns if one.coordinate == 5), None)
+    if column is None:
+        column = next((one for one in swing.columns if one.channel is not None), None)
+    if column is None:
+        return None
+    return _period(swing.times_s, column)
+
+
+def _period(times_s: Array, column: Column) -> float | None:
+    times, values = times_s[column.known], column.values[column.known]
+    span = times[-1] - times[0]
+    rates = np.arange(LEAST_PERIODS / span, min(5.0, 0.25 / np.median(np.diff(times))), 0.1 / span)
+    if not len(rates):
+        return None
+    best = rates[int(np.argmin([_left(times, values, rate) for rate in rates]))]
+    for width in (0.1, 0.01, 0.001):
+        near = best + np.linspace(-width, width, 21) / span
+        best = near[int(np.argmin([_left(times, values, rate) for rate in near]))]
+    return float(1.0 / best)
+
+
+def _left(times: Array, values: Array, rate: float) -> float:
+    phase = 2.0 * np.pi * rate * times
+    design = np.column_stack([np.ones_like(times), np.cos(phase), np.sin(phase)])
+    found = np.linalg.lstsq(design, values, rcond=None)[0]
+    return float(np.sum((values - design @ found) ** 2))
+
+
+def _reasons(
+    swing: BenchSwing,
+    values: dict[str, Array],
+    total: Array,
+    mass: float,
+) -> tuple[tuple[str, float], ...]:
+    """Shares of the difference, each by itself: mass, centre of mass, amplitude, wire lengths."""
+    length = float(np.mean(swing.lengths_m))
+    motion = swing.simulated(values)
+    yaw = motion.at(swing.times_s)[0][:, 5]
+    amplitude = 0.5 * float(np.ptp(yaw))
+    centre = total[1:3] / total[0] - swing.model.robot.attachments_m.mean(axis=0)[:2]
+    fitted = float(np.mean(swing.lengths(values)))
+    off_centre = float(total[0] * centre @ centre / total[IZZ])
+    return (
+        ("mass that payload runs contradict", 100.0 * (mass / total[0] - 1.0)),
+        ("centre of mass beside the middle: yaw moves it along", -100.0 * off_centre),
+        ("amplitude: the period grows with it", 100.0 * amplitude**2 / 8.0),
+        ("wire length", 100.0 * (fitted / length - 1.0)),
+    )
+
+
+def group_sentence(solved: Solved) -> str:
+    """What runs with a known mass cannot tell apart, where they contradict the robot file."""
+    mass = solved.mass
+    if mass is None or not mass.contradicted:
+        return ""
+    ratio = mass.fitted_kg / mass.declared_kg
+    share, half = 100.0 * (ratio - 1.0), 50.0 * (ratio - 1.0)
+    return (
+        f"the payload runs contradict mass_kg = {mass.declared_kg:.4g} kg: they give "
+        f"{mass.fitted_kg:.4g} +- {mass.fitted_std_kg:.2g} kg ({share:+.1f} %), which is used. "
+        "They cannot tell apart what is off: the platform's mass; R_top R_bottom / L of the wires "
+        f"({share:+.1f} %); the payloads' distances from the middle ({-half:+.1f} %) or "
+        f"masses ({-share:+.1f} %); the frame rate ({half:+.1f} %). Weigh the "
+        "platform with all that hangs on it: if the declared mass was wrong, all is settled; if it "
+        "was right, measure R and L again, then film a clock. The platform's inertia in kg m2 is "
+        "the same for the first two, and goes with the payloads' masses and squared distances"
+    )
+
+
+def own_izz(solved: Solved) -> float:
+    """The platform's Izz about P, kg m2."""
+    return float(moments(solved.solution.value("platform"))[IZZ])

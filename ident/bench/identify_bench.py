@@ -1,0 +1,240 @@
+"""`identify` for benches: every run of a session in one fit, and what it says of each body."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from freeswing.cdpr.files.problems import DataError
+from freeswing.cdpr.model.batch import evaluate
+from freeswing.cdpr.model.equations import Model, build_model
+from freeswing.cdpr.robot import INERTIA_NAMES, POSE_COORDINATES, Array, Robot
+from freeswing.ident.bench.assemble import EFFECTS, assembled
+from freeswing.ident.bench.classic import ClassicRun, classic_runs, group_sentence
+from freeswing.ident.bench.held_out import HeldOut, held_out
+from freeswing.ident.bench.objects import moments, moments_slope, specific, specific_slope
+from freeswing.ident.bench.report_objects import (
+    RESTS_ON_PRIOR,
+    channels_document,
+    objects_document,
+)
+from freeswing.ident.bench.runs import Bench, BenchRun, Signal
+from freeswing.ident.bench.solve import Solved, solved
+
+LEAST_OVER_NOISE = 5.0  # a channel's spread over the noise between its neighbours
+FROM_POSES_STD_M = 2e-3  # wire lengths from mean poses: as good as the wires' ends are known
+
+
+@dataclass(frozen=True, slots=True)
+class BenchResult:
+    """What a bench session gives.
+
+    Attributes:
+        solved: the fit.
+        bench: the session, with the runs as fitted.
+        classic: the classic formula beside it, by run.
+        validation: held-out runs.
+        notes: what a reader must know.
+    """
+
+    solved: Solved
+    bench: Bench
+    classic: tuple[ClassicRun, ...]
+    validation: tuple[HeldOut, ...]
+    notes: tuple[str, ...]
+
+    def document(self) -> dict[str, Any]:
+        """results/identification.json."""
+        runs = tuple(run for run in self.bench.runs if run.role == "identify")
+        robot = self.solved.swings[0].model.robot
+        name = "ml_full" if all(run.coordinates == POSE_COORDINATES for run in runs) else "ml_free"
+        return {
+            "format": "freeswing-identification/1",
+            "estimates": {name: self._platform()},
+            "comparison": {},
+            "validation": [one.document() for one in self.validation],
+            "validated": name,
+            "free_coordinates": list(robot.free_coordinates or ()),
+            "amplification": None,
+            "notes": list(self.notes),
+            "objects": objects_document(self.solved, self.bench, runs),
+            "channels": channels_document(self.solved, self.bench),
+            "classic": [one.document() for one in self.classic],
+            "scatter_between_runs_kg_m2": self.solved.scatter_std,
+        }
+
+    def _platform(self) -> dict[str, Any]:
+        """The nine specific numbers of the platform; those that only a prior holds are null."""
+        found, body = self.solved.solution, self.solved.solution.value("platform")
+        slope = specific_slope(moments(body)) @ moments_slope(body)
+        covariance = slope @ found.covariance_of("platform") @ slope.T
+        block = self.solved.first.block("platform")
+        spread = np.zeros(10) if block.prior is None else np.array(block.prior.std)
+        spread = np.where(block.estimated, spread, 0.0)
+        before = np.sum((slope * spread) ** 2, axis=1)
+        values, variances = specific(moments(body)), np.diag(covariance)
+        rows = []
+        for k, name in enumerate(INERTIA_NAMES):
+            seen = bool(variances[k] < RESTS_ON_PRIOR * before[k])
+            std = float(np.sqrt(variances[k]))
+            rows.append(
+                {
+                    "name": name,
+                    "value": float(values[k]) if seen else None,
+                    "std": std if seen else None,
+                    "std_percent": 100.0 * std / abs(float(values[k])) if seen else None,
+                    "essential": seen,
+                    "identifiable": seen,
+                }
+            )
+        if self.solved.mass is not None:
+            std = float(found.std("platform")[0])
+            rows.append(
+                {
+                    "name": "mass_kg",
+                    "value": float(body[0]),
+                    "std": std,
+                    "std_percent": 100.0 * std / float(body[0]),
+                    "essential": True,
+                    "identifiable": True,
+                }
+            )
+        samples = sum(len(swing.times_s) for swing in self.solved.swings)
+        return {
+            "parameters": rows,
+            "samples": samples,
+            "dropped_runs": [],
+            "notes": list(self.notes),
+            "stop_reason": found.reason,
+        }
+
+
+def identify_bench(bench: Bench, robot: Robot) -> BenchResult:
+    """Fit all runs of a bench session together.
+
+    Raises:
+        DataError: when the data cannot give a result, naming run, number and remedy.
+    """
+    _check(bench, robot)
+    model = build_model(robot, EFFECTS)
+    runs = tuple(_with_lengths(model, run) for run in bench.runs)
+    bench = replace(bench, runs=tuple(_windowed(run) for run in runs))
+    fitted = [run for run in bench.runs if run.role == "identify"]
+    try:
+        found = solved(model, bench, assembled(model, bench, fitted))
+    except (ValueError, np.linalg.LinAlgError) as error:
+        raise DataError(f"the bench's runs cannot be fitted: {error}") from error
+    checked = [run for run in bench.runs if run.role == "validate"]
+    validation = tuple(held_out(model, bench, found, run) for run in checked)
+    classic = tuple(classic_runs(found, robot.platform.mass_kg))
+    return BenchResult(found, bench, classic, validation, tuple(_notes(found, bench, robot)))
+
+
+def _check(bench: Bench, robot: Robot) -> None:
+    fitted = [run for run in bench.runs if run.role == "identify"]
+    if not fitted:
+        raise DataError('no run with role = "identify": there is nothing to identify from')
+    if bench.loads and all(run.loads for run in fitted) and robot.inertia is None:
+        raise DataError(
+            "every run carries a load and the platform's inertia is not given: object and platform "
+            "cannot be told apart; add a run of the empty platform, or one with a known payload"
+        )
+    if bench.loads and robot.platform.mass_kg is None and not any(r.payloads for r in fitted):
+        raise DataError(
+            "loads are to be measured, and neither the platform's mass_kg nor a run with a known "
+            "payload is given: weigh the platform, or add a run with a known mass on it"
+        )
+    for run in bench.runs:
+        if run.lengths_m is None and run.coordinates != POSE_COORDINATES:
+            raise DataError(
+                f"run {run.name}: it measures {', '.join(run.coordinates) or 'channels'} alone and "
+                "cable_lengths_m is not given: give the wires' lengths"
+            )
+        for signal in run.signals:
+            _check_moves(run, signal)
+
+
+def _check_moves(run: BenchRun, signal: Signal) -> None:
+    if signal.is_coordinate:
+        return
+    known = signal.values[np.isfinite(signal.values)]
+    if len(known) < 20:
+        raise DataError(
+            f"run {run.name}: channel column {signal.column} holds {len(known)} samples"
+        )
+    # Second differences: a swing's own curvature between neighbours is far below its size.
+    noise = float(np.std(np.diff(known, 2))) / np.sqrt(6.0)
+    spread = float(np.std(known))
+    if not spread > LEAST_OVER_NOISE * noise:
+        raise DataError(
+            f"run {run.name}: channel column {signal.column} never moves above its noise: it "
+            f"spreads by {spread:.3g}, its noise is {noise:.3g} ({LEAST_OVER_NOISE:g} times that "
+            "is needed); twist wider, or leave the channel out"
+        )
+
+
+def _with_lengths(model: Model, run: BenchRun) -> BenchRun:
+    """A run of full poses without stated lengths gets those of its mean poses."""
+    if run.lengths_m is not None:
+        return run
+    columns = {signal.column: signal.values for signal in run.signals}
+    poses = np.stack([columns[name] for name in POSE_COORDINATES], axis=1)
+    known = poses[np.isfinite(poses).all(axis=1)]
+    lengths = evaluate(model.lengths, known, model.start_values)[0].mean(axis=0)
+    return replace(run, lengths_m=lengths, lengths_std_m=run.lengths_std_m or FROM_POSES_STD_M)
+
+
+def _windowed(run: BenchRun) -> BenchRun:
+    """The run's stated window alone; without one all of it."""
+    if run.window_s is None:
+        return run
+    inside = (run.times_s >= run.window_s[0]) & (run.times_s <= run.window_s[1])
+    if inside.sum() < 20:
+        raise DataError(
+            f"run {run.name}: {int(inside.sum())} samples in window_s {list(run.window_s)}; it "
+            f"lasts from {run.times_s[0]:g} to {run.times_s[-1]:g} s"
+        )
+    return replace(
+        run,
+        times_s=run.times_s[inside],
+        signals=tuple(_part(signal, inside) for signal in run.signals),
+    )
+
+
+def _part(signal: Signal, inside: Array) -> Signal:
+    std = None if signal.std is None else signal.std[inside]
+    return Signal(signal.column, signal.values[inside], std)
+
+
+def _notes(found: Solved, bench: Bench, robot: Robot) -> list[str]:
+    notes = [sentence for sentence in (group_sentence(found),) if sentence]
+    if bench.loads and found.mass is None and bench.mass_std_kg is None:
+        notes.append(
+            "no run carries a known payload: the loads' inertia rests on the declared platform "
+            "mass (I_load = s m_load + (s - s_tare) m_platform); a run with a known mass far from "
+            "the middle, or mass_std_kg, says how well"
+        )
+    for channel in bench.channels:
+        name = f"channel.{channel.name}"
+        if channel.main_coordinate in channel.gains or name not in found.solution.unknowns:
+            continue
+        if channel.per_run:
+            notes.append(f"channel {channel.name}: its gains are new in every run and not reported")
+            continue
+        place = channel.coordinates.index(channel.main_coordinate)
+        value = float(found.solution.value(name)[place])
+        std = float(found.solution.std(name)[place])
+        notes.append(
+            f"channel {channel.name}: its gain for {channel.main_coordinate} is not given and "
+            f"rests on how the period depends on amplitude alone: {value:.4g} +- {std:.2g}"
+        )
+    if found.scatter_std > 0.0:
+        notes.append(
+            f"runs scatter by {found.scatter_std:.2g} kg m2 in Izz beyond their noise (rehanging, "
+            "twisting, placing): every deviation counts it"
+        )
+    if not found.solution.converged:
+        notes.append(f"the fit has not converged ({found.solution.reason}): do not rely on it")
+    return notes

@@ -1,0 +1,249 @@
+"""A run of a bench as the fit sees it: what was measured against a simulated swing.
+
+Every measured column is one coordinate or one channel, each with its own noise and its own gaps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from freeswing.cdpr.model.equations import Model
+from freeswing.cdpr.robot import Array
+from freeswing.cdpr.simulation.free_swing import Motion, simulate
+from freeswing.cdpr.simulation.sensitivity import linearise
+from freeswing.ident.bench.channels import Channel
+from freeswing.ident.bench.chart import Chart
+from freeswing.ident.bench.objects import moments, moments_slope, specific, specific_slope
+
+TOLERANCE_M = 1e-7  # a thousandth of the best tracks' noise
+IZZ = 6  # of the ten moments
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """One measured column of a run.
+
+    Attributes:
+        name: of the coordinate or the channel.
+        values: (n,); NaN: not measured.
+        std: stated or assumed noise of every sample, (n,).
+        coordinate: its place in the pose; None for a channel.
+        channel: the channel; None for a coordinate.
+        factor: on the noise, from the residuals: their size, and their colour.
+    """
+
+    name: str
+    values: Array
+    std: Array
+    coordinate: int | None = None
+    channel: Channel | None = None
+    factor: float = 1.0
+
+    @property
+    def known(self) -> Array:
+        """Which samples there are, (n,)."""
+        return np.isfinite(self.values)
+
+
+@dataclass(frozen=True, slots=True)
+class Riding:
+    """A body on the platform in a run: its block of unknowns, and how it is placed.
+
+    Attributes:
+        block: name of the unknowns.
+        turn: R_platform_body, (3, 3).
+        shift_m: its origin in the platform frame, (3,).
+    """
+
+    block: str
+    turn: Array
+    shift_m: Array
+
+
+@dataclass(frozen=True, slots=True)
+class BenchSwing:
+    """One run.
+
+    Attributes:
+        name: of the run.
+        model: the robot's equations.
+        times_s: of the samples, (n,).
+        columns: what was measured.
+        lengths_m: stated wire lengths, (n_cables,).
+        wires: name of the block of what is wrong with them, common to runs on the same wires.
+        rest: pose that channels count from, (6,).
+        chart: of start states.
+        riding: bodies whose inertia is unknown, the platform first.
+        known: moments (10,) of known payloads.
+        loose: how far from rest each coordinate may start, (6,); infinite where it is measured.
+        place: of the run among those of the fit.
+    """
+
+    name: str
+    model: Model
+    times_s: Array
+    columns: tuple[Column, ...]
+    lengths_m: Array
+    wires: str
+    rest: Array
+    chart: Chart
+    riding: tuple[Riding, ...]
+    known: Array
+    loose: Array
+    place: int = 0
+
+    @property
+    def span_s(self) -> tuple[float, float]:
+        """First and last sample."""
+        return float(self.times_s[0]), float(self.times_s[-1])
+
+    def total(self, values: Mapping[str, Array]) -> Array:
+        """Mass, first moments and tensor about P of everything that swings, (10,)."""
+        found = np.array(self.known)
+        for one in self.riding:
+            found += moments(values[one.block], one.turn, one.shift_m)
+        if "scatter" in values:
+            found[IZZ] += values["scatter"][self.place]
+        return found
+
+    def lengths(self, values: Mapping[str, Array]) -> Array:
+        """Wire lengths, (n,)."""
+        found = self.lengths_m + values[self.wires]
+        return found + values["wires_each"] if "wires_each" in values else found
+
+    def simulated(self, values: Mapping[str, Array]) -> Motion:
+        """The simulated swing.
+
+        Raises:
+            ValueError: naming the run, where it cannot be followed.
+        """
+        total = self.total(values)
+        if not total[0] > 0.0:
+            raise ValueError(f"run {self.name}: a mass of {total[0]:.3g} kg")
+        inertia, effects = specific(total), values["effects"]
+        start_s = self.span_s[0]
+        lengths = self.lengths(values)
+        try:
+            state = self.chart.state(values["start"], lengths, start_s, inertia, effects)
+            return simulate(
+                self.model, state[:6], state[6:], self.span_s, inertia, effects, TOLERANCE_M
+            )
+        except (ValueError, np.linalg.LinAlgError) as error:
+            raise ValueError(f"run {self.name}: {error}") from error
+
+    def residuals(self, values: Mapping[str, Array], motion: Motion) -> Array:
+        """Whitened prediction minus measurement of all known samples, (m,)."""
+        moved = motion.at(self.times_s)[0]
+        off = [self._off(column, moved, values) for column in self.columns]
+        return np.concatenate([*off, self._astray(motion)])
+
+    def linearised(
+        self, values: Mapping[str, Array], motion: Motion
+    ) -> tuple[Array, dict[str, Array]]:
+        """The same, and its slopes by every block that it knows."""
+        zetas = motion.at(self.times_s)[0]
+        state, change = self._changes(motion, values)
+        sizes = {name: len(np.atleast_1d(value)) for name, value in values.items()}
+        off, rows = [], []
+        for column in self.columns:
+            white = (column.factor * column.std)[column.known]
+            slope, own = self._slope(column, zetas, values)
+            known = column.known
+            by_block = {
+                name: np.einsum("nc,ncs->ns", slope[known], part[known]) / white[:, None]
+                for name, part in change.items()
+            }
+            by_block |= {name: part[known] / white[:, None] for name, part in own.items()}
+            rows.append(by_block)
+            off.append(self._off(column, zetas, values))
+        off.append(self._astray(motion))
+        _, places, spread = self._reach()
+        rows.append({name: part[places] / spread[:, None] for name, part in state.items()})
+        names = {name for row in rows for name in row}
+        stacked = {
+            name: np.vstack(
+                [
+                    row.get(name, np.zeros((len(part), sizes[name])))
+                    for row, part in zip(rows, off, strict=True)
+                ]
+            )
+            for name in names
+        }
+        return np.concatenate(off), stacked
+
+    def _reach(self) -> tuple[Array, Array, Array]:
+        """Where unmeasured coordinates rest, their places in [zeta; rates] and their spread."""
+        pendulum = np.sqrt(9.81 / float(np.mean(self.lengths_m)))
+        spread = np.concatenate([self.loose, pendulum * self.loose])
+        places = np.flatnonzero(np.isfinite(spread))
+        rest = np.concatenate([self.rest, np.zeros(6)])
+        return rest[places], places, spread[places]
+
+    def _astray(self, motion: Motion) -> Array:
+        """Distance of the start from rest where nothing measures it, whitened."""
+        state = np.concatenate([motion.zetas[0], motion.rates[0]])
+        rest, places, spread = self._reach()
+        return np.asarray((state[places] - rest) / spread)
+
+    def predicted(self, column: Column, zetas: Array, values: Mapping[str, Array]) -> Array:
+        """What a column would read along poses (n, 6), (n,)."""
+        if column.channel is None:
+            return np.asarray(zetas[:, column.coordinate])
+        design = column.channel.design(zetas - self.rest)
+        name = column.channel.name
+        return np.asarray(values[f"offset.{name}"][0] + design @ values[f"channel.{name}"])
+
+    def _off(self, column: Column, zetas: Array, values: Mapping[str, Array]) -> Array:
+        difference = self.predicted(column, zetas, values) - column.values
+        return np.asarray((difference / (column.factor * column.std))[column.known])
+
+    def _slope(
+        self, column: Column, zetas: Array, values: Mapping[str, Array]
+    ) -> tuple[Array, dict[str, Array]]:
+        """Derivatives of a column by the pose (n, 6), and by the channel's own blocks."""
+        if column.channel is None:
+            slope = np.zeros(zetas.shape)
+            slope[:, column.coordinate] = 1.0
+            return slope, {}
+        moved, name = zetas - self.rest, column.channel.name
+        slope = column.channel.slopes(moved, values[f"channel.{name}"])
+        own = {
+            f"offset.{name}": np.ones((len(zetas), 1)),
+            f"channel.{name}": column.channel.design(moved),
+        }
+        return slope, own
+
+    def _changes(
+        self, motion: Motion, values: Mapping[str, Array]
+    ) -> tuple[dict[str, Array], dict[str, Array]]:
+        """Derivatives of the start state (12, size) and of the pose at the samples (n, 6, size).
+
+        By every block that moves them.
+        """
+        by_all = linearise(motion).at(self.times_s)[0]
+        by_state, by_rest = by_all[:, :, :12], by_all[:, :, 12:]
+        first = np.concatenate([motion.zetas[0], motion.rates[0]])
+        lengths = self.lengths(values)
+        by_numbers, by_lengths, start_by_rest = self.chart.slopes(
+            first, lengths, self.span_s[0], motion.inertia, motion.values
+        )
+        slope = specific_slope(self.total(values))
+        state = {"start": by_numbers, "effects": start_by_rest[:, 9:], self.wires: by_lengths}
+        total = start_by_rest[:, :9] @ slope
+        pose = {name: by_state @ part for name, part in state.items()}
+        pose["effects"] = pose["effects"] + by_rest[:, :, 9:]
+        pose_total = by_rest[:, :, :9] @ slope + by_state @ total
+        if "wires_each" in values:
+            state["wires_each"], pose["wires_each"] = state[self.wires], pose[self.wires]
+        for one in self.riding:
+            part = moments_slope(values[one.block], one.turn, one.shift_m)
+            state[one.block] = state.get(one.block, 0.0) + total @ part
+            pose[one.block] = pose.get(one.block, 0.0) + pose_total @ part
+        if "scatter" in values:
+            only = np.zeros((10, len(values["scatter"])))
+            only[IZZ, self.place] = 1.0
+            state["scatter"], pose["scatter"] = total @ only, pose_total @ only
+        return state, pose
