@@ -107,7 +107,7 @@ def _make_bench(
 ) -> list[tuple[str, dict[str, Any]]]:
     """The same of a bench: all its runs in one fit."""
     from freeswing.ident.bench.identify_bench import identify_bench
-    from freeswing.results.bench_words import bench_lines
+    from freeswing.report.bench_words import bench_lines
     from freeswing.session.load_bench import load_bench
     from freeswing.session.load_swings import load_target
 

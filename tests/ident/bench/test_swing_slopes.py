@@ -85,14 +85,7 @@ def small_bench() -> Bench:
     weight = KnownBody(0.3, np.array([0.1, 0.0, 0.0]), np.zeros(6))
     runs = (
         BenchRun("a", "identify", times, (Signal("chi", chi),), lengths, 1e-3, loads=(load,)),
-        BenchRun(
-            "b",
-            "identify",
-            times,
-            (Signal("dot_px", 900.0 * chi + x),),
-            lengths,
-            payloads=(weight,),
-        ),
+        BenchRun("b", "identify", times, dot, lengths, payloads=(weight,)),
         BenchRun("c", "identify", times, (Signal("x", x), Signal("chi", chi)), lengths),
     )
     channels = (Channel("dot", "dot_px", ("chi", "x", "y"), order=2),)
