@@ -14,6 +14,7 @@ from freeswing.cdpr.measured.trajectory import angle_noise
 from freeswing.cdpr.robot import POSE_COORDINATES, Robot
 from freeswing.ident.bench.runs import Bench, BenchRun, Signal
 from freeswing.session.load_swings import load_trajectory
+from freeswing.session.marker_runs import read_marker_runs
 from freeswing.session.session_file import Run, Session
 
 PARALLEL_RAD = 0.02  # wires that lean towards each other by less hang parallel
@@ -97,7 +98,7 @@ def _load_run(
             Signal(name, values, table.stds.get(name)) for name, values in table.values.items()
         )
     else:
-        trajectory = load_trajectory(session, run, robot, target)
+        trajectory = load_trajectory(session, run, robot, target, read_marker_runs(session, target))
         times, noise = trajectory.times_s, None
         if trajectory.covariances is not None:
             turned = angle_noise(trajectory.coordinates, trajectory.values, trajectory.covariances)
