@@ -39,6 +39,7 @@ _NEWTON_STEPS = 30
 _CONVERGED = 1e-12
 
 
+@lru_cache(maxsize=64)
 def _selection(model: str) -> Array:
     """Maps a model's parameters to the full list: full = selection @ params, (12, k)."""
     selection = np.zeros((len(FULL_NAMES), len(PARAMETER_NAMES[model])))
@@ -50,12 +51,9 @@ def _selection(model: str) -> Array:
     return np.eye(len(FULL_NAMES), 8) if model == FISHEYE else selection
 
 
-_SELECTIONS = {model: _selection(model) for model in PARAMETER_NAMES}
-
-
 def parameter_columns(model: str) -> NDArray[np.int64]:
     """Which of a model's parameters each entry of the full list is, -1 for none, (12,)."""
-    selection = _SELECTIONS[model]
+    selection = _selection(model)
     return np.where(selection.any(axis=1), selection.argmax(axis=1), -1)
 
 
@@ -68,7 +66,7 @@ def focal_and_centre(model: str, params: Array) -> tuple[Array, Array]:
 
 def full_parameters(model: str, params: Array) -> Array:
     """The parameters as the full list `FULL_NAMES`, the fisheye's in its first eight, (12,)."""
-    return _SELECTIONS[model] @ params
+    return _selection(model) @ params
 
 
 def project(model: str, points: Array, params: Array) -> Array:
@@ -82,7 +80,7 @@ def project_jacobian(model: str, points: Array, params: Array) -> tuple[Array, A
     """Pixels (..., 2) with their derivatives by the point (..., 2, 3) and params (..., 2, k)."""
     full = full_parameters(model, params)
     pixels, d_point, d_full = lens_jacobians(model == FISHEYE, full, _flat(points))
-    d_params = d_full if model == "FULL_OPENCV" else d_full @ _SELECTIONS[model]
+    d_params = d_full if model == "FULL_OPENCV" else d_full @ _selection(model)
     batch = points.shape[:-1]
     return (
         pixels.reshape(*batch, 2),

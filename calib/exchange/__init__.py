@@ -12,7 +12,7 @@ from freeswing.calib.camera.camera import Camera
 from freeswing.calib.camera.cameras_file import read_cameras, write_cameras
 from freeswing.cdpr.files.documents import InputError
 
-FORMATS = ("freeswing", "opencv", "kalibr", "ros", "anipose", "colmap", "qualisys")
+FORMATS = ("freeswing", "opencv", "kalibr", "ros", "anipose", "colmap", "colmap-binary", "qualisys")
 Tell = Callable[[str], None]
 _LOOKED_AT_BYTES = 20_000
 _RIGID = 1e-3
@@ -22,6 +22,7 @@ _MODULES = {
     "ros": "ros",
     "anipose": "anipose",
     "colmap": "colmap",
+    "colmap-binary": "colmap_binary",
     "qualisys": "qualisys",
 }
 
@@ -65,7 +66,9 @@ def guess(path: Path) -> str:
         InputError: when nothing known is there.
     """
     if path.is_dir():
-        return "colmap" if (path / "cameras.txt").is_file() else "ros"
+        if (path / "cameras.txt").is_file():
+            return "colmap"
+        return "colmap-binary" if (path / "cameras.bin").is_file() else "ros"
     if not path.is_file():
         raise InputError(f"{path}: no such file")
     with path.open("rb") as file:

@@ -31,10 +31,19 @@ def read(path: Path, tell: Callable[[str], None]) -> tuple[Camera, ...]:
     Where images of several folders have one name, the folders name the cameras.
     """
     folder = path if path.is_dir() else path.parent
+    return read_text_model(folder, folder)
+
+
+def read_text_model(folder: Path, named: Path) -> tuple[Camera, ...]:
+    """The cameras of a text model that the user knows under another name.
+
+    Raises:
+        InputError: when it is none.
+    """
     try:
         return _cameras(folder)
     except ODD_ENTRY as error:
-        raise InputError(f"{folder}: not COLMAP's text model: {str(error)[:200]}") from error
+        raise InputError(f"{named}: not COLMAP's text model: {str(error)[:200]}") from error
 
 
 def _cameras(folder: Path) -> tuple[Camera, ...]:

@@ -8,7 +8,9 @@ from pathlib import Path
 from freeswing.console import Console
 
 SUFFIXES = (".csv", ".tum", ".trc", ".c3d")
-CAMERA_FORMATS = ("freeswing", "opencv", "kalibr", "ros", "anipose", "colmap", "qualisys")
+CAMERA_FORMATS = (
+    "freeswing", "opencv", "kalibr", "ros", "anipose", "colmap", "colmap-binary", "qualisys",
+)  # fmt: skip
 
 
 def add_arguments(parser: ArgumentParser) -> None:

@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import re
+import sys
+from types import ModuleType
 
 import numpy as np
 import pytest
 
+import freeswing.main
+from freeswing.calib import exchange
+from freeswing.calib.camera.lens_models import PARAMETER_NAMES, project, project_jacobian
 from freeswing.cdpr.effects import catalogue
 from freeswing.cdpr.effects.own_folders import effects_in
 from freeswing.cdpr.files.problems import InputError
@@ -16,6 +21,7 @@ from freeswing.ident.diagnose.experiments import separating_experiment
 from freeswing.main import main
 from freeswing.session.load_swings import load_robot, load_swings, load_target
 from freeswing.session.session_file import read_session
+from tests.calib.rigs import rig
 from tests.oracle.sessions import make_session
 from tests.places import ROOT, SAMPLES
 
@@ -122,3 +128,50 @@ def test_a_folder_that_is_none_is_told(monkeypatch, capsys) -> None:
     monkeypatch.setenv("FREESWING_EFFECTS", "/not/there")
     assert main(["effects"]) == 2
     assert "FREESWING_EFFECTS: /not/there is not a folder" in capsys.readouterr().err
+
+
+def module_of(title: str, name: str, monkeypatch) -> None:
+    """The example as a module that is there under a name."""
+    module = ModuleType(name)
+    exec(compile(example(title), name, "exec"), module.__dict__)
+    module.__doc__ = example(title).split('"""')[1]
+    monkeypatch.setitem(sys.modules, name, module)
+
+
+def test_a_board_needs_its_table_alone(capsys) -> None:
+    exec(compile(example("A board"), "example", "exec"), {})
+    assert capsys.readouterr().out == "(48, 3) 12\n"
+
+
+def test_cameras_in_another_format_come_back(tmp_path, monkeypatch) -> None:
+    module_of("A file format", "freeswing.calib.exchange.json_list", monkeypatch)
+    monkeypatch.setitem(exchange._MODULES, "json-list", "json_list")
+    cameras = rig(2)
+    exchange.write(tmp_path / "cameras.json", cameras, "json-list")
+    back = exchange.read(tmp_path / "cameras.json", "json-list")
+    assert [camera.name for camera in back] == [camera.name for camera in cameras]
+    for one, other in zip(cameras, back, strict=True):
+        assert np.array_equal(one.params, other.params)
+        assert np.array_equal(one.T_camera_base, other.T_camera_base)
+
+
+def test_a_command_is_run(monkeypatch, capsys) -> None:
+    module_of("A command", "freeswing.commands.runs", monkeypatch)
+    monkeypatch.setattr(freeswing.main, "COMMANDS", (*freeswing.main.COMMANDS, "runs"))
+    assert main(["runs", str(SAMPLES / "undeclared-drag")]) == 0
+    said = capsys.readouterr().out.splitlines()
+    roles = {line.partition(": ")[2] for line in said}
+    assert roles == {"identify", "validate"}, said
+
+
+def test_a_camera_model_projects_as_its_general_one(monkeypatch) -> None:
+    monkeypatch.setitem(PARAMETER_NAMES, "THREE_RADIAL", ())
+    exec(compile(example("A camera model"), "example", "exec"), {})
+    points = np.random.default_rng(0).uniform([-0.4, -0.4, 1.0], [0.4, 0.4, 2.0], (20, 3))
+    own = np.array([900.0, 910.0, 640.0, 500.0, -0.1, 0.05, -0.01])
+    general = np.array([*own[:6], 0.0, 0.0, own[6], 0.0, 0.0, 0.0])
+    pixels, by_point, by_params = project_jacobian("THREE_RADIAL", points, own)
+    assert np.array_equal(pixels, project("FULL_OPENCV", points, general))
+    _, same_by_point, by_all = project_jacobian("FULL_OPENCV", points, general)
+    assert np.abs(by_point - same_by_point).max() < 1e-9
+    assert np.abs(by_params - by_all[..., [0, 1, 2, 3, 4, 5, 8]]).max() < 1e-9
