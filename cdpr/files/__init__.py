@@ -1,1 +1,1 @@
-"""The project's files: robot.toml, trajectories, meshes; documents read and written whole."""
+"""The project's files: robot.toml, trajectories, documents read and written whole."""

@@ -25,7 +25,7 @@ from freeswing.cdpr.files.drive_file import (
     read_motors,
     read_shape,
 )
-from freeswing.cdpr.files.mesh import METRES_PER_UNIT, platform_from_mesh
+from freeswing.cdpr.mesh.nominal_inertia import METRES_PER_UNIT, platform_from_mesh
 from freeswing.cdpr.robot import POSE_COORDINATES, STANDARD_GRAVITY_M_S2, Cable, Platform, Robot
 from freeswing.cdpr.tolerances import Tolerances
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from freeswing.cdpr.files.documents import InputError, read_bytes
-from freeswing.cdpr.files.mesh_bodies import problem_of_bodies
+from freeswing.cdpr.mesh.separate_bodies import problem_of_bodies
 from freeswing.cdpr.robot import Platform
 
 METRES_PER_UNIT = {

@@ -3,8 +3,8 @@ import pytest
 import trimesh
 
 from freeswing.cdpr.files.documents import InputError
-from freeswing.cdpr.files.mesh import platform_from_mesh
 from freeswing.cdpr.files.robot_file import read_robot
+from freeswing.cdpr.mesh.nominal_inertia import platform_from_mesh
 from tests.places import SAMPLES
 
 SIZE = np.array([0.4, 0.3, 0.1])
