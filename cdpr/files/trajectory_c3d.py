@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.cdpr.files.documents import InputError, read_bytes, replace_file
+from freeswing.cdpr.files.mocap.gaps import without_gaps
 from freeswing.cdpr.files.number_table import LARGEST_NUMBER
 from freeswing.cdpr.measured.marker_recording import MarkerRecording
 
@@ -25,6 +26,7 @@ BYTE_ORDERS = {84: "<", 86: ">"}
 METRES_PER_UNIT = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 ITEM_TYPES = {-1: "S1", 1: "i1", 2: "i2", 4: "f4"}
 FULL_COUNT = 0xFFFF
+SPARE_SHARE = 0.1  # some writers leave room at the end; a count of 1 where 801 are is no such
 LEAST_RATE_HZ = 0.01
 MOST_RATE_HZ = 1e6
 
@@ -63,12 +65,14 @@ def write_c3d(path: Path | str, recording: MarkerRecording, unit: str = "mm") ->
     positions = recording.positions_m / METRES_PER_UNIT[unit]
     points = np.ones((4, len(recording.names), len(recording.times_s)))
     points[:3] = positions.transpose(2, 1, 0)
+    residuals = np.where(np.isnan(points[0]), -1.0, 0.0)  # the format's mark of a gap
     file = ezc3d.c3d()
     file["header"]["points"]["first_frame"] = first
     file["parameters"]["POINT"]["RATE"]["value"] = [rate]
     file["parameters"]["POINT"]["LABELS"]["value"] = list(recording.names)
     file["parameters"]["POINT"]["UNITS"]["value"] = [unit]
     file["data"]["points"] = points
+    file["data"]["meta_points"]["residuals"] = residuals[None]
     with tempfile.TemporaryDirectory() as folder:
         draft = Path(folder) / "draft.c3d"
         file.write(str(draft))
@@ -111,15 +115,15 @@ def _read(path: Path, data: bytes) -> MarkerRecording:
         raise InputError(
             f"{path}: POINT:RATE is {rate} Hz, must be {LEAST_RATE_HZ:g} to {MOST_RATE_HZ:g}"
         )
-    first, n_frames = _frames(header, parameters, order)
     names = _names(path, parameters, order)
-    positions = _points(path, data, header, parameters, order, n_frames, len(names))
+    first, n_frames = _frames(path, data, header, parameters, order, len(names))
+    raw = _points(path, data, header, parameters, order, n_frames, len(names))
+    labelled = [i for i, name in enumerate(names) if name]
+    used = tuple(names[i] for i in labelled)
+    positions, notes = without_gaps(raw[:, labelled], used)
     scale = _metres_per_unit(path, parameters)
     times = (first - 1 + np.arange(n_frames)) / rate
-    labelled = [i for i, name in enumerate(names) if name]
-    return MarkerRecording(
-        times, tuple(names[i] for i in labelled), scale * positions[:, labelled], path.name
-    )
+    return MarkerRecording(times, used, scale * positions, path.name, notes)
 
 
 def _parameters(data: bytes, start: int, order: str) -> dict[tuple[str, str], _Parameter]:
@@ -159,19 +163,69 @@ def _parameter(data: bytes, at: int) -> _Parameter:
 
 
 def _frames(
-    header: NDArray[np.uint16], parameters: dict[tuple[str, str], _Parameter], order: str
+    path: Path,
+    data: bytes,
+    header: NDArray[np.uint16],
+    parameters: dict[tuple[str, str], _Parameter],
+    order: str,
+    n_points: int,
 ) -> tuple[int, int]:
-    """First frame, counted from 1, and the number of frames."""
+    """First frame, counted from 1, and the number of frames that all fields agree on.
+
+    Frames are counted four times: in the header's two numbers of 16 bits, in POINT:FRAMES, in
+    TRIAL:ACTUAL_*_FIELD and by the file's length. Numbers of 16 bits that are full say nothing.
+
+    Raises:
+        InputError: where they contradict each other, naming all of them.
+    """
     first, last = int(header[3]), int(header[4])
+    told: dict[str, int] = {}
+    if last < FULL_COUNT and last >= first:
+        told["header"] = last - first + 1
     fields = [parameters.get(("TRIAL", f"ACTUAL_{end}_FIELD")) for end in ("START", "END")]
     if all(field is not None and len(field.data) >= 4 for field in fields):
-        first, last = (_long(field.data, order) for field in fields if field is not None)
-    elif last == FULL_COUNT and ("POINT", "FRAMES") in parameters:
-        count = parameters["POINT", "FRAMES"]
-        last = first - 1 + int(count.numbers(order)[0]) if count.kind == 4 else last
-    if not last - first + 1 >= 1:
-        raise KeyError(f"frames {first} to {last}")
-    return first, last - first + 1
+        start, end = (_long(field.data, order) for field in fields if field is not None)
+        if end >= start:
+            told["TRIAL:ACTUAL"] = end - start + 1
+            first = start if start >= 1 else first
+    count = parameters.get(("POINT", "FRAMES"))
+    if count is not None:
+        number = count.numbers(order)[0]
+        number = number + 2.0**16 if count.kind == 2 and number < 0.0 else number
+        if 0.0 < number < FULL_COUNT or (count.kind == 4 and number > 0.0):
+            told["POINT:FRAMES"] = int(number)
+    there, spare = _frames_of_length(data, header, parameters, order, n_points)
+    fitting = {n for n in told.values() if 0 <= there - n <= max(spare, SPARE_SHARE * n)}
+    agreed = set(told.values())
+    if len(fitting) == 1 and (agreed == fitting or len(told) > 1):
+        return first, fitting.pop()
+    if len(agreed) == 1 and there < min(agreed):
+        return first, agreed.pop()  # cut short: said where the points are read
+    if not told and there >= 1:
+        return first, there
+    all_told = ", ".join(f"{name} {number}" for name, number in told.items()) or "no field"
+    raise InputError(
+        f"{path}: how many frames there are is told in contradiction: {all_told}, and the file's "
+        f"length holds {there}; export it again"
+    )
+
+
+def _frames_of_length(
+    data: bytes,
+    header: NDArray[np.uint16],
+    parameters: dict[tuple[str, str], _Parameter],
+    order: str,
+    n_points: int,
+) -> tuple[int, int]:
+    """Whole frames that the file has room for, and how many of them may fill the last block."""
+    item = 4 if parameters["POINT", "SCALE"].numbers(order)[0] < 0.0 else 2
+    bytes_a_frame = item * (4 * n_points + int(header[2]))
+    start = (int(header[8]) - 1) * BLOCK
+    if start < BLOCK or bytes_a_frame == 0:
+        return 0, 0
+    parameters_at = (data[0] - 1) * BLOCK
+    end = parameters_at if parameters_at > start else len(data)
+    return max(end - start, 0) // bytes_a_frame, BLOCK // bytes_a_frame
 
 
 def _long(data: bytes, order: str) -> int:
@@ -184,6 +238,10 @@ def _names(
 ) -> tuple[str, ...]:
     """Label of every point, empty where it has none."""
     n_points = int(parameters["POINT", "USED"].numbers(order)[0]) & FULL_COUNT
+    if n_points == 0:
+        raise InputError(
+            f"{path}: holds no points, analogue channels alone; export the markers' paths too"
+        )
     names: list[str] = []
     for suffix in ("", *map(str, range(2, 10))):
         if ("POINT", f"LABELS{suffix}") in parameters:
@@ -230,8 +288,13 @@ def _points(
 
 
 def _metres_per_unit(path: Path, parameters: dict[tuple[str, str], _Parameter]) -> float:
-    texts = parameters["POINT", "UNITS"].texts()
-    unit = texts[0].lower() if texts else ""
+    given = parameters.get(("POINT", "UNITS"))
+    unit = (given.texts() or [""])[0].lower() if given is not None else ""
+    if not unit:
+        raise InputError(
+            f"{path}: states no unit (POINT:UNITS is missing); export it again with one, or set it "
+            "with ezc3d"
+        )
     if unit not in METRES_PER_UNIT:
         known = ", ".join(METRES_PER_UNIT)
         raise InputError(f"{path}: POINT:UNITS is {unit[:20]!r}, must be one of {known}")

@@ -5,6 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 from freeswing.cdpr.files.documents import InputError
+from freeswing.cdpr.files.mocap.text_exports import (
+    is_mocap_text,
+    read_mocap_text,
+    read_motive_body,
+)
 from freeswing.cdpr.files.trajectory_c3d import read_c3d, write_c3d
 from freeswing.cdpr.files.trajectory_csv import read_csv, write_csv
 from freeswing.cdpr.files.trajectory_trc import read_trc, write_trc
@@ -25,7 +30,7 @@ __all__ = [
     "write_tum",
 ]
 
-SUFFIXES = (".csv", ".trc", ".c3d", ".tum")
+SUFFIXES = (".csv", ".tsv", ".trc", ".c3d", ".tum")
 
 
 def read_trajectory(
@@ -42,7 +47,11 @@ def read_trajectory(
         DataError: when no sample shows three markers.
     """
     suffix = _suffix(path)
-    if suffix == ".csv":
+    if suffix == ".csv" and is_mocap_text(path):
+        body = read_motive_body(path)
+        if body is not None:
+            return body
+    elif suffix == ".csv":
         return read_csv(path, robot.free_coordinates if robot else None)
     if suffix == ".tum":
         return read_tum(path)
@@ -50,21 +59,28 @@ def read_trajectory(
 
 
 def read_recording(path: Path | str) -> MarkerRecording:
-    """Read the labelled markers of a .trc or .c3d file.
+    """Read the labelled markers of a .trc or .c3d file, or of Motive, Vicon or Qualisys text.
 
     Raises:
         InputError: naming the file and what to do.
     """
     readers = {".trc": read_trc, ".c3d": read_c3d}
     suffix = _suffix(path)
-    if suffix not in readers:
-        raise InputError(f"{path}: holds no markers; name a .trc or .c3d file")
-    return readers[suffix](path)
+    if suffix in readers:
+        return readers[suffix](path)
+    if is_mocap_text(path):
+        return read_mocap_text(path)
+    raise InputError(
+        f"{path}: holds no markers; name a .trc or .c3d file, or an export of Motive, Vicon or QTM"
+    )
 
 
 def holds_markers(path: Path | str) -> bool:
-    """Whether a file's ending says that it holds markers."""
-    return Path(path).suffix.lower() in (".trc", ".c3d")
+    """Whether a file holds markers, by its ending, or by its first lines where it is text."""
+    suffix = Path(path).suffix.lower()
+    if suffix in (".csv", ".tsv") and is_mocap_text(path):
+        return suffix == ".tsv" or read_motive_body(path) is None
+    return suffix in (".trc", ".c3d")
 
 
 def _suffix(path: Path | str) -> str:

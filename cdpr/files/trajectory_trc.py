@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.cdpr.files.documents import InputError, Problems, replace_file
+from freeswing.cdpr.files.mocap.gaps import without_gaps
 from freeswing.cdpr.files.number_table import (
     NumberTable,
     check_times,
@@ -22,7 +23,7 @@ Array = NDArray[np.float64]
 METRES_PER_UNIT = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "meters": 1.0, "millimeters": 1e-3}
 HEADER_KEYS = ("DataRate", "NumFrames", "NumMarkers", "Units")
 HEADER_LINES = 5
-RATE_TOLERANCE = 0.02
+RATE_TOLERANCE = 1e-3  # beside what rounding for print makes; 29.97 for 30 is as much
 
 
 def read_trc(path: Path | str) -> MarkerRecording:
@@ -31,7 +32,7 @@ def read_trc(path: Path | str) -> MarkerRecording:
     Raises:
         InputError: naming file, line and remedy, also where header and rows disagree.
     """
-    lines = read_lines(path)
+    lines = _tabbed(read_lines(path))
     if len(lines) <= HEADER_LINES or not lines[0].lstrip().startswith("PathFileType"):
         raise InputError(f"{path}: line 1: not a TRC file (must start with PathFileType)")
     for number in (2, 3, 4):
@@ -43,17 +44,19 @@ def read_trc(path: Path | str) -> MarkerRecording:
         (number, _padded(line, len(columns)))
         for number, line in enumerate(lines[HEADER_LINES:], start=HEADER_LINES + 1)
     )
-    table = read_numbers(path, rows, "\t", columns)
+    decimal_comma = any("," in line for line in lines[HEADER_LINES : HEADER_LINES + 2])
+    table = read_numbers(path, rows, "\t", columns, decimal_comma=decimal_comma)
     check_times(path, table, 1, "Time")
     if len(table.values) != n_frames:
         raise InputError(
             f"{path}: line 3: NumFrames is {n_frames}, but {len(table.values)} rows follow; the "
             "file is cut short or was edited: export it again"
         )
-    times = _exact_times(path, table, rate, lines)
-    positions = scale * table.values[:, 2:].reshape(len(times), n_markers, 3)
-    positions[np.isnan(positions).any(axis=2)] = np.nan
-    return MarkerRecording(times, names, positions, Path(path).name)
+    restart = _restart(table)
+    times = table.values[:, 1] if restart else _exact_times(path, table, rate, lines)
+    raw = table.values[:, 2:].reshape(len(times), n_markers, 3)
+    positions, notes = without_gaps(raw, names)
+    return MarkerRecording(times, names, scale * positions, Path(path).name, (*restart, *notes))
 
 
 def write_trc(path: Path | str, recording: MarkerRecording, unit: str = "mm") -> None:
@@ -89,6 +92,25 @@ def write_trc(path: Path | str, recording: MarkerRecording, unit: str = "mm") ->
     replace_file(path, "\n".join([*header, *rows, ""]).encode())
 
 
+def _tabbed(lines: list[str]) -> list[str]:
+    """Lines with tabs between cells, also of files that have commas or spaces there."""
+    labels = lines[3] if len(lines) > 3 else "\t"
+    if "\t" in labels:
+        return lines
+    if "," in labels:
+        return [line.replace(",", "\t") for line in lines]
+    return ["\t".join(line.split()) for line in lines]
+
+
+def _restart(table: NumberTable) -> tuple[str, ...]:
+    """What is said where frame numbers do not increase; the Time column then counts alone."""
+    back = np.flatnonzero(np.diff(table.values[:, 0]) <= 0.0)
+    if not len(back):
+        return ()
+    line = table.lines[back[0] + 1]
+    return (f"frame numbers begin again at line {line}: two takes in one file? Time is used",)
+
+
 def _read_header(path: Path | str, lines: list[str]) -> tuple[float, int, int, float]:
     """Rate [Hz], frames, markers and metres per unit of lines 2 and 3."""
     cells = dict(zip(lines[1].split("\t"), lines[2].split("\t"), strict=False))
@@ -118,7 +140,7 @@ def _count(text: str) -> int | None:
 
 def _positive(text: str) -> float | None:
     try:
-        number = float(text)
+        number = float(text.replace(",", "."))
     except ValueError:
         return None
     return number if 0.0 < number < 1e9 else None
@@ -155,13 +177,15 @@ def _exact_times(path: Path | str, table: NumberTable, rate: float, lines: list[
     n_steps = frames[-1] - frames[0]
     n_steps = float(n_steps) if n_steps > 0 else len(times) - 1.0
     measured = n_steps / float(times[-1] - times[0])
-    if abs(measured - rate) > RATE_TOLERANCE * rate:
+    last = lines[int(table.lines[-1]) - 1].split("\t")[1].strip()
+    printed = last.replace(",", ".").partition(".")[2]
+    digit = 10.0 ** -len(printed) if printed.isdigit() else 0.0
+    rounding = 2.0 * digit / float(times[-1] - times[0])
+    if abs(measured / rate - 1.0) > RATE_TOLERANCE + rounding:
         raise InputError(
             f"{path}: line 3: DataRate {rate:g}, but the Time column steps at {measured:.6g} Hz; "
             "correct the header or export again"
         )
-    printed = lines[int(table.lines[-1]) - 1].split("\t")[1].strip().partition(".")[2]
-    digit = 10.0 ** -len(printed) if printed.isdigit() else 0.0
     grid = times[0] + (frames - frames[0]) / rate
     is_grid = np.isfinite(grid).all() and (np.diff(grid) > 0.0).all()
     return grid if is_grid and np.abs(grid - times).max() <= digit else times

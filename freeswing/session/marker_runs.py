@@ -53,9 +53,9 @@ def read_marker_runs(session: Session, target: Target | None) -> MarkerRuns:
     examined: dict[str, Examined] = {}
     failures: dict[str, InputError | DataError] = {}
     for run in session.runs:
-        if run.trajectory is None or not holds_markers(run.trajectory):
-            continue
         try:
+            if run.trajectory is None or not holds_markers(run.trajectory):
+                continue
             recording = read_recording(run.trajectory)
             if fixes_poses(recording, target):
                 examined[run.name] = examine(recording, target, run.window_s)

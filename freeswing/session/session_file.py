@@ -25,7 +25,7 @@ from freeswing.session.bench_keys import (
 Array = NDArray[np.float64]
 
 ROLES = ("identify", "validate")
-TRAJECTORY_SUFFIXES = (".csv", ".trc", ".c3d")
+TRAJECTORY_SUFFIXES = (".csv", ".tsv", ".trc", ".c3d")
 BOARD_KEYS = {
     "charuco": ("squares", "square_m", "marker_m", "dictionary"),
     "chessboard": ("squares", "square_m"),
