@@ -1,0 +1,1 @@
+"""Driven robots from data: kinematics, inverse dynamics, output error, the joint estimate."""

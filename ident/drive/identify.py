@@ -1,0 +1,221 @@
+"""A driven session identified: kinematics, a start by inverse dynamics, output error, joint."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from freeswing.cdpr.driven.model import DrivenModel
+from freeswing.cdpr.driven.motion import DrivenMotion
+from freeswing.ident.drive.inverse_dynamics import Regression, inverse_dynamics
+from freeswing.ident.drive.joint import Estimate, Premise, carried_over, estimate
+from freeswing.ident.drive.kinematics import (
+    Kinematics,
+    StaticPoses,
+    as_published,
+    most_likely,
+    zero_turns,
+)
+from freeswing.ident.drive.run_problem import DriveRun, Noise, compared, simulated, start_pose
+from freeswing.ident.drive.unknowns import Asked
+
+Array = NDArray[np.float64]
+Progress = Callable[[str, float], None]
+
+# A second start whose end differs by more of its deviations is another minimum.
+SAME_MINIMUM = 0.5
+SECOND_START = 1.1
+
+
+@dataclass(frozen=True, slots=True)
+class DriveSession:
+    """What was recorded, and what is asked.
+
+    Attributes:
+        model: the declared robot.
+        asked: the unknowns.
+        runs: all recordings.
+        static: poses at rest, or None.
+        noise: of the readings.
+        zero_pose: where all angles are zero, or None.
+    """
+
+    model: DrivenModel
+    asked: Asked
+    runs: tuple[DriveRun, ...]
+    static: StaticPoses | None
+    noise: Noise
+    zero_pose: Array | None
+
+    def of(self, role: str) -> tuple[DriveRun, ...]:
+        """The runs of a role."""
+        return tuple(run for run in self.runs if run.role == role)
+
+
+@dataclass(frozen=True, slots=True)
+class RunFit:
+    """How well a run is predicted from its start and its references.
+
+    Attributes:
+        run: which.
+        equation_22: by motor, per cent (22).
+        matlab: by motor, 1 - |e| / |y - mean| in per cent.
+        rms_rad: of all angles.
+        slack: samples at which each cable would have had to push, (n,).
+        saturated: samples at which each motor was asked for more than its limits, (n,).
+        motion: the prediction.
+    """
+
+    run: DriveRun
+    equation_22: Array
+    matlab: Array
+    rms_rad: float
+    slack: NDArray[np.intp]
+    saturated: NDArray[np.intp]
+    motion: DrivenMotion
+
+
+@dataclass(frozen=True, slots=True)
+class DriveIdentification:
+    """All estimates of a session.
+
+    Attributes:
+        published: (18), or None without static poses or kinematic unknowns.
+        kinematics: the same with poses as the noisy side.
+        regression: inverse dynamics.
+        output_error: second step of two, its covariance with that of the kinematics.
+        second_start: largest difference of its end from another start, in deviations.
+        joint: the joint estimate.
+        fits: every run by the joint estimate.
+        initial: every run by the declared numbers.
+    """
+
+    published: Kinematics | None
+    kinematics: Kinematics | None
+    regression: Regression
+    output_error: Estimate
+    second_start: float
+    joint: Estimate
+    fits: tuple[RunFit, ...]
+    initial: tuple[RunFit | None, ...]
+
+
+def identify_drive(session: DriveSession, progress: Progress) -> DriveIdentification:
+    """Estimate what the session asks for.
+
+    Raises:
+        ValueError: when the angles fit no pose or a run cannot be simulated.
+    """
+    model, asked = session.model, session.asked
+    published, kinematics = _step_1(session)
+    theta, offsets = _geometry(session, kinematics)
+    runs = session.of("identify")
+    progress("inverse dynamics", 0.05)
+    regression = inverse_dynamics(model, theta, asked.dynamic, list(runs), offsets)
+    start = asked.dynamic.put(model, theta, _possible(session, regression))
+    given = Premise(model, start, runs, session.noise, session.zero_pose, offsets)
+    progress("output error", 0.1)
+    second = estimate(given, asked.dynamic)
+    progress("a second start", 0.35)
+    apart = _second_start(given, asked, second)
+    if kinematics is not None:
+        kept = np.where(np.isfinite(kinematics.covariance), kinematics.covariance, 0.0)
+        more = carried_over(given, asked, second, kept)
+        second = replace(second, covariance=second.covariance + more)
+    progress("joint estimate", 0.55)
+    free = session.zero_pose is None
+    whole = Premise(
+        model, second.theta, runs, session.noise, session.zero_pose, offsets, session.static, free
+    )
+    joint = estimate(whole, asked)
+    progress("predictions", 0.9)
+    zero = offsets_of(session, model.declared, offsets)
+    return DriveIdentification(
+        published,
+        kinematics,
+        regression,
+        second,
+        apart,
+        joint,
+        tuple(predict(session, run, joint.theta, joint.offsets) for run in session.runs),
+        tuple(_declared(session, run, zero) for run in session.runs),
+    )
+
+
+def _step_1(session: DriveSession) -> tuple[Kinematics | None, Kinematics | None]:
+    wanted = session.asked.kinematic
+    if session.static is None or not wanted.groups:
+        return None, None
+    args = (session.model, session.model.declared, wanted, session.static, session.zero_pose)
+    return as_published(*args), most_likely(*args)
+
+
+def _geometry(session: DriveSession, found: Kinematics | None) -> tuple[Array, Array]:
+    """Numbers with the estimated geometry, and L / r where the angles are zero."""
+    model = session.model
+    if found is not None:
+        theta = session.asked.kinematic.put(model, model.declared, found.values)
+        return theta, found.offsets_rad
+    return model.declared, offsets_of(session, model.declared, None)
+
+
+def offsets_of(session: DriveSession, theta: Array, fallback: Array | None) -> Array:
+    """L / r where the angles are zero, (n,), at these numbers."""
+    nothing = Asked((), 0)
+    if session.zero_pose is not None:
+        return zero_turns(session.model, theta, session.zero_pose, nothing)[0]
+    if fallback is not None:
+        return fallback
+    raise ValueError(
+        "encoder_zero is absent and there are no static poses to find it from: declare "
+        "encoder_zero, or record static poses ([static])"
+    )
+
+
+def _possible(session: DriveSession, regression: Regression) -> Array:
+    """Regressed values, or the declared one where the regression gives an impossible one."""
+    declared = session.asked.dynamic.read(session.model, session.model.declared)
+    usable = np.isfinite(regression.values) & (regression.values * declared > 0.0)
+    return np.where(usable, regression.values, declared)
+
+
+def _second_start(given: Premise, asked: Asked, first: Estimate) -> float:
+    """Largest difference of the minimum that is reached from numbers a tenth off."""
+    signs = np.where(np.arange(len(first.values)) % 2 == 0, SECOND_START, 1.0 / SECOND_START)
+    away = asked.dynamic.put(given.model, first.theta, first.values * signs)
+    other = estimate(replace(given, theta=away), asked.dynamic)
+    gaps = np.abs(other.values - first.values)[first.determined]
+    return float((gaps / first.std[first.determined]).max(initial=0.0))
+
+
+def predict(session: DriveSession, run: DriveRun, theta: Array, zero: Array) -> RunFit:
+    """The run from its first angles and its references alone."""
+    model = session.model
+    pose = start_pose(model, theta, run, zero)
+    motion = simulated(model, theta, run, pose)
+    seen = compared(run, motion, zero, session.noise, None)
+    gaps, angles = seen.angles * session.noise.angle_std_rad, run.record.angles_rad
+    spread = np.sum((angles - angles.mean(axis=0)) ** 2, axis=0)
+    share = np.sum(gaps**2, axis=0) / np.where(spread > 0.0, spread, np.nan)
+    limits = model.robot.drive.current_limits_A
+    asked = run.record.references_A
+    return RunFit(
+        run,
+        100.0 * (1.0 - share),
+        100.0 * (1.0 - np.sqrt(share)),
+        float(np.sqrt(np.mean(gaps**2))),
+        motion.slack.sum(axis=0),
+        ((asked < limits[:, 0]) | (asked > limits[:, 1])).sum(axis=0),
+        motion,
+    )
+
+
+def _declared(session: DriveSession, run: DriveRun, zero: Array) -> RunFit | None:
+    """The run by the declared numbers; None where they cannot follow it at all."""
+    try:
+        return predict(session, run, session.model.declared, zero)
+    except ValueError:
+        return None
