@@ -25,6 +25,7 @@ COMMANDS = (
     "export",
     "simulate",
     "linearise",
+    "drive",
     "effects",
     "board",
     "home",

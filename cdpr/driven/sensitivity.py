@@ -14,7 +14,7 @@ from freeswing.cdpr.model.batch import evaluate
 
 Array = NDArray[np.float64]
 
-N_START = 6  # small translation and turn of the start pose
+N_POSE = 6  # small translation and turn of the start pose
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,9 +29,10 @@ class _Steps:
 
 
 def state_slopes(motion: DrivenMotion, chosen: tuple[str, ...]) -> Array:
-    """Derivatives of all states by the start pose and by chosen numbers, (n_t, 13, 6 + k).
+    """Derivatives of all states by start pose, start currents and numbers, (n_t, 13, 6 + n + k).
 
     Exact for the steps that were taken: Runge and Kutta's stages are differentiated one by one.
+    Numbers of the current loop are not among those that may be chosen.
     """
     steps = _all_steps(motion)
     model, theta = motion.model, motion.theta
@@ -41,11 +42,13 @@ def state_slopes(motion: DrivenMotion, chosen: tuple[str, ...]) -> Array:
     states, currents = (np.moveaxis(part, -1, 1) for part in looks)  # (m, 4, ..)
     found = evaluate(motion_slope(model, chosen), states, currents, theta)
     flows = _flows(states, found[1])
-    sources = np.zeros((*states.shape, len(chosen)))
+    n = model.n_cables
+    sources = np.zeros((*states.shape, n + len(chosen)))
+    sources[..., 7:, :n] = found[2] * _of_start_currents(motion, steps)[..., None, :]
     if chosen:
-        sources[..., 7:, :] = found[3]
+        sources[..., 7:, n:] = found[3]
     transitions = _transitions(flows, sources, steps.periods)
-    return _chained(motion, steps, transitions, len(chosen))
+    return _chained(motion, steps, transitions)
 
 
 def _all_steps(motion: DrivenMotion) -> _Steps:
@@ -70,6 +73,19 @@ def _all_steps(motion: DrivenMotion) -> _Steps:
             motion.theta,
         )
     return _Steps(states, currents, motion.references_A[samples], periods, samples)
+
+
+def _of_start_currents(motion: DrivenMotion, steps: _Steps) -> Array:
+    """What is left of a unit start current at every stage of every step, (m, 4, n)."""
+    model, theta, n = motion.model, motion.theta, motion.model.n_cables
+    ones, zeros = np.ones(n), np.zeros(n)
+    periods, place = np.unique(steps.periods, return_inverse=True)
+    state = motion.states[0]
+    looks = evaluate(model.stages, state, ones, zeros, periods, theta)[1]
+    ends = evaluate(model.step, state, ones, zeros, periods, theta)[1]
+    left = ends[place]
+    before = np.vstack([ones[None], np.cumprod(left, axis=0)[:-1]])
+    return before[:, None, :] * np.moveaxis(looks, -1, 1)[place]
 
 
 def _flows(states: Array, by_state: Array) -> Array:
@@ -101,16 +117,17 @@ def _transitions(flows: Array, sources: Array, periods: Array) -> Array:
     return start + h / 6.0 * total
 
 
-def _chained(motion: DrivenMotion, steps: _Steps, transitions: Array, n_chosen: int) -> Array:
+def _chained(motion: DrivenMotion, steps: _Steps, transitions: Array) -> Array:
     """The transitions one after another, quaternions normalised as the steps do."""
-    result = np.zeros((len(motion.times_s), N_STATE, N_START + n_chosen))
-    result[0, :7, :N_START] = pose_map(motion.states[0, :7])
+    n_more = transitions.shape[2] - N_STATE
+    result = np.zeros((len(motion.times_s), N_STATE, N_POSE + n_more))
+    result[0, :7, :N_POSE] = pose_map(motion.states[0, :7])
     now = result[0].copy()
     # A step's end is the next one's start; its quaternion is of unit length there.
     ends = np.vstack([steps.states[1:, 3:7], motion.states[-1:, 3:7]])
     for k, transition in enumerate(transitions):
         now = transition[:, :N_STATE] @ now
-        now[:, N_START:] += transition[:, N_STATE:]
+        now[:, N_POSE:] += transition[:, N_STATE:]
         q = ends[k]
         now[3:7] -= np.outer(q, q @ now[3:7])
         result[steps.samples[k] + 1] = now

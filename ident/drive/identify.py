@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 
 from freeswing.cdpr.driven.model import DrivenModel
 from freeswing.cdpr.driven.motion import DrivenMotion
+from freeswing.cdpr.driven.record import DriveRecord
+from freeswing.cdpr.driven.sensitivity import N_POSE
+from freeswing.cdpr.driven.slopes import moved
 from freeswing.ident.drive.inverse_dynamics import Regression, inverse_dynamics
 from freeswing.ident.drive.joint import Estimate, Premise, carried_over, estimate
 from freeswing.ident.drive.kinematics import (
@@ -25,9 +28,9 @@ from freeswing.ident.drive.unknowns import Asked
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
 
-# A second start whose end differs by more of its deviations is another minimum.
-SAME_MINIMUM = 0.5
-SECOND_START = 1.1
+HEAD_S = 0.3  # of a run: what a wrong start does is largest there
+NOTHING = Asked((), 0)
+SECOND_START = 1.05  # by which every number is off there, up and down in turn
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,9 +167,8 @@ def _geometry(session: DriveSession, found: Kinematics | None) -> tuple[Array, A
 
 def offsets_of(session: DriveSession, theta: Array, fallback: Array | None) -> Array:
     """L / r where the angles are zero, (n,), at these numbers."""
-    nothing = Asked((), 0)
     if session.zero_pose is not None:
-        return zero_turns(session.model, theta, session.zero_pose, nothing)[0]
+        return zero_turns(session.model, theta, session.zero_pose, NOTHING)[0]
     if fallback is not None:
         return fallback
     raise ValueError(
@@ -183,7 +185,7 @@ def _possible(session: DriveSession, regression: Regression) -> Array:
 
 
 def _second_start(given: Premise, asked: Asked, first: Estimate) -> float:
-    """Largest difference of the minimum that is reached from numbers a tenth off."""
+    """Largest difference of the minimum that is reached from numbers 5 % off."""
     signs = np.where(np.arange(len(first.values)) % 2 == 0, SECOND_START, 1.0 / SECOND_START)
     away = asked.dynamic.put(given.model, first.theta, first.values * signs)
     other = estimate(replace(given, theta=away), asked.dynamic)
@@ -192,10 +194,9 @@ def _second_start(given: Premise, asked: Asked, first: Estimate) -> float:
 
 
 def predict(session: DriveSession, run: DriveRun, theta: Array, zero: Array) -> RunFit:
-    """The run from its first angles and its references alone."""
+    """The run from its start and its references alone; the start is told by its first 0.3 s."""
     model = session.model
-    pose = start_pose(model, theta, run, zero)
-    motion = simulated(model, theta, run, pose)
+    motion = simulated(model, theta, run, *_start(session, run, theta, zero))
     seen = compared(run, motion, zero, session.noise, None)
     gaps, angles = seen.angles * session.noise.angle_std_rad, run.record.angles_rad
     spread = np.sum((angles - angles.mean(axis=0)) ** 2, axis=0)
@@ -211,6 +212,25 @@ def predict(session: DriveSession, run: DriveRun, theta: Array, zero: Array) -> 
         ((asked < limits[:, 0]) | (asked > limits[:, 1])).sum(axis=0),
         motion,
     )
+
+
+def _start(session: DriveSession, run: DriveRun, theta: Array, zero: Array) -> tuple[Array, Array]:
+    """Pose and currents at the start, by the first angles and one step of least squares."""
+    model, rows = session.model, max(2, round(HEAD_S * run.rate_hz))
+    record = run.record
+    head = DriveRecord(*(getattr(record, name)[:rows] for name in DriveRecord.__slots__))
+    short = replace(run, record=head)
+    pose = start_pose(model, theta, run, zero)
+    seen = compared(short, simulated(model, theta, short, pose), zero, session.noise, NOTHING)
+    n_start = N_POSE + model.n_cables
+    columns = np.vstack(
+        [part.reshape(-1, n_start) for part in (seen.angle_slopes, seen.pose_slopes)]
+    )
+    gaps = np.concatenate([seen.angles.reshape(-1), seen.poses.reshape(-1)])
+    known = np.zeros(n_start)
+    known[N_POSE:] = session.noise.current_std_A**-2.0
+    shift = -np.linalg.solve(columns.T @ columns + np.diag(known), columns.T @ gaps)
+    return moved(pose, shift[:N_POSE]), record.currents_A[0] + shift[N_POSE:]
 
 
 def _declared(session: DriveSession, run: DriveRun, zero: Array) -> RunFit | None:

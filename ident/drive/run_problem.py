@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from freeswing.cdpr.driven.model import DrivenModel
 from freeswing.cdpr.driven.motion import DrivenMotion, simulate_driven
 from freeswing.cdpr.driven.record import DriveRecord, poses_at
-from freeswing.cdpr.driven.sensitivity import N_START, state_slopes
+from freeswing.cdpr.driven.sensitivity import N_POSE, state_slopes
 from freeswing.cdpr.driven.slopes import length_slope, turn_map
 from freeswing.cdpr.model.batch import evaluate
 from freeswing.ident.drive.direct_kinematics import poses_from_turns
@@ -47,24 +47,26 @@ class Noise:
         angle_std_rad: of an encoder reading.
         pose_std: of small translations and turns, (6,).
         latency_s: the pose in a row was true this much earlier.
+        current_std_A: of a measured current: of what flows at a run's start.
     """
 
     angle_std_rad: float
     pose_std: Array
     latency_s: float
+    current_std_A: float
 
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """A run beside its simulation.
+    """A run beside its simulation; a start is a pose's 6 and n currents: s = 6 + n.
 
     Attributes:
         motion: the simulation.
         angles: predicted less read, over their deviation, (n_t, n).
         poses: likewise of the rows with a pose, (n_p, 6).
         rows: those rows, (n_p,).
-        angle_slopes: (n_t, n, 6 + k), or None.
-        pose_slopes: (n_p, 6, 6 + k), or None.
+        angle_slopes: (n_t, n, s + k), or None.
+        pose_slopes: (n_p, 6, s + k), or None.
     """
 
     motion: DrivenMotion
@@ -75,17 +77,24 @@ class Seen:
     pose_slopes: Array | None
 
 
-def simulated(model: DrivenModel, theta: Array, run: DriveRun, start_pose: Array) -> DrivenMotion:
-    """The run's references again, from rest at a pose and the current that flowed there.
+def simulated(
+    model: DrivenModel,
+    theta: Array,
+    run: DriveRun,
+    start_pose: Array,
+    start_A: Array | None = None,
+) -> DrivenMotion:
+    """The run's references again, from rest at a pose and the currents that flowed there.
+
+    Without `start_A` those are the measured ones.
 
     Raises:
         ValueError: when the platform is lost.
     """
     state = np.concatenate([start_pose, np.zeros(6)])
     record = run.record
-    return simulate_driven(
-        model, state, record.references_A, run.rate_hz, theta, currents_A=record.currents_A[0]
-    )
+    first = record.currents_A[0] if start_A is None else start_A
+    return simulate_driven(model, state, record.references_A, run.rate_hz, theta, currents_A=first)
 
 
 def compared(
@@ -108,7 +117,7 @@ def compared(
         turns = evaluate(length_slope(motion.model), motion.poses, motion.theta)[0]
         gaps = (zero - turns - record.angles_rad) / noise.angle_std_rad
         return Seen(motion, gaps, pose_gaps, rows, None, None)
-    spread = _spread(asked)
+    spread = _spread(asked, motion.model.n_cables)
     states = state_slopes(motion, asked.members) @ spread
     turns, slopes = _turns(motion, asked, states)
     gaps = (zero - turns - record.angles_rad) / noise.angle_std_rad
@@ -117,18 +126,20 @@ def compared(
     return Seen(motion, gaps, pose_gaps, rows, -slopes / noise.angle_std_rad, by_pose)
 
 
-def _spread(asked: Asked) -> Array:
-    whole = np.zeros((N_START + len(asked.members), N_START + len(asked.groups)))
-    whole[:N_START, :N_START] = np.eye(N_START)
-    whole[N_START:, N_START:] = asked.spread
+def _spread(asked: Asked, n: int) -> Array:
+    """Which unknown moves which column of `state_slopes`: starts themselves, then the numbers."""
+    whole = np.zeros((N_POSE + n + len(asked.members), N_POSE + n + len(asked.groups)))
+    whole[: N_POSE + n, : N_POSE + n] = np.eye(N_POSE + n)
+    whole[N_POSE + n :, N_POSE + n :] = asked.spread
     return whole
 
 
 def _turns(motion: DrivenMotion, asked: Asked, states: Array) -> tuple[Array, Array]:
-    """L / r at every sample (n_t, n) and its slopes by start and unknowns (n_t, n, 6 + k)."""
+    """L / r at every sample (n_t, n) and its slopes by start and unknowns (n_t, n, s + k)."""
     found = evaluate(length_slope(motion.model, asked.members), motion.poses, motion.theta)
     slopes = found[1] @ states[:, :7]
-    slopes[..., N_START:] += found[2] @ asked.spread
+    if asked.members:
+        slopes[..., N_POSE + motion.model.n_cables :] += found[2] @ asked.spread
     return found[0], slopes
 
 
@@ -142,7 +153,7 @@ def _pose_gaps(true: Array, measured: Array) -> Array:
 
 
 def _tangents(motion: DrivenMotion, states: Array) -> Array:
-    """Slopes of poses as small translations and turns, (n_t, 6, 6 + k)."""
+    """Slopes of poses as small translations and turns, (n_t, 6, s + k)."""
     turns = 4.0 * np.swapaxes(turn_map(motion.states[:, 3:7]), -1, -2) @ states[:, 3:7]
     return np.concatenate([states[:, :3], turns], axis=1)
 

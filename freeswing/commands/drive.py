@@ -1,0 +1,113 @@
+"""Identify a driven robot: geometry, inertia, friction and springs, and check it on other runs."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from freeswing.commands.arguments import add_results
+from freeswing.console import Console
+
+if TYPE_CHECKING:
+    from freeswing.session.drive_session import DriveFile
+
+# Residuals of a right model are their noise: counts that stand still make 1.1 of it at most.
+MISFIT = 1.5
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """The session."""
+    parser.add_argument("session", metavar="SESSION", help="a session's folder or drive.toml")
+    add_results(parser, "SESSION/results")
+
+
+def run(options: Namespace, console: Console) -> None:
+    """Look the recordings over, estimate, write, say."""
+    from freeswing.session.drive_session import drive_path, read_drive_session
+
+    path = drive_path(options.session) or Path(options.session)
+    identify(read_drive_session(path, options.results), console)
+
+
+def examined(file: DriveFile) -> None:
+    """Refuse recordings with which any fit would be wrong.
+
+    Raises:
+        DataError: with every finding.
+    """
+    from freeswing.cdpr.files.documents import DataError
+    from freeswing.ident.drive.checks import findings
+
+    found = findings(file.session)
+    if found:
+        raise DataError("\n  ".join([f"{file.path}: {len(found)} to mend first", *found]))
+
+
+def identify(file: DriveFile, console: Console) -> Path:
+    """drive.json of a session.
+
+    Raises:
+        DataError: when the recordings cannot give a result.
+    """
+    from freeswing.cdpr.files.documents import DataError, write_json
+    from freeswing.ident.drive.identify import identify_drive
+    from freeswing.results.drive import drive_document
+
+    examined(file)
+    try:
+        found = identify_drive(file.session, console.progress)
+    except ValueError as error:
+        raise DataError(f"{file.path}: {error}") from error
+    document = drive_document(file.name, file.session, found)
+    result = file.results / "drive.json"
+    write_json(result, document)
+    _say(document, console)
+    console.say(str(result))
+    console.show_file(result)
+    return result
+
+
+def _say(document: dict[str, Any], console: Console) -> None:
+    for entry in document["estimates"]["joint"]["parameters"]:
+        if not entry["identifiable"]:
+            console.complain(
+                f"{entry['name']} is not determined by these recordings: no run excites it enough"
+            )
+            continue
+        bound = "  on a bound of the search: no estimate" if entry["on_bound"] else ""
+        share = 100.0 * entry["std"] / abs(entry["value"]) if entry["value"] else 0.0
+        console.say(
+            f"  {entry['name']:24} {entry['value']:12.6g}  +- {entry['std']:.2g} "
+            f"({share:.2g} %){bound}"
+        )
+    for fit in document["fit_percent"]:
+        mean = sum(fit["matlab"]) / len(fit["matlab"])
+        times = document["residual"]["times_noise"][fit["run"]]
+        console.say(
+            f"  {fit['run']} ({fit['role']}): FIT {mean:.2f} %, "
+            f"angles {times:.2f} times their noise"
+        )
+    _warn(document, console)
+
+
+def _warn(document: dict[str, Any], console: Console) -> None:
+    """FIT alone passes nothing: what is left over is said."""
+    for entry in document["slack"]:
+        console.complain(
+            f"run {entry['run']}: cables {', '.join(entry['cables'])} would have had to push at "
+            f"{entry['samples']} samples; slack is not in the model, and what follows may be wrong"
+        )
+    times = document["residual"]["times_noise"]
+    wrong = [f"{run} {value:.1f}" for run, value in times.items() if value > MISFIT]
+    if wrong:
+        console.complain(
+            f"the angles' residuals are above their noise (times: {', '.join(wrong)}): something "
+            "is missing in the model, and the deviations above do not count it; see diagnose"
+        )
+    apart = document["estimates"]["output_error"]["second_start_z"]
+    if apart > 1.0:
+        console.complain(
+            f"output error ends {apart:.1f} deviations elsewhere from a second start: another "
+            "minimum; do not trust its numbers"
+        )

@@ -1,0 +1,114 @@
+"""Recordings that must never be reported as a fit, through the command line."""
+
+import numpy as np
+import pytest
+
+from freeswing.ident.drive.checks import findings
+from freeswing.main import main
+from freeswing.session.drive_session import read_drive_session
+from tests.ident.drive.made_sessions import TOML, write_session
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    return write_session(tmp_path_factory.mktemp("made"), seed=40, seconds=1.2)
+
+
+def spoiled(made, tmp_path, run=None, static=None, toml=None):
+    """A copy with a table of one file changed by a function of (names, values)."""
+    for file in made.iterdir():
+        (tmp_path / file.name).write_bytes(file.read_bytes())
+    for name, change in (("ident.csv", run), ("static.csv", static)):
+        if change is not None:
+            rows = [row.split(",") for row in (made / name).read_text().splitlines()]
+            values = np.array([[float(c) if c else np.nan for c in row] for row in rows[1:]])
+            values = change(rows[0], values)
+            lines = [",".join(rows[0])]
+            lines += [",".join("" if np.isnan(v) else f"{v:.12g}" for v in row) for row in values]
+            (tmp_path / name).write_text("\n".join(lines))
+    if toml is not None:
+        (tmp_path / "drive.toml").write_text(TOML.replace(*toml, 1))
+    return tmp_path
+
+
+def scaled(prefix, factor):
+    def change(names, values):
+        columns = [k for k, name in enumerate(names) if name.startswith(prefix)]
+        values[:, columns] *= factor
+        return values
+
+    return change
+
+
+def swapped(names, values):
+    a, b = names.index("theta2_rad"), names.index("theta5_rad")
+    values[:, [a, b]] = values[:, [b, a]]
+    return values
+
+
+def jumping(_, values):
+    values[700:, 0] += 0.25
+    return values
+
+
+def cut(_, values):
+    values = values[400:]
+    values[:, 0] -= values[0, 0]
+    return values
+
+
+def moving(names, values):
+    values[4, names.index("theta3_rad")] += 0.2
+    return values
+
+
+def test_a_sound_session_has_no_finding(made):
+    assert findings(read_drive_session(made / "drive.toml").session) == []
+
+
+@pytest.mark.parametrize(
+    ("how", "words"),
+    [
+        ({"run": scaled("theta", 57.29578)}, ["run ident", "degrees? write rad"]),
+        ({"run": scaled("theta", 4096 / 6.2832)}, ["run ident", "counts? write rad"]),
+        ({"run": scaled("theta4", -1.0)}, ["run ident", "motor 4 falls where its cable is wound"]),
+        ({"run": scaled("I", 1000.0)}, ["run ident", "look like mA"]),
+        ({"run": swapped}, ["motors 2 and 5", "columns are swapped"]),
+        ({"run": jumping}, ["run ident", "time jumps by 0.251 s after 0.699 s"]),
+        ({"run": cut}, ["run ident", "starts in motion"]),
+        ({"run": scaled("theta", 1e-4)}, ["encoder steps: nothing is excited"]),
+        ({"static": moving}, ["static pose 5 contradicts the others"]),
+        ({"toml": ("pose_latency_s = 0.0107", "pose_latency_s = 0.03")},
+         ["10.", "ms before their rows", "says 30.0 ms"]),
+        ({"toml": ("sample_rate_hz = 1000", "sample_rate_hz = 500")},
+         ["time stamps are 0.001 s apart"]),
+    ],
+)  # fmt: skip
+def test_spoiled_recordings_end_with_1(made, tmp_path, capsys, how, words):
+    folder = spoiled(made, tmp_path, **how)
+    assert main(["drive", str(folder), "--quiet"]) == 1
+    said = capsys.readouterr().err
+    missing = [word for word in words if word not in said]
+    assert not missing, f"{missing} not in: {said}"
+    assert not (folder / "results").exists()
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (('role = "validate"', 'role = "identify"'), ['no run has role = "validate"']),
+        (('"Lx_m"', '"Lq_m"'), ["unknown.kinematic", "Lq_m", "Lx_m, Ly_m"]),
+        (('"mass_kg"', '"arm_m"'), ["unknown.dynamic", "it belongs to the other list"]),
+        (('"mass_kg"', '"mass_kg", "mass_kg"'), ["mass_kg is asked for twice"]),
+        (("[0, 0, 0], q", "[0, 0, 9], q"), ["outside the robot's frame"]),
+        (("q = [1, 0, 0, 0]", "q = [1, 1, 0, 0]"), ["encoder_zero.q"]),
+        (('file = "static.csv"', 'file = "../static.csv"'), ["leads out of"]),
+        (("encoder_step_rad", "encoder_steps_rad"), ["encoder_step_rad: missing", "unknown key"]),
+    ],
+)
+def test_a_wrong_session_ends_with_2(made, tmp_path, capsys, change, words):
+    folder = spoiled(made, tmp_path, toml=change)
+    assert main(["drive", str(folder), "--quiet"]) == 2
+    said = capsys.readouterr().err
+    missing = [word for word in words if word not in said]
+    assert not missing, f"{missing} not in: {said}"
