@@ -26,6 +26,7 @@ __all__ = [
     "dump_toml",
     "inside",
     "load_toml",
+    "plain_json",
     "read_bytes",
     "read_text",
     "replace_file",
@@ -103,7 +104,7 @@ def dump_toml(path: Path | str, table: Mapping[str, object]) -> None:
 
 def write_json(path: Path | str, table: Mapping[str, object]) -> None:
     """Write a JSON document; a number that is not finite becomes null. Replaced whole."""
-    text = json.dumps(_plain(table), indent=1, ensure_ascii=False, allow_nan=False)
+    text = json.dumps(plain_json(table), indent=1, ensure_ascii=False, allow_nan=False)
     replace_file(path, f"{text}\n".encode())
 
 
@@ -194,14 +195,14 @@ def _check_format(path: Path | str, found: object, kind: str) -> None:
         )
 
 
-def _plain(value: object) -> object:
+def plain_json(value: object) -> object:
     """Plain JSON values; numbers that are not finite become None."""
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, Mapping):
-        return {str(key): _plain(entry) for key, entry in value.items()}
+        return {str(key): plain_json(entry) for key, entry in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(entry) for entry in value]
+        return [plain_json(entry) for entry in value]
     return value

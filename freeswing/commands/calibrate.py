@@ -9,6 +9,7 @@ from freeswing.commands.arguments import add_session, open_session
 from freeswing.console import Console
 
 if TYPE_CHECKING:
+    from freeswing.results.codec import Document
     from freeswing.session.session_file import Session
     from freeswing.workers.crew import Crew
 
@@ -32,12 +33,13 @@ def run(options: Namespace, console: Console) -> None:
 
 def make(
     session: Session, console: Console, settings: dict[str, Any], crew: Crew
-) -> list[tuple[str, dict[str, Any]]]:
+) -> list[tuple[str, Document]]:
     """cameras.toml on disk, and calibration.json as a document."""
     from freeswing.calib.calibrate import calibrate_session
     from freeswing.cdpr.files.documents import InputError
     from freeswing.cdpr.files.robot_file import read_robot
     from freeswing.cdpr.robot import STANDARD_GRAVITY_M_S2
+    from freeswing.results.calibration import Calibration
 
     source = session.calibration
     if source is None or source.recordings is None or source.board is None:
@@ -57,13 +59,12 @@ def make(
         gravity_m_s2=gravity_m_s2,
         progress=console.progress,
     )
-    for entry in found.document["cameras"]:
-        console.say(
-            f"camera {entry['name']}: {entry['views']} views, {entry['reprojection_px']:.3f} px"
-        )
-    vertical = found.document.get("vertical")
-    if vertical and vertical["verdict"] == "agrees":  # anything else is among the warnings
-        console.say(vertical["sentence"])
-    for warning in found.document["verdict"]["warnings"]:
+    document = Calibration.from_json(found.document)
+    for entry in document.cameras:
+        console.say(f"camera {entry.name}: {entry.views} views, {entry.reprojection_px:.3f} px")
+    vertical = document.vertical
+    if vertical is not None and vertical.verdict == "agrees":  # else it is among the warnings
+        console.say(vertical.sentence)
+    for warning in document.verdict.warnings if document.verdict else ():
         console.complain(warning)
-    return [("calibration.json", found.document)]
+    return [("calibration.json", document)]

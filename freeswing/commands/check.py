@@ -17,12 +17,13 @@ def run(options: Namespace, console: Console) -> None:
     """Examine the session; fails where a finding keeps a command from a result."""
     from freeswing.cdpr.files.documents import DataError, write_json
     from freeswing.doctor.examine import examine
+    from freeswing.results.check import Check, Found
 
     session = open_session(options)
     findings = examine(session, console.progress)
     result = session.results / "check.json"
-    entries = [finding.entry() for finding in findings]
-    write_json(result, {"format": "freeswing-check/1", "findings": entries})
+    found = Check(findings=tuple(Found.from_json(finding.entry()) for finding in findings))
+    write_json(result, found.to_json())
     for finding in findings:
         console.say(finding.line())
     console.show_file(result)

@@ -9,6 +9,9 @@ from freeswing.commands.arguments import add_session, add_workers, crew_of, open
 from freeswing.console import Console
 
 if TYPE_CHECKING:
+    from freeswing.results.codec import Document
+    from freeswing.results.common import SeenDirection
+    from freeswing.results.diagnosis import Diagnosis
     from freeswing.session.session_file import Session
     from freeswing.workers.crew import Crew
 
@@ -38,13 +41,14 @@ def run(options: Namespace, console: Console) -> None:
 
 def make(
     session: Session, console: Console, settings: dict[str, Any], crew: Crew
-) -> list[tuple[str, dict[str, Any]]]:
+) -> list[tuple[str, Document]]:
     """diagnosis.json and diagnosis_motion.json as documents."""
     import os
 
     from freeswing.cdpr.effects import catalogue
     from freeswing.cdpr.files.documents import InputError
     from freeswing.ident.diagnose.diagnose import diagnose
+    from freeswing.results.diagnosis import Diagnosis
     from freeswing.results.motions import ladder_motions
     from freeswing.session.load_swings import load_robot, load_swings, load_target
 
@@ -57,44 +61,45 @@ def make(
     candidates = None if only is None else tuple(only)
     count = crew.processes or os.cpu_count() or 1
     found = diagnose(swings, robot, console.progress, count, candidates, crew.executor)
-    document = found.document()
+    document = Diagnosis.from_json(found.document())
     _summarise(document, console)
     return [("diagnosis.json", document), ("diagnosis_motion.json", ladder_motions(found.ladder))]
 
 
-def _summarise(document: dict[str, Any], console: Console) -> None:
-    from freeswing.report.answer import verdict
+def _summarise(document: Diagnosis, console: Console) -> None:
     from freeswing.report.material import Material
-    from freeswing.report.words import millimetres
+    from freeswing.report.panels.answer import verdict
+    from freeswing.report.words import millimetres, number, plain
 
-    for entry in document["accepted"]:
-        values = ", ".join(f"{p['name']} {p['value']:.4g}" for p in entry["parameters"])
-        console.say(f"  accepted: {entry['effect'].replace('_', ' ')} ({values})")
-        for sentence in seen_directions(entry.get("directions", [])):
+    for entry in document.accepted:
+        values = ", ".join(f"{p.name} {number(p.value, 4)}" for p in entry.parameters)
+        console.say(f"  accepted: {plain(entry.effect)} ({values})")
+        for sentence in seen_directions(entry.directions):
             console.say(f"    {sentence}")
     for sentence in verdict(Material("", diagnosis=document)):
         console.say(f"  {sentence}")
-    before, after = document["before"], document["after"]
-    console.say(
-        f"  held-out runs: off by {millimetres(before['prediction_rmse_m'])} before, "
-        f"{millimetres(after['prediction_rmse_m'])} after "
-        f"(noise floor {millimetres(after['noise_floor_m'])})"
-    )
+    before, after = document.before, document.after
+    if before is not None and after is not None:
+        console.say(
+            f"  held-out runs: off by {millimetres(before.prediction_rmse_m)} before, "
+            f"{millimetres(after.prediction_rmse_m)} after "
+            f"(noise floor {millimetres(after.noise_floor_m)})"
+        )
 
 
-def seen_directions(directions: list[dict[str, Any]]) -> list[str]:
+def seen_directions(directions: tuple[SeenDirection, ...]) -> list[str]:
     """Along which directions a displaced point is known best and worst, a sentence a point."""
-    points: dict[str, list[dict[str, Any]]] = {}
+    points: dict[str, list[SeenDirection]] = {}
     for one in directions:
-        points.setdefault(one["point"], []).append(one)
+        points.setdefault(one.point, []).append(one)
     return [
         f"{point}: known to {_along(ones[0])}, to {_along(ones[-1])}"
         for point, ones in points.items()
     ]
 
 
-def _along(one: dict[str, Any]) -> str:
+def _along(one: SeenDirection) -> str:
     from freeswing.report.words import millimetres
 
-    axis = ", ".join(f"{part:.2f}" for part in one["direction"])
-    return f"{millimetres(one['std_m'])} along ({axis})"
+    axis = ", ".join(f"{part:.2f}" for part in one.direction)
+    return f"{millimetres(one.std_m)} along ({axis})"

@@ -49,6 +49,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(options: Namespace, console: Console) -> None:
     """Plan, and say what the plan is worth."""
     from freeswing.excite.excite import ExcitationOptions, SwingLimits, excite
+    from freeswing.results.planning import Excitation
 
     path = Path(options.robot)
     limits = SwingLimits(tension_N=tuple(options.tension_n), reach_m=options.reach_m)
@@ -66,19 +67,19 @@ def run(options: Namespace, console: Console) -> None:
         seed=options.seed,
     )
     folder = path.parent / "results" if options.results is None else Path(options.results)
-    document = excite(path, asked, console.progress, folder)
-    console.say(f"conditioning cost C {document['cost_C']:.2f} (below 10 is good)")
-    random = document["random_plans"]
+    document = Excitation.from_json(excite(path, asked, console.progress, folder))
+    console.say(f"conditioning cost C {document.cost_C:.2f} (below 10 is good)")
+    random = document.random_plans
     if random:
         console.say(
-            f"{random['count']} random plans: median {random['quantiles']['50']:.2f}, best "
-            f"{random['quantiles']['0']:.2f}, {100 * random['share_below_10']:.0f} % below 10"
+            f"{random.count} random plans: median {random.quantiles['50']:.2f}, best "
+            f"{random.quantiles['0']:.2f}, {100 * random.share_below_10:.0f} % below 10"
         )
-    for count, entry in enumerate(document["equilibria"], start=1):
-        lengths = ", ".join(f"{value:.3f}" for value in entry["cable_lengths_m"])
-        low, high = entry["tension_range_N"]
-        winch = entry.get("winch_release", "")
-        told = "; by hand: no winch motion within the limits" if winch is None else ""
+    for count, entry in enumerate(document.equilibria, start=1):
+        lengths = ", ".join(f"{value:.3f}" for value in entry.cable_lengths_m)
+        low, high = entry.tension_range_N
+        by_hand = entry.winch_release is None
+        told = "; by hand: no winch motion within the limits" if by_hand else ""
         console.say(f"  {count:2}: lengths {lengths} m, tensions {low:.0f} to {high:.0f} N{told}")
     console.say(str(folder / "excitation.json"))
     console.show_file(folder / "excitation.json")

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
     from freeswing.cdpr.robot import Robot
     from freeswing.export.write_exports import Inertia
+    from freeswing.session.session_file import Session
 
 SUFFIXES = {"urdf": ".urdf", "mjcf": ".xml", "plain": ".json"}
 
@@ -41,10 +42,11 @@ def run(options: Namespace, console: Console) -> None:
         raise InputError("freeswing export: choose one of --urdf, --mjcf and --json")
     session = open_session(options)
     robot = load_robot(session)
+    _refuse_stale(session)
     inertia = _inertia(options, session.results, robot)
     path = session.results / f"platform{SUFFIXES[kind]}"
     if kind == "plain":
-        write_json(path, exports.plain(robot, inertia))
+        write_json(path, exports.plain(robot, inertia).to_json())
     else:
         text = getattr(exports, kind)(robot, inertia)
         replace_file(path, text.encode("utf-8"))
@@ -52,19 +54,31 @@ def run(options: Namespace, console: Console) -> None:
     console.show_file(path)
 
 
+def _refuse_stale(session: Session) -> None:
+    """What was found for another robot, or from other recordings, is not handed on."""
+    from freeswing.cdpr.files.documents import DataError
+    from freeswing.session.freshness import stale_results
+
+    used = ("identification.json", "diagnosis.json")
+    stale = [one.sentence() for one in stale_results(session) if one.file in used]
+    if stale:
+        raise DataError("; ".join(stale))
+
+
 def _inertia(options: Namespace, results: Path, robot: Robot) -> Inertia:
     from freeswing.cdpr.files.documents import DataError
     from freeswing.export.write_exports import inertia_from
-    from freeswing.report.material import ESTIMATE_ORDER, read_result
+    from freeswing.results.diagnosis import Diagnosis
+    from freeswing.results.files import read_document
+    from freeswing.results.identification import Identification
 
-    identification = read_result(results / "identification.json", "identification")
-    diagnosis = read_result(results / "diagnosis.json", "diagnosis")
-    estimates = identification.get("estimates") or {}
-    best = next((estimates[name] for name in ESTIMATE_ORDER if estimates.get(name)), None)
-    if best is None:
+    identification = read_document(results / "identification.json", Identification)
+    diagnosis = read_document(results / "diagnosis.json", Diagnosis)
+    if identification is None or identification.best is None:
         raise DataError(f"{results}: nothing is identified yet; run freeswing identify first")
-    rows = diagnosis.get("parameters_after") or best["parameters"]
-    values = {row["name"]: row["value"] for row in [*best["parameters"], *rows]}
+    best = identification.estimates[identification.best].parameters
+    rows = (diagnosis.parameters_after if diagnosis else ()) or best
+    values = {row.name: row.value for row in [*best, *rows] if row.value is not None}
     mass = options.mass_kg or values.get("mass_kg") or robot.platform.mass_kg
     if not mass or mass <= 0.0:
         raise DataError("swings alone do not tell the mass: give --mass-kg, or payload runs")

@@ -49,19 +49,20 @@ def run(options: Namespace, console: Console) -> None:
 
 def _home(path: Path, options: Namespace, console: Console) -> None:
     from freeswing.homing.home import home
+    from freeswing.results.planning import Homing
 
     beside = path if path.is_dir() else path.parent
     folder = beside / "results" if options.results is None else Path(options.results)
-    document = home(path, console.progress, folder)
-    pose, std = document["start_pose"], document["start_pose_std"]
+    document = Homing.from_json(home(path, console.progress, folder))
+    pose, std = document.start_pose, document.start_pose_std
     for key, unit, scale in (("position_m", "mm", 1e3), ("angles_rad", "mrad", 1e3)):
-        values = ", ".join(f"{scale * value:.3f}" for value in pose[key])
-        spread = ", ".join(f"{scale * value:.3f}" for value in std[key])
+        values = ", ".join(f"{scale * value:.3f}" for value in getattr(pose, key))
+        spread = ", ".join(f"{scale * value:.3f}" for value in getattr(std, key))
         console.say(f"{key.partition('_')[0]}: {values} {unit} (std {spread})")
-    for reading in document["suspect_readings"]:
-        console.say(f"suspect: row {reading['row']}, {reading['column']}")
-    ratio = document["chi_square_over_degrees"]
-    if document["noise"]["stated"] and ratio > 2:
+    for reading in document.suspect_readings:
+        console.say(f"suspect: row {reading.row}, {reading.column}")
+    ratio = document.chi_square_over_degrees
+    if document.noise.stated and ratio > 2:
         console.say(
             f"the readings differ {ratio:.1f} times more (in square) than their stated noise"
         )
@@ -72,19 +73,19 @@ def _home(path: Path, options: Namespace, console: Console) -> None:
 
 def _advise(path: Path, options: Namespace, console: Console) -> None:
     from freeswing.homing.swivel_advice import advise
+    from freeswing.results.planning import HomingAdvice
 
     folder = path.parent / "results" if options.results is None else Path(options.results)
-    document = advise(path, console.progress, folder)
-    for name in ("declared", "advised"):
-        quality = document[name]
+    document = HomingAdvice.from_json(advise(path, console.progress, folder))
+    for name, quality in (("declared", document.declared), ("advised", document.advised)):
         console.say(
-            f"{name}: start position to {1e3 * quality['position_std_m']:.2f} mm, "
-            f"conditioning {quality['conditioning']:.1f}"
+            f"{name}: start position to {1e3 * quality.position_std_m:.2f} mm, "
+            f"conditioning {quality.conditioning:.1f}"
         )
-    for cable in document["cables"]:
-        if cable["changed"]:
-            axis = ", ".join(f"{value:.3f}" for value in cable["swivel_z"])
-            console.say(f"cable {cable['name']}: swivel_z = [{axis}]")
+    for cable in document.cables:
+        if cable.changed:
+            axis = ", ".join(f"{value:.3f}" for value in cable.swivel_z)
+            console.say(f"cable {cable.name}: swivel_z = [{axis}]")
     result = folder / "homing-advice.json"
     console.say(str(result))
     console.show_file(result)

@@ -10,6 +10,8 @@ from freeswing.console import Console
 
 if TYPE_CHECKING:
     from freeswing.cdpr.robot import Robot
+    from freeswing.results.codec import Document
+    from freeswing.results.identification import Identification
     from freeswing.session.session_file import Session
     from freeswing.workers.crew import Crew
 
@@ -60,13 +62,14 @@ def run(options: Namespace, console: Console) -> None:
 
 def make(
     session: Session, console: Console, settings: dict[str, Any], crew: Crew
-) -> list[tuple[str, dict[str, Any]]]:
+) -> list[tuple[str, Document]]:
     """identification.json and motion.json as documents."""
     from freeswing.cdpr.files.documents import InputError
     from freeswing.doctor.markers import marker_findings
     from freeswing.ident.identify import IdentifySettings, identify
     from freeswing.ident.likelihood.cable_ends import GeometryPriors
     from freeswing.ident.swing_places import swing_places
+    from freeswing.results.identification import Identification
     from freeswing.results.markers import marker_document
     from freeswing.results.motions import predicted_motions
     from freeswing.session.load_bench import is_bench
@@ -91,47 +94,52 @@ def make(
         geometry=geometry,
     )
     found = identify(list(swings), robot, chosen, console.progress)
-    document = found.document()
-    document["swings"] = swing_places(robot, found)
-    document["entries_m"] = robot.entries_m.tolist()
-    document["markers"] = marker_document(markers)
-    document["notes"] += [f.sentence() for f in marker_findings(markers) if f.level == "warning"]
+    noted = [one.sentence() for one in marker_findings(markers) if one.level == "warning"]
+    told = found.document()
+    document = Identification.from_json(
+        {
+            **told,
+            "notes": [*told["notes"], *noted],
+            "swings": swing_places(robot, found),
+            "entries_m": robot.entries_m,
+            "markers": marker_document(markers),
+        }
+    )
     _summarise(document, found.best, console)
-    for sentence in found.estimates[found.best].notes:
+    for sentence in document.estimates[found.best].notes:
         console.say(f"  {sentence}")
     return [("identification.json", document), ("motion.json", predicted_motions(found))]
 
 
-def _make_bench(
-    session: Session, console: Console, robot: Robot
-) -> list[tuple[str, dict[str, Any]]]:
+def _make_bench(session: Session, console: Console, robot: Robot) -> list[tuple[str, Document]]:
     """The same of a bench: all its runs in one fit."""
     from freeswing.ident.bench.identify_bench import identify_bench
     from freeswing.report.bench_words import bench_lines
+    from freeswing.results.identification import Identification
+    from freeswing.results.motion import Motion
     from freeswing.session.load_bench import load_bench
     from freeswing.session.load_swings import load_target
 
-    document = identify_bench(load_bench(session, robot, load_target(session)), robot).document()
-    document["entries_m"] = robot.entries_m.tolist()
-    for line in bench_lines(document):
+    told = identify_bench(load_bench(session, robot, load_target(session)), robot).document()
+    for line in bench_lines(told):
         console.say(line)
-    motion = {"format": "freeswing-motion/1", "runs": []}
-    return [("identification.json", document), ("motion.json", motion)]
+    document = Identification.from_json({**told, "entries_m": robot.entries_m})
+    return [("identification.json", document), ("motion.json", Motion())]
 
 
-def _summarise(document: dict[str, Any], best: str, console: Console) -> None:
+def _summarise(document: Identification, best: str, console: Console) -> None:
     from freeswing.report.words import ESTIMATES, millimetres, number, parameter_row
 
     console.say(f"{ESTIMATES[best]}, ± 95 %")
-    for parameter in document["estimates"][best]["parameters"]:
+    for parameter in document.estimates[best].parameters:
         row = parameter_row(parameter)
         line = f"  {row['name']:6} {row['value']:>12} ± {row['half_width']:<10} {row['unit']}"
         console.say(f"{line}  {row['weak']}".rstrip())
-    for dropped in document["estimates"][best]["dropped_runs"]:
-        console.say(f"  run {dropped['run']} left out: {dropped['why']}")
-    for entry in document["validation"]:
-        error, floor = (millimetres(entry[k]) for k in ("prediction_rmse_m", "noise_floor_m"))
-        predicted = f"off by {error} (noise {floor}), " if entry["prediction_rmse_m"] else ""
-        console.say(f"  {entry['run']}: {predicted}sigma_perp {number(entry['sigma_perp'])}")
-    for note in document["notes"]:
+    for dropped in document.estimates[best].dropped_runs:
+        console.say(f"  run {dropped.run} left out: {dropped.why}")
+    for entry in document.validation:
+        error, floor = millimetres(entry.prediction_rmse_m), millimetres(entry.noise_floor_m)
+        predicted = f"off by {error} (noise {floor}), " if entry.prediction_rmse_m else ""
+        console.say(f"  {entry.run}: {predicted}sigma_perp {number(entry.sigma_perp)}")
+    for note in document.notes:
         console.say(f"  note: {note}")

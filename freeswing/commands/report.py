@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import json
 from argparse import ArgumentParser, Namespace
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,36 +11,94 @@ from freeswing.commands.arguments import add_session, open_session
 from freeswing.console import Console
 
 if TYPE_CHECKING:
+    from freeswing.cdpr.robot import Robot
+    from freeswing.report.material import Material
     from freeswing.session.session_file import Session
 
 
 def add_arguments(parser: ArgumentParser) -> None:
     """The session."""
     add_session(parser)
+    parser.add_argument("--open", action="store_true", help="show the page in a browser")
 
 
 def run(options: Namespace, console: Console) -> None:
-    """Render what results there are."""
-    page = write_report(open_session(options))
+    """Render what results there are; what is out of date or cannot be read is named."""
+    from freeswing.cdpr.files.documents import InputError
+
+    session = open_session(options)
+    page, material = write_report(session)
+    for warning in material.warnings:
+        console.complain(warning)
     console.say(str(page))
     console.say_json({"format": "freeswing-report/1", "page": str(page)})
+    if options.open:
+        open_page(page, console)
+    unreadable = [why for why in material.absent.values() if "not a result" in why]
+    if unreadable:
+        raise InputError("; ".join(dict.fromkeys(unreadable)))
 
 
-def write_report(session: Session) -> Path:
-    """Render the page; gives its path."""
+def write_report(
+    session: Session, failures: Mapping[str, str] | None = None
+) -> tuple[Path, Material]:
+    """Render the page; gives its path and what it was made of.
+
+    Args:
+        session: whose results are shown. Those that are out of date are named; where they do not
+            belong to what stands beside them they are left out.
+        failures: why stages came to no result just now, by the stage's name.
+    """
     from freeswing.report.material import read_material
     from freeswing.report.page import write_page
+    from freeswing.session.freshness import stale_results
 
+    stale = stale_results(session)
+    left_out = {one.file: f"{one.sentence()}. It is left out here." for one in stale if one.mixed}
+    kinds = {"calibrate": "calibration", "track": "tracking", "identify": "identification"}
+    kinds |= {"diagnose": "diagnosis"}
+    absent = {kinds[name]: why for name, why in (failures or {}).items()}
+    if not any(run.role == "validate" for run in session.runs):
+        absent.setdefault("diagnosis", NO_VALIDATION)
+    material = read_material(
+        session.name,
+        session.results,
+        robot=_robot(session),
+        folder=str(session.folder),
+        left_out=left_out,
+        absent=absent,
+        warnings=tuple(one.sentence() for one in stale if not one.mixed),
+    )
     page = session.results / "report.html"
-    notes = _findings(session.results / "check.json")
-    write_page(page, read_material(session.name, session.results, notes))
-    return page
+    write_page(page, material)
+    return page, material
 
 
-def _findings(path: Path) -> tuple[str, ...]:
-    """What `freeswing check` found, where it has been run."""
+NO_VALIDATION = (
+    'No run has role = "validate": missing effects are judged on runs that are never fitted, so '
+    "freeswing diagnose has nothing to judge by. Give a third of the runs that role."
+)
+
+
+def open_page(page: Path, console: Console) -> None:
+    """Show a page where there is a desktop."""
+    import os
+    import sys
+    import webbrowser
+
+    has_desktop = sys.platform in ("win32", "darwin") or bool(
+        os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    )
+    if not has_desktop or not webbrowser.open(page.resolve().as_uri()):
+        console.say("no desktop here: open the page yourself")
+
+
+def _robot(session: Session) -> Robot | None:
+    """The declared robot, for the drawing; None where its file cannot be read."""
+    from freeswing.cdpr.files.documents import InputError
+    from freeswing.session.load_swings import load_robot
+
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))["findings"]
-        return tuple(f"{one['level']} {one['subject']}: {one['text']}" for one in found)
-    except (OSError, ValueError, KeyError, TypeError):
-        return ()
+        return load_robot(session)
+    except InputError:
+        return None

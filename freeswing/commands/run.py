@@ -13,6 +13,9 @@ if TYPE_CHECKING:
     from freeswing.workers.crew import Crew
 
 
+NEEDED = ("calibrate", "track")  # without their results what follows cannot begin
+
+
 def add_arguments(parser: ArgumentParser) -> None:
     """The session."""
     add_session(parser)
@@ -28,16 +31,34 @@ def run(options: Namespace, console: Console) -> None:
 
 
 def run_session(session: Session, console: Console, crew: Crew) -> None:
-    """All steps of a session, then the report, whose path is said last."""
-    from freeswing.commands.report import write_report
-    from freeswing.session.stages import STAGES
+    """All steps of a session, then the report, whose path is said last.
 
+    Raises:
+        DataError: where a step came to no result; the report is written all the same and says so.
+    """
+    from freeswing.cdpr.files.documents import DataError
+    from freeswing.commands.report import NO_VALIDATION, write_report
+    from freeswing.session.stages import DIAGNOSE, STAGES
+
+    failures: dict[str, DataError] = {}
     for stage in STAGES:
         if not stage.due(session):
+            if stage is DIAGNOSE:
+                console.say(f"diagnose: left out. {NO_VALIDATION}")
             continue
         if stage.is_current(session):
             console.say(f"{stage.name}: up to date")
-        else:
-            console.say(f"{stage.name}:")
+            continue
+        console.say(f"{stage.name}:")
+        try:
             stage.take(session, console, crew=crew)
-    console.say(str(write_report(session)))
+        except DataError as failure:
+            failures[stage.name] = failure
+            if stage.name in NEEDED:
+                break
+    page, material = write_report(session, {name: str(one) for name, one in failures.items()})
+    for warning in material.warnings:
+        console.complain(warning)
+    console.say(str(page))
+    if failures:
+        raise DataError("\n  ".join(f"{name}: {why}" for name, why in failures.items()))

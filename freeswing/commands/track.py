@@ -11,6 +11,8 @@ from freeswing.commands.arguments import add_session, add_workers, crew_of, open
 from freeswing.console import Console
 
 if TYPE_CHECKING:
+    from freeswing.results.codec import Document
+    from freeswing.results.tracking import Tracking
     from freeswing.session.session_file import Session
     from freeswing.workers.crew import Crew
 
@@ -66,10 +68,11 @@ def run(options: Namespace, console: Console) -> None:
 
 def make(
     session: Session, console: Console, settings: dict[str, Any], crew: Crew
-) -> list[tuple[str, dict[str, Any]]]:
+) -> list[tuple[str, Document]]:
     """The tracks on disk, and tracking.json as a document."""
     from freeswing.calib.camera.cameras_file import read_cameras
     from freeswing.cdpr.files.documents import DataError, InputError
+    from freeswing.results.tracking import Tracking
     from freeswing.session.load_swings import load_target
     from freeswing.vision.settings import Settings
     from freeswing.vision.track_session import track_session
@@ -79,7 +82,7 @@ def make(
     target = load_target(session)
     if target is None:
         raise InputError(f"{session.path}: target: missing; it says what is on the platform")
-    document = track_session(
+    found = track_session(
         session.video_runs,
         read_cameras(session.cameras),
         target,
@@ -91,6 +94,7 @@ def make(
         executor=crew.executor,
         progress=console.progress,
     )
+    document = Tracking.from_json(found)
     _summarise(document, console)
     return [("tracking.json", document)]
 
@@ -140,15 +144,16 @@ def _write_clocks(session: Session, result: Path, console: Console) -> None:
         console.say(f"  {text}")
 
 
-def _summarise(document: dict[str, Any], console: Console) -> None:
-    for run in document["runs"]:
+def _summarise(document: Tracking, console: Console) -> None:
+    from freeswing.report.words import number, plain
+
+    for run in document.runs:
         console.say(
-            f"  {run['run']}: {run['known']} of {run['samples']} samples, "
-            f"{run['reprojection_px']:.3f} px, cameras agree to {run['consistency_mm']:.3f} mm"
+            f"  {run.run}: {run.known} of {run.samples} samples, "
+            f"{number(run.reprojection_px)} px, cameras agree to {number(run.consistency_mm)} mm"
         )
-        for problem in run["problems"]:
+        for problem in run.problems:
             console.say(f"    {problem}")
-    for effect in document["effects"]:
-        values = ", ".join(f"{p['name']} {p['value']:.4g}" for p in effect["parameters"])
-        where = f"{effect['run']} {effect['camera']}"
-        console.say(f"  {where}: {effect['effect'].replace('_', ' ')} removed ({values})")
+    for effect in document.effects:
+        values = ", ".join(f"{p.name} {number(p.value, 4)}" for p in effect.parameters)
+        console.say(f"  {effect.run} {effect.camera}: {plain(effect.effect)} removed ({values})")

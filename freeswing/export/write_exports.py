@@ -5,13 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 from xml.etree.ElementTree import Element, SubElement, fromstring, indent, tostring
 
 import numpy as np
 
 from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.robot import INERTIA_NAMES, Array, Robot
+from freeswing.results.platform import Platform
 
 _NOT_XML = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
@@ -97,15 +97,14 @@ def mjcf(robot: Robot, inertia: Inertia) -> str:
     return _text(root)
 
 
-def plain(robot: Robot, inertia: Inertia) -> dict[str, Any]:
+def plain(robot: Robot, inertia: Inertia) -> Platform:
     """The same numbers as a document."""
-    return {
-        "format": "freeswing-platform/1",
-        "robot": robot.name,
-        "mass_kg": inertia.mass_kg,
-        "com_m": inertia.com_m,
-        "inertia_about_com_kg_m2": inertia.tensor_kg_m2,
-    }
+    return Platform(
+        robot=robot.name,
+        mass_kg=inertia.mass_kg,
+        com_m=tuple(inertia.com_m.tolist()),
+        inertia_about_com_kg_m2=tuple(tuple(row) for row in inertia.tensor_kg_m2.tolist()),
+    )
 
 
 def _numbers(values: Array) -> str:

@@ -1,10 +1,15 @@
-"""Figures as inline SVG: one style, deterministic, drawn without a display."""
+"""Figures as inline SVG: one style, deterministic, drawn without a display.
+
+A figure is a row of small drawings that wrap, so that a phone shows them below each other at the
+size at which they can be read. Colours are names that the page's style gives a value, so that they
+turn with its dark mode; no colour stands alone: dashes, marks and hatching say the same.
+"""
 
 from __future__ import annotations
 
 import io
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import matplotlib as mpl
@@ -15,21 +20,31 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-INK, FAINT = "#1c2733", "#9aa7b3"
+INK, FAINT, GRID = "#1c2733", "#9aa7b3", "#e3e8ec"
 MEASURED, BEFORE, AFTER = "#1c2733", "#c8641b", "#1769aa"
 SERIES = ("#1769aa", "#c8641b", "#3b8a5a", "#8a4fa3", "#a08a1c", "#5b6b7a")
-MAX_POINTS = 1200
+MARKS = ("o", "s", "^", "D", "v", "P")
+DASHES = ("-", "--", "-.", ":")
+# The page's names of these colours, see templates/page.css.
+COLOURS = {INK: "ink", FAINT: "axis", GRID: "grid"} | {
+    colour: f"series-{k}" for k, colour in enumerate(SERIES)
+}
+MAX_POINTS = 700
+CELL_IN = 3.4  # width of one drawing; a phone's column shows it at about its own size
 _STYLE: Any = {
     "svg.fonttype": "none",
     "font.family": "sans-serif",
     "font.size": 9.0,
+    "figure.facecolor": "none",
+    "savefig.facecolor": "none",
+    "axes.facecolor": "none",
     "axes.edgecolor": FAINT,
     "axes.labelcolor": INK,
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.grid": True,
     "axes.axisbelow": True,
-    "grid.color": "#e3e8ec",
+    "grid.color": GRID,
     "grid.linewidth": 0.6,
     "text.color": INK,
     "text.parse_math": False,
@@ -39,16 +54,16 @@ _STYLE: Any = {
     "lines.linewidth": 1.2,
 }
 
+Draw = Callable[[Figure], None]
+
 
 def figure_style() -> dict[str, Any]:
     """The one style, for figures that are files of their own."""
     return dict(_STYLE)
 
 
-def figure(
-    draw: Callable[[Figure], None], width_in: float, height_in: float, caption: str
-) -> Markup:
-    """An SVG figure with its caption, which is also its description for screen readers.
+def figure(draw: Draw, width_in: float, height_in: float, caption: str) -> Markup:
+    """One drawing with its caption, which is also its description for screen readers.
 
     Args:
         draw: fills the empty figure.
@@ -56,15 +71,39 @@ def figure(
         height_in: drawing height in inches.
         caption: one sentence that says what is seen.
     """
-    with mpl.rc_context({**_STYLE, "svg.hashsalt": caption}):
-        sheet = Figure(figsize=(width_in, height_in), layout="constrained")
-        draw(sheet)
-        buffer = io.StringIO()
-        FigureCanvasSVG(sheet).print_svg(buffer, metadata={"Date": None, "Creator": None})
-    svg = _unique_ids(_only_svg(buffer.getvalue()), caption)
+    return figures([draw], height_in, caption, width_in)
+
+
+def figures(
+    draws: Sequence[Draw], height_in: float, caption: str, width_in: float = CELL_IN
+) -> Markup:
+    """Several drawings side by side, or below each other where the page is narrow."""
+    cells = [_svg(draw, width_in, height_in, f"{caption} {k}") for k, draw in enumerate(draws)]
+    kind = "one" if len(cells) == 1 else "many"
     return Markup(
-        '<figure role="img" aria-label="{0}">{1}<figcaption>{0}</figcaption></figure>'
-    ).format(escape(caption), Markup(svg))
+        '<figure class="{2}" role="img" aria-label="{0}"><div class="cells">{1}</div>'
+        "<figcaption>{0}</figcaption></figure>"
+    ).format(escape(caption), Markup("").join(cells), kind)
+
+
+def key(entries: Sequence[tuple[str, str, str]]) -> Draw:
+    """A drawing that explains lines: label, colour and dash (or mark) of each."""
+
+    def draw(sheet: Figure) -> None:
+        for label, colour, dash in entries:
+            style = {"ls": dash} if dash in DASHES else {"ls": "", "marker": dash, "ms": 5}
+            sheet.gca().plot([], [], color=colour, label=label, **style)
+        sheet.gca().set_axis_off()
+        sheet.legend(loc="center left", ncols=1, fontsize=9)
+
+    return draw
+
+
+def roomy(sheet: Figure) -> Axes:
+    """Axes with fixed margins for two labels: three times quicker than margins that are fitted."""
+    sheet.set_layout_engine("none")
+    sheet.subplots_adjust(left=0.2, right=0.98, bottom=0.26, top=0.96)
+    return sheet.subplots()
 
 
 def thin(values: np.ndarray, limit: int = MAX_POINTS) -> np.ndarray:
@@ -79,6 +118,18 @@ def plain_log_axes(axes: Axes) -> None:
         axis.set_major_locator(LogLocator(numticks=4))
         axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         axis.set_minor_formatter(NullFormatter())
+
+
+def _svg(draw: Draw, width_in: float, height_in: float, salt: str) -> Markup:
+    with mpl.rc_context({**_STYLE, "svg.hashsalt": salt}):
+        sheet = Figure(figsize=(width_in, height_in), layout="constrained")
+        draw(sheet)
+        buffer = io.StringIO()
+        FigureCanvasSVG(sheet).print_svg(buffer, metadata={"Date": None, "Creator": None})
+    svg = _unique_ids(_only_svg(buffer.getvalue()), salt)
+    for colour, name in COLOURS.items():
+        svg = svg.replace(colour, f"var(--{name})")
+    return Markup(svg)
 
 
 def _only_svg(text: str) -> str:

@@ -1,26 +1,37 @@
-"""What the report is made of: the result files of a session, as they stand."""
+"""What the report is made of: the results of a session, and why others are not there."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from freeswing.cdpr.files.documents import InputError
+from freeswing.cdpr.robot import Robot
+from freeswing.results.calibration import Calibration
+from freeswing.results.check import Check
+from freeswing.results.codec import Document
+from freeswing.results.diagnosis import Diagnosis
+from freeswing.results.files import read_document
+from freeswing.results.identification import Estimate, Identification
+from freeswing.results.motion import Motion
+from freeswing.results.tracking import Tracking
 
-RESULTS = ("calibration", "tracking", "identification", "diagnosis", "motion")
-FILES = {kind: (f"{kind}.json",) for kind in RESULTS} | {
-    "motion": ("diagnosis_motion.json", "motion.json")
+# Where each result stands, the first that is there taken.
+FILES: dict[str, tuple[type[Document], tuple[str, ...]]] = {
+    "calibration": (Calibration, ("calibration.json",)),
+    "tracking": (Tracking, ("tracking.json",)),
+    "identification": (Identification, ("identification.json",)),
+    "diagnosis": (Diagnosis, ("diagnosis.json",)),
+    "motion": (Motion, ("diagnosis_motion.json", "motion.json")),
+    "check": (Check, ("check.json",)),
 }
-ESTIMATE_ORDER = ("ml_full", "ml_free", "fidim_full", "fidim_free")
-Document = Mapping[str, Any]
+RESULTS = ("calibration", "tracking", "identification", "diagnosis", "motion")
 
 
 @dataclass(frozen=True, slots=True)
 class Material:
-    """The result documents of one session; an empty mapping where a file is absent.
+    """The results of one session; None where there is none to show.
 
     Attributes:
         title: the session's name.
@@ -30,55 +41,76 @@ class Material:
         diagnosis: `results/diagnosis.json`.
         motion: measured and predicted samples of the validation runs, by diagnosis
             (`results/diagnosis_motion.json`) or else by identification (`results/motion.json`).
-        notes: findings to show beside the results, such as those of `freeswing check`.
+        check: `results/check.json`.
+        robot: as declared, for the drawing.
+        folder: the session as a command line names it.
+        absent: why a result is not shown, by its kind.
+        warnings: what to know of the results as a whole.
     """
 
     title: str
-    calibration: Document = field(default_factory=dict)
-    tracking: Document = field(default_factory=dict)
-    identification: Document = field(default_factory=dict)
-    diagnosis: Document = field(default_factory=dict)
-    motion: Document = field(default_factory=dict)
-    notes: tuple[str, ...] = ()
+    calibration: Calibration | None = None
+    tracking: Tracking | None = None
+    identification: Identification | None = None
+    diagnosis: Diagnosis | None = None
+    motion: Motion | None = None
+    check: Check | None = None
+    robot: Robot | None = None
+    folder: str = "SESSION"
+    absent: Mapping[str, str] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
 
     @property
-    def estimates(self) -> dict[str, Document]:
+    def estimates(self) -> dict[str, Estimate]:
         """The estimates that are there, best first."""
-        given = self.identification.get("estimates") or {}
-        return {name: given[name] for name in ESTIMATE_ORDER if given.get(name)}
+        return {} if self.identification is None else self.identification.ranked
 
     @property
     def documents(self) -> dict[str, Document]:
         """The result documents that are there, by kind."""
-        return {name: document for name in RESULTS if (document := getattr(self, name))}
+        found = {name: getattr(self, name) for name in RESULTS}
+        return {name: one for name, one in found.items() if one is not None}
+
+    def why_absent(self, *kinds: str) -> str:
+        """Why results of these kinds are not shown; empty where nothing is known."""
+        return " ".join(dict.fromkeys(self.absent[kind] for kind in kinds if kind in self.absent))
 
 
-def read_material(title: str, results: Path, notes: tuple[str, ...] = ()) -> Material:
+def read_material(
+    title: str,
+    results: Path,
+    *,
+    robot: Robot | None = None,
+    folder: str = "SESSION",
+    left_out: Mapping[str, str] | None = None,
+    absent: Mapping[str, str] | None = None,
+    warnings: tuple[str, ...] = (),
+) -> Material:
     """The results found in the folder `results`.
 
-    Raises:
-        InputError: where a result file is not one that this version wrote.
+    Args:
+        title: the session's name.
+        results: the folder.
+        robot: as declared.
+        folder: the session as a command line names it.
+        left_out: files that are not to be shown, with the reason.
+        absent: why results that are not there could not be made, by kind.
+        warnings: what to know of the results as a whole.
     """
-    found = {
-        kind: next((one for name in names if (one := read_result(results / name, kind))), {})
-        for kind, names in FILES.items()
-    }
-    return Material(title, **found, notes=notes)
-
-
-def read_result(path: Path, kind: str) -> Document:
-    """A result file, or an empty mapping where there is none.
-
-    Raises:
-        InputError: where it is not JSON or its `format` is not `freeswing-<kind>/1`.
-    """
-    try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        return {}
-    except (OSError, ValueError, RecursionError) as failure:
-        raise InputError(f"{path}: cannot be read ({failure}); delete it and run again") from None
-    expected = f"freeswing-{kind}/1"
-    if not isinstance(document, dict) or document.get("format") != expected:
-        raise InputError(f"{path}: its format is not {expected}; delete it and run again")
-    return document
+    left_out = left_out or {}
+    found: dict[str, Document] = {}
+    why = dict(absent or {})
+    for kind, (cls, names) in FILES.items():
+        for name in names:
+            if name in left_out:
+                why[kind] = left_out[name]
+                continue
+            try:
+                document = read_document(results / name, cls)
+            except InputError as failure:
+                why[kind] = str(failure)
+                continue
+            if document is not None:
+                found[kind] = document
+                break
+    return Material(title, **found, robot=robot, folder=folder, absent=why, warnings=warnings)  # pyright: ignore[reportArgumentType]

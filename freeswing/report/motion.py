@@ -1,78 +1,101 @@
-"""Panel: measured and predicted motion, residuals and their spectra, before and after."""
+"""Measured and predicted motion, residuals and their spectra, before and after, of one run."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
+from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from freeswing.report.figures import AFTER, BEFORE, MEASURED, figure, plain_log_axes, thin
-from freeswing.report.material import Document, Material
+from freeswing.report.figures import (
+    AFTER,
+    BEFORE,
+    MEASURED,
+    Draw,
+    figures,
+    plain_log_axes,
+    roomy,
+    thin,
+)
 from freeswing.report.words import plain
+from freeswing.results.motion import RunMotion
 
-MAX_RUNS = 4
 _UNITS = {"x": ("mm", 1e3), "y": ("mm", 1e3), "z": ("mm", 1e3)}
 _ANGLE = ("mrad", 1e3)
+_LINES = {"before": (BEFORE, "--"), "after": (AFTER, "-")}
+HEIGHT_IN = 1.75
 
 
-class Motion:
-    """What was measured beside what the model predicts from the initial state alone."""
+def motion_figures(run: RunMotion) -> list[Markup]:
+    """A figure a coordinate: the motion, what the prediction leaves, and the spectrum of that."""
+    times = np.array(run.times_s, dtype=np.float64)
+    measured = _samples(run.measured)
+    rows = {"before": run.before, "after": run.after}
+    predictions = {key: _samples(one) for key, one in rows.items() if one}
+    found = []
+    for column, name in enumerate(run.coordinates):
+        unit, scale = _UNITS.get(name, _ANGLE)
+        series = {key: scale * values[:, column] for key, values in predictions.items()}
+        seen = scale * measured[:, column]
+        label = f"{plain(name)} ({unit})"
+        draws = [
+            _motion(times, seen, series, label),
+            _residual(times, seen, series, f"residual of {label}"),
+            _spectrum(times, seen, series, f"its amplitude ({unit})"),
+        ]
+        told = " and ".join(
+            {"before": "before (dashed, orange)", "after": "after (solid, blue)"}[key]
+            for key in series
+        )
+        caption = f"Run {run.run}, {plain(name)}: measured (dark) and predicted {told}."
+        found.append(figures(draws, HEIGHT_IN, caption))
+    return found
 
-    name = "motion"
-    title = "Measured and predicted motion"
 
-    def values(self, material: Material) -> dict[str, Any] | None:
-        """Figures for the first held-out runs; the others are counted."""
-        runs = list(material.motion.get("runs") or [])
-        if not runs:
-            return None
-        return {
-            "figures": [run_figure(run) for run in runs[:MAX_RUNS]],
-            "shown": min(len(runs), MAX_RUNS),
-            "total": len(runs),
-        }
-
-
-def run_figure(run: Document) -> object:
-    """Motion, residual and its spectrum for each coordinate of one run."""
-    times = np.array(run["times_s"], dtype=np.float64)
-    measured = _samples(run["measured"])
-    predictions = {key: _samples(run[key]) for key in ("before", "after") if run.get(key)}
-    coordinates = [str(name) for name in run["coordinates"]]
-
+def _motion(
+    times: np.ndarray, measured: np.ndarray, series: dict[str, np.ndarray], label: str
+) -> Draw:
     def draw(sheet: Figure) -> None:
-        grid = sheet.subplots(len(coordinates), 3, squeeze=False, width_ratios=[2, 2, 1.3])
-        for row, name in enumerate(coordinates):
-            unit, scale = _UNITS.get(name, _ANGLE)
-            series = {key: scale * values[:, row] for key, values in predictions.items()}
-            _draw_row(list(grid[row]), times, scale * measured[:, row], series)
-            grid[row][0].set_ylabel(f"{plain(name)} ({unit})")
-        for axes in grid[:, 2]:
-            plain_log_axes(axes)
-        for axes, title in zip(grid[0], ("motion", "residual", "its spectrum"), strict=True):
-            axes.set_title(title, fontsize=9, loc="left")
-        grid[-1][0].set_xlabel("time (s)")
-        grid[-1][1].set_xlabel("time (s)")
-        grid[-1][2].set_xlabel("frequency (Hz)")
-        handles, labels = grid[0][0].get_legend_handles_labels()
-        sheet.legend(handles, labels, loc="outside lower left", ncols=3, fontsize=8)
+        axes = roomy(sheet)
+        axes.plot(thin(times), thin(measured), color=MEASURED, lw=1.6)
+        for key, predicted in series.items():
+            colour, dash = _LINES[key]
+            axes.plot(thin(times), thin(predicted), color=colour, ls=dash, lw=0.9)
+        axes.set_xlabel("time (s)")
+        axes.set_ylabel(label)
 
-    caption = f"Run {run['run']}: measured (dark), predicted before (orange) and after (blue)."
-    return figure(draw, 8.0, 0.9 + 1.35 * len(coordinates), caption)
+    return draw
 
 
-def _draw_row(
-    axes: list[Any], times: np.ndarray, measured: np.ndarray, series: dict[str, np.ndarray]
-) -> None:
-    colours = {"before": BEFORE, "after": AFTER}
-    axes[0].plot(thin(times), thin(measured), color=MEASURED, label="measured")
-    for key, predicted in series.items():
-        residual = measured - predicted
-        axes[0].plot(thin(times), thin(predicted), color=colours[key], lw=0.9, label=key)
-        axes[1].plot(thin(times), thin(residual), color=colours[key], lw=0.9)
-        frequencies, amplitudes = amplitude_spectrum(times, residual)
-        axes[2].loglog(frequencies, amplitudes, color=colours[key], lw=0.9)
+def _residual(
+    times: np.ndarray, measured: np.ndarray, series: dict[str, np.ndarray], label: str
+) -> Draw:
+    def draw(sheet: Figure) -> None:
+        axes = roomy(sheet)
+        for key, predicted in series.items():
+            colour, dash = _LINES[key]
+            axes.plot(thin(times), thin(measured - predicted), color=colour, ls=dash, lw=0.9)
+        axes.set_xlabel("time (s)")
+        axes.set_ylabel(label)
+
+    return draw
+
+
+def _spectrum(
+    times: np.ndarray, measured: np.ndarray, series: dict[str, np.ndarray], label: str
+) -> Draw:
+    def draw(sheet: Figure) -> None:
+        axes = roomy(sheet)
+        for key, predicted in series.items():
+            colour, dash = _LINES[key]
+            frequencies, amplitudes = amplitude_spectrum(times, measured - predicted)
+            axes.loglog(frequencies, amplitudes, color=colour, ls=dash, lw=0.9)
+        plain_log_axes(axes)
+        axes.set_xlabel("frequency (Hz)")
+        axes.set_ylabel(label)
+
+    return draw
 
 
 def _samples(rows: Any) -> np.ndarray:

@@ -10,18 +10,28 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, UndefinedError
 from markupsafe import Markup
 
 from freeswing.cdpr.files.documents import InputError, replace_file
-from freeswing.report.answer import Answer
-from freeswing.report.cameras import Cameras
-from freeswing.report.dropped import Dropped
-from freeswing.report.free_full import FreeAgainstFull
-from freeswing.report.ladder import EffectLadder
-from freeswing.report.markers import Markers
 from freeswing.report.material import Material
-from freeswing.report.motion import Motion
-from freeswing.report.provenance import Provenance
-from freeswing.report.sigma import SigmaByRun
-from freeswing.report.swings import Swings
+from freeswing.report.panels.advice import Advice
+from freeswing.report.panels.answer import Answer
+from freeswing.report.panels.cameras import Cameras
+from freeswing.report.panels.change import Change
+from freeswing.report.panels.dropped import Dropped
+from freeswing.report.panels.ladder import EffectLadder
+from freeswing.report.panels.markers import Markers
+from freeswing.report.panels.provenance import Provenance
+from freeswing.report.panels.sure import HowSure
+from freeswing.report.panels.swings import Swings
+from freeswing.report.tables import csv_tables
 
+# The results that a section is made of, to say why it lacks something.
+MADE_OF = {
+    "answer": ("identification",),
+    "sure": ("identification",),
+    "ladder": ("diagnosis",),
+    "change": ("diagnosis", "motion"),
+    "swings": ("identification",),
+    "cameras": ("calibration", "tracking"),
+}
 # What numbers, tables and texts in each other's place lead to.
 ODD_VALUES = (TypeError, ValueError, LookupError, AttributeError, ArithmeticError)
 
@@ -39,10 +49,10 @@ class Panel(Protocol):
 
 PANELS: tuple[Panel, ...] = (
     Answer(),
+    HowSure(),
     EffectLadder(),
-    FreeAgainstFull(),
-    SigmaByRun(),
-    Motion(),
+    Change(),
+    Advice(),
     Swings(),
     Cameras(),
     Markers(),
@@ -67,16 +77,20 @@ def render_page(material: Material) -> str:
     sections = [_section(environment, panel, material) for panel in PANELS]
     style = (files("freeswing.report") / "templates" / "page.css").read_text(encoding="utf-8")
     page = environment.get_template("page.html")
-    return page.render(title=material.title, sections=sections, style=Markup(style))
+    return page.render(
+        title=material.title, sections=sections, style=Markup(style), warnings=material.warnings
+    )
 
 
 def write_page(path: Path, material: Material) -> None:
-    """Render the report and put it in the place of an older one."""
+    """Render the report and put it in the place of an older one, its tables as CSV beside it."""
+    for name, rows in csv_tables(material).items():
+        replace_file(path.with_name(name), rows.encode("utf-8"))
     replace_file(path, render_page(material).encode("utf-8"))
 
 
 def _section(environment: Environment, panel: Panel, material: Material) -> dict[str, Any]:
-    """One section; its body is None where there is nothing to show."""
+    """One section; its body is None where there is nothing to show, and then it says why."""
     try:
         values = panel.values(material)
         body = None
@@ -88,4 +102,5 @@ def _section(environment: Environment, panel: Panel, material: Material) -> dict
             f"the report's section {panel.title!r}: a result is not as this version writes it "
             f"({kind}: {str(failure)[:200]}); delete the results' .json files and run again"
         ) from failure
-    return {"name": panel.name, "title": panel.title, "body": body}
+    why = material.why_absent(*MADE_OF.get(panel.name, ()))
+    return {"name": panel.name, "title": panel.title, "body": body, "why": why}

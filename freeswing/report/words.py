@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any
+
+from freeswing.results.common import Parameter
 
 ESTIMATES = {
     "ml_full": "maximum likelihood, full poses",
@@ -12,7 +12,23 @@ ESTIMATES = {
     "fidim_full": "FIDIM (total least squares), full poses",
     "fidim_free": "FIDIM (total least squares), free coordinates",
 }
-_SCALES = {"m": (1e3, "mm"), "m2": (1e3, "10⁻³ m²"), "kg": (1.0, "kg"), "rad": (1e3, "mrad")}
+# Suffixes of names, the longest first: scale to the readable unit, and that unit.
+_UNITS = {
+    "kg_m2": (1e3, "10⁻³ kg m²"),
+    "m_s2": (1.0, "m/s²"),
+    "rad_s": (1.0, "rad/s"),
+    "1_m": (1.0, "1/m"),
+    "1_s": (1.0, "1/s"),
+    "m2": (1e3, "10⁻³ m²"),
+    "N_kg": (1.0, "N/kg"),
+    "m": (1e3, "mm"),
+    "kg": (1.0, "kg"),
+    "rad": (1e3, "mrad"),
+    "s": (1e3, "ms"),
+    "hz": (1.0, "Hz"),
+    "N": (1.0, "N"),
+    "fraction": (100.0, "%"),
+}
 HALF_WIDTH_95 = 1.959964
 
 
@@ -38,22 +54,40 @@ def millimetres(value_m: object, digits: int = 3) -> str:
     return f"{number(value_m * 1e3, digits)} mm"
 
 
-def parameter_row(parameter: Mapping[str, Any]) -> dict[str, str]:
+def unit_of(name: str) -> tuple[str, float, str]:
+    """A parameter's name without its unit, the scale to the readable unit, and that unit."""
+    for suffix, (scale, unit) in _UNITS.items():
+        if name.endswith(f"_{suffix}"):
+            return name.removesuffix(f"_{suffix}"), scale, unit
+    return name, 1.0, ""
+
+
+def parameter_row(parameter: Parameter) -> dict[str, str]:
     """One parameter in a readable unit with its 95 % interval, digits following the interval."""
-    stem, _, suffix = str(parameter["name"]).rpartition("_")
-    scale, unit = _SCALES.get(suffix, (1.0, suffix.replace("_", " ")))
-    name = stem if suffix in _SCALES else str(parameter["name"])
-    value, std = _scaled(parameter.get("value"), scale), _scaled(parameter.get("std"), scale)
+    stem, scale, unit = unit_of(parameter.name)
+    value, std = _scaled(parameter.value, scale), _scaled(parameter.std, scale)
+    percent = getattr(parameter, "std_percent", None)
+    percent = _percent(value, std) if percent is None else percent
     return {
-        "name": plain(name),
-        "key": str(parameter["name"]),
-        "value": _with_decimals(value, std),
-        "half_width": _with_decimals(None if std is None else HALF_WIDTH_95 * std, std),
+        "name": plain(stem),
+        "key": parameter.name,
+        "value": with_decimals(value, std),
+        "half_width": with_decimals(None if std is None else HALF_WIDTH_95 * std, std),
         "unit": unit,
-        "std_percent": number(parameter.get("std_percent", _percent(value, std)), 2),
-        "raw": "" if parameter.get("value") is None else repr(parameter["value"]),
-        "weak": "" if parameter.get("essential", True) else "not essential",
+        "percent": number(None if percent is None else HALF_WIDTH_95 * percent, 2),
+        "raw": "" if parameter.value is None else repr(parameter.value),
+        "weak": "" if getattr(parameter, "essential", True) else "not essential",
     }
+
+
+def with_decimals(value: float | None, std: float | None) -> str:
+    """A number with as many decimals as its standard deviation asks for."""
+    if value is None:
+        return "–"
+    if not std or std < 0:
+        return number(value, 5)
+    decimals = min(max(1 - math.floor(math.log10(std)), 0), 9)
+    return f"{value:.{decimals}f}"
 
 
 def _percent(value: float | None, std: float | None) -> float | None:
@@ -65,12 +99,3 @@ def _scaled(value: object, scale: float) -> float | None:
     if not isinstance(value, int | float) or isinstance(value, bool) or not math.isfinite(value):
         return None
     return value * scale
-
-
-def _with_decimals(value: float | None, std: float | None) -> str:
-    if value is None:
-        return "–"
-    if not std or std < 0:
-        return number(value, 5)
-    decimals = min(max(1 - math.floor(math.log10(std)), 0), 9)
-    return f"{value:.{decimals}f}"

@@ -1,4 +1,4 @@
-"""Measured beside predicted samples of the held-out runs, for the report and for plots."""
+"""What motion.json and diagnosis_motion.json hold, from the results of identify and diagnose."""
 
 from __future__ import annotations
 
@@ -8,17 +8,18 @@ from typing import Any
 from freeswing.ident.diagnose.diagnose import Rung
 from freeswing.ident.identify import Identification
 from freeswing.ident.judge.prediction import Prediction
+from freeswing.results.motion import Motion, RunMotion
 
 MOST_RUNS = 8
 
 
-def predicted_motions(found: Identification) -> dict[str, Any]:
-    """`motion.json`: the first held-out runs, samples in m and rad."""
+def predicted_motions(found: Identification) -> Motion:
+    """`motion.json`: the first held-out runs."""
     entries = [_entry(run.prediction) for run in found.validation if run.prediction is not None]
-    return {"format": "freeswing-motion/1", "runs": entries[:MOST_RUNS]}
+    return Motion(runs=tuple(RunMotion.from_json(one) for one in entries[:MOST_RUNS]))
 
 
-def ladder_motions(ladder: Sequence[Rung]) -> dict[str, Any]:
+def ladder_motions(ladder: Sequence[Rung]) -> Motion:
     """`diagnosis_motion.json`: the same before the first effect and after the last."""
     after = {run.run: run.prediction for run in ladder[-1].held_out.runs}
     entries = []
@@ -30,14 +31,14 @@ def ladder_motions(ladder: Sequence[Rung]) -> dict[str, Any]:
         if len(ladder) > 1 and last is not None:
             entry["after"] = last.predicted
         entries.append(entry)
-    return {"format": "freeswing-motion/1", "runs": entries[:MOST_RUNS]}
+    return Motion(runs=tuple(RunMotion.from_json(one) for one in entries[:MOST_RUNS]))
 
 
 def _entry(prediction: Prediction) -> dict[str, Any]:
     return {
         "run": prediction.run,
         "role": "validate",
-        "times_s": prediction.times_s.tolist(),
+        "times_s": prediction.times_s,
         "coordinates": list(prediction.coordinates),
         "measured": prediction.measured,
         "before": prediction.predicted,

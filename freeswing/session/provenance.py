@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from freeswing import __version__
+from freeswing.results.files import read_provenance
 from freeswing.session.session_file import Session
 
 PACKAGES = ("numpy", "scipy", "casadi", "opencv-contrib-python-headless", "av", "ezc3d")
@@ -38,16 +39,29 @@ def provenance(
 
 
 def is_current(
-    result: Path, session: Session, inputs: Iterable[Path], settings: Mapping[str, Any]
+    result: Path,
+    session: Session,
+    inputs: Iterable[Path],
+    settings: Mapping[str, Any],
+    outputs: Iterable[Path] = (),
 ) -> bool:
-    """Whether `result` was made by this version from these very inputs and settings."""
+    """Whether `result` was made by this version from these very inputs and settings.
+
+    Args:
+        result: the stage's main file.
+        session: where inputs and outputs are named from.
+        inputs: what it reads.
+        settings: those that it would be made with now.
+        outputs: the stage's other files; each has to be there as it was written.
+    """
+    made = read_provenance(result)
     try:
-        made = json.loads(result.read_text(encoding="utf-8"))["provenance"]
         same_version = made["versions"]["freeswing"] == __version__
         if not same_version or made["settings"] != json.loads(json.dumps(dict(settings))):
             return False
-        return made["inputs"] == hashes(session, inputs)
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        intact = dict(made.get("outputs", {})) == hashes(session, outputs)
+        return intact and made["inputs"] == hashes(session, inputs)
+    except (OSError, ValueError, KeyError, TypeError):
         return False
 
 

@@ -11,12 +11,13 @@ from typing import Any
 
 from freeswing.cdpr.files.documents import write_json
 from freeswing.console import Console
+from freeswing.results.codec import Document
 from freeswing.session.load_swings import trajectory_path
-from freeswing.session.provenance import is_current, provenance
+from freeswing.session.provenance import hashes, is_current, provenance
 from freeswing.session.session_file import Session
 from freeswing.workers.crew import Crew
 
-Documents = list[tuple[str, dict[str, Any]]]
+Documents = list[tuple[str, Document]]
 Make = Callable[[Session, Console, dict[str, Any], Crew], Documents]
 
 
@@ -31,6 +32,8 @@ class Stage:
         inputs: what it reads.
         due: whether a session needs it at all.
         settings: those that `freeswing run` uses.
+        others: its files beside the main one, which have to be there as they were written.
+        whole: whether what it leaves for a person to edit is there and can be read.
     """
 
     name: str
@@ -38,11 +41,14 @@ class Stage:
     inputs: Callable[[Session], list[Path]]
     due: Callable[[Session], bool]
     settings: dict[str, Any] = field(default_factory=dict)
+    others: Callable[[Session], list[Path]] = lambda session: []
+    whole: Callable[[Session], bool] = lambda session: True
 
     def is_current(self, session: Session) -> bool:
-        """Whether the result is there and made from what is there now."""
-        result = session.results / self.result
-        return is_current(result, session, self.inputs(session), self.settings)
+        """Whether all its files are there, whole, and made from what is there now."""
+        result, others = session.results / self.result, self.others(session)
+        made_of = self.inputs(session), self.settings, others
+        return is_current(result, session, *made_of) and self.whole(session)
 
     def take(
         self,
@@ -60,8 +66,12 @@ class Stage:
         made_of = provenance(session, self.inputs(session), chosen)
         make: Make = importlib.import_module(f"freeswing.commands.{self.name}").make
         documents = make(session, console, chosen, crew or Crew())
-        for name, document in reversed(documents):
-            write_json(session.results / name, {**document, "provenance": made_of})
+        main, *beside = documents
+        for name, document in reversed(beside):
+            write_json(session.results / name, document.made_of(made_of).to_json())
+        if others := hashes(session, self.others(session)):
+            made_of = {**made_of, "outputs": others}
+        write_json(session.results / main[0], main[1].made_of(made_of).to_json())
         return session.results / self.result
 
 
@@ -96,6 +106,25 @@ def _motion_files(session: Session) -> list[Path]:
     return [*_robot_files(session), *tracks, *tracking]
 
 
+def _tracks(session: Session) -> list[Path]:
+    return [trajectory_path(session, run) for run in session.video_runs]
+
+
+def _has_its_cameras(session: Session) -> bool:
+    """cameras.toml may be edited by hand; gone, cut short or emptied it is made again."""
+    from freeswing.calib.camera.cameras_file import read_cameras
+    from freeswing.cdpr.files.documents import InputError
+    from freeswing.results.calibration import Calibration
+    from freeswing.results.files import read_document
+
+    try:
+        made = read_document(session.results / "calibration.json", Calibration)
+        known = {camera.name for camera in read_cameras(session.cameras)}
+    except InputError:
+        return False
+    return made is not None and {camera.name for camera in made.cameras} <= known
+
+
 def _needs_calibration(session: Session) -> bool:
     """Cameras that came from elsewhere are not calibrated again."""
     source = session.calibration
@@ -112,6 +141,7 @@ CALIBRATE = Stage(
     _calibration_files,
     _needs_calibration,
     {"model": "OPENCV"},
+    whole=_has_its_cameras,
 )
 TRACK = Stage(
     "track",
@@ -119,6 +149,7 @@ TRACK = Stage(
     _tracking_files,
     lambda session: bool(session.video_runs),
     {"correct_rig": True, "refine_layout": False},
+    _tracks,
 )
 IDENTIFY = Stage(
     "identify",
@@ -126,6 +157,7 @@ IDENTIFY = Stage(
     _motion_files,
     lambda session: True,
     {"weighting": "published", "likelihood": True},
+    lambda session: [session.results / "motion.json"],
 )
 DIAGNOSE = Stage(
     "diagnose",
@@ -133,5 +165,6 @@ DIAGNOSE = Stage(
     _motion_files,
     lambda session: any(run.role == "validate" for run in session.runs),
     {"only": None},
+    lambda session: [session.results / "diagnosis_motion.json"],
 )
 STAGES = (CALIBRATE, TRACK, IDENTIFY, DIAGNOSE)

@@ -39,7 +39,7 @@ from freeswing.report.material import read_material
 from freeswing.report.page import render_page
 from freeswing.vision.fuse.calibration_share import read_calibration_noise
 from tests.freeswing.hostile_files import broken
-from tests.freeswing.report_material import whole_material
+from tests.freeswing.report.report_material import whole_material
 from tests.places import SAMPLES
 
 EXAMPLES = settings(
@@ -267,7 +267,7 @@ def test_results_that_the_report_reads(tmp_path: Path, data: st.DataObject) -> N
     shutil.rmtree(results, ignore_errors=True)
     results.mkdir()
     for kind in ("calibration", "tracking", "identification", "diagnosis"):
-        document = json.loads(json.dumps(getattr(material, kind)))
+        document = json.loads(json.dumps(getattr(material, kind).to_json()))
         for _ in range(data.draw(st.integers(0, 2))):
             _replace_somewhere(document, data)
         (results / f"{kind}.json").write_text(json.dumps(document), encoding="utf-8")

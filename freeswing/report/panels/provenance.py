@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from freeswing.report.material import Document, Material
+from freeswing.report.material import Material
+from freeswing.results.codec import Table
 
 
 class Provenance:
@@ -16,14 +17,14 @@ class Provenance:
     def values(self, material: Material) -> dict[str, Any] | None:
         """Settings, versions and input hashes of each result file."""
         results = [
-            _result(kind, document["provenance"])
+            _result(kind, document.provenance)
             for kind, document in material.documents.items()
-            if document.get("provenance")
+            if document.provenance
         ]
         return {"results": results} if results else None
 
 
-def _result(kind: str, provenance: Document) -> dict[str, Any]:
+def _result(kind: str, provenance: Table) -> dict[str, Any]:
     seconds = provenance.get("seconds")
     return {
         "kind": kind,
@@ -32,8 +33,9 @@ def _result(kind: str, provenance: Document) -> dict[str, Any]:
         "versions": _pairs(provenance.get("versions")),
         "settings": _pairs(provenance.get("settings")),
         "inputs": _pairs(provenance.get("inputs")),
+        "outputs": _pairs(provenance.get("outputs")),
     }
 
 
-def _pairs(mapping: Document | None) -> list[tuple[str, str]]:
+def _pairs(mapping: Table | None) -> list[tuple[str, str]]:
     return [(str(key), str(value)) for key, value in (mapping or {}).items()]

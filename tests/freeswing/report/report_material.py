@@ -8,6 +8,13 @@ import numpy as np
 
 from freeswing.cdpr.robot import INERTIA_NAMES
 from freeswing.report.material import Material
+from freeswing.results.calibration import Calibration
+from freeswing.results.check import Check, Found
+from freeswing.results.diagnosis import Diagnosis
+from freeswing.results.identification import Identification
+from freeswing.results.motion import Motion
+from freeswing.results.tracking import Tracking
+from tests.oracle.robots import declared_robot
 
 VALUES = (0.0016, -0.0025, 0.2, 0.0563, 0.0627, 0.0322, 1e-4, -3e-4, 2e-4)
 HOSTILE = "<script>alert('x')</script> & \"quotes\""
@@ -19,28 +26,35 @@ def whole_material(title: str = "lab-day-1") -> Material:
     kinds = {"fidim_free": 2.0, "fidim_full": 1.5, "ml_free": 0.2, "ml_full": 0.1}
     return Material(
         title,
-        calibration=_calibration(),
-        tracking=_tracking(),
-        identification={
-            "format": "freeswing-identification/1",
-            "estimates": {name: _estimate(spread, rng) for name, spread in kinds.items()},
-            "comparison": {
-                kind: [{"name": n, "difference_percent": 1.2, "z": 0.4} for n in INERTIA_NAMES]
-                for kind in ("fidim", "ml")
-            },
-            "validation": [_validation(f"check-{k:02d}", rng) for k in range(8)],
-            "swings": [_swing(k, rng) for k in range(12)],
-            "entries_m": [[0.2, -1.3, 0.5], [2.3, -1.2, 0.5], [2.2, 1.0, 0.6], [0.1, 0.8, 0.5]],
-            "markers": _markers(),
-            "provenance": {
-                "versions": {"freeswing": "0.1.0"},
-                "settings": {},
-                "inputs": {"robot.toml": "ab" * 32},
-            },
-        },
-        diagnosis=_diagnosis(),
-        motion={"format": "freeswing-motion/1", "runs": [_motion(k, rng) for k in range(5)]},
-        notes=("warning run swing-03: 12 % of the samples are missing",),
+        calibration=Calibration.from_json(_calibration()),
+        tracking=Tracking.from_json(_tracking()),
+        identification=Identification.from_json(
+            {
+                "format": "freeswing-identification/1",
+                "estimates": {name: _estimate(spread, rng) for name, spread in kinds.items()},
+                "comparison": {
+                    kind: [{"name": n, "difference_percent": 1.2, "z": 0.4} for n in INERTIA_NAMES]
+                    for kind in ("fidim", "ml")
+                },
+                "validation": [_validation(f"check-{k:02d}", rng) for k in range(8)],
+                "swings": [_swing(k, rng) for k in range(12)],
+                "entries_m": [[0.2, -1.3, 0.5], [2.3, -1.2, 0.5], [2.2, 1.0, 0.6], [0.1, 0.8, 0.5]],
+                "markers": _markers(),
+                "provenance": {
+                    "versions": {"freeswing": "0.1.0"},
+                    "settings": {},
+                    "inputs": {"robot.toml": "ab" * 32},
+                },
+            }
+        ),
+        diagnosis=Diagnosis.from_json(_diagnosis()),
+        motion=Motion.from_json(
+            {"format": "freeswing-motion/1", "runs": [_motion(k, rng) for k in range(5)]}
+        ),
+        check=Check(
+            findings=(Found(level="warning", subject="run swing-03", text="12 % missing"),)
+        ),
+        robot=declared_robot("bologna-4"),
     )
 
 

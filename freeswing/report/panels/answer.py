@@ -1,0 +1,108 @@
+"""Panel: what hangs there. Mass if known, centre of mass, inertia, principal axes, a drawing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from freeswing.report.body import body_about_com, hanging, principal_rows, tensor_rows
+from freeswing.report.material import Material
+from freeswing.report.words import ESTIMATES, parameter_row, plain
+from freeswing.results.common import Parameter
+from freeswing.results.diagnosis import Diagnosis
+
+
+class Answer:
+    """The body to take away, and the verdict on the model in a sentence or two."""
+
+    name = "answer"
+    title = "What hangs there"
+
+    def values(self, material: Material) -> dict[str, Any] | None:
+        """Best parameters, the body about its centre of mass, and the verdict."""
+        parameters, source = best_parameters(material)
+        if not parameters and material.diagnosis is None:
+            return None
+        body, mass_kg = body_about_com(parameters), known_mass_kg(material, parameters)
+        identification = material.identification
+        entries = np.zeros((0, 3))
+        if identification is not None and identification.entries_m:
+            entries = np.array(identification.entries_m, dtype=np.float64)
+        swings = () if identification is None else identification.swings
+        return {
+            "source": source,
+            "verdict": verdict(material.diagnosis),
+            "mass": mass_sentence(material, mass_kg),
+            "parameters": _shown([parameter_row(entry) for entry in parameters]),
+            "tensor": [] if body is None else tensor_rows(body, mass_kg),
+            "principal": [] if body is None else principal_rows(body, mass_kg),
+            "drawing": "" if body is None else hanging(body, material.robot, swings, entries),
+        }
+
+
+def _shown(rows: list[dict[str, str]]) -> list[dict[str, str]]:
+    remarks = any(row["weak"] for row in rows)
+    return [
+        {
+            "parameter": row["name"],
+            "value ± 95 %": f"{row['value']} ± {row['half_width']} {row['unit']}",
+            "± of value (%)": row["percent"],
+            "to copy (SI)": row["raw"],
+            **({"remark": row["weak"]} if remarks else {}),
+        }
+        for row in rows
+    ]
+
+
+def best_parameters(material: Material) -> tuple[tuple[Parameter, ...], str]:
+    """The nine parameters to take away, and where they are from."""
+    estimates = material.estimates
+    best = next(iter(estimates), "")
+    own = tuple(estimates[best].parameters) if best else ()
+    corrected = material.diagnosis.parameters_after if material.diagnosis else ()
+    if corrected:
+        names = {one.name for one in corrected}
+        more = tuple(one for one in own if one.name not in names)
+        return (*corrected, *more), "with the effects that the model lacked"
+    return own, ESTIMATES.get(best, "")
+
+
+def known_mass_kg(material: Material, parameters: Sequence[Parameter]) -> float | None:
+    """The mass that payload runs tell, else the declared one."""
+    found = next((one.value for one in parameters if one.name == "mass_kg"), None)
+    if found:
+        return found
+    return None if material.robot is None else material.robot.platform.mass_kg
+
+
+def mass_sentence(material: Material, mass_kg: float | None) -> str:
+    """Where the mass comes from; swings alone do not tell it."""
+    if not mass_kg:
+        return (
+            "The mass is not known: swings tell inertia over mass. Weigh the platform and state "
+            "platform.mass_kg in robot.toml, or record a run with a known payload."
+        )
+    declared = material.robot is not None and material.robot.platform.mass_kg == mass_kg
+    source = "as stated in robot.toml" if declared else "from the runs with a payload"
+    return f"Mass {mass_kg:.5g} kg, {source}."
+
+
+def verdict(diagnosis: Diagnosis | None) -> list[str]:
+    """What the diagnosis says, one plain sentence each."""
+    if diagnosis is None:
+        return ["Missing effects have not been looked for yet: run freeswing diagnose."]
+    accepted = [plain(entry.effect) for entry in diagnosis.accepted]
+    confounded = [plain(one.effect) for one in diagnosis.candidates if one.verdict == "confounded"]
+    sentences = []
+    if accepted:
+        sentences.append(f"The model lacked: {', '.join(accepted)}.")
+    if confounded:
+        sentences.append(f"These data cannot tell apart: {', '.join(confounded)}.")
+    unexplained = diagnosis.unexplained
+    if unexplained is not None and unexplained.present:
+        sentences.append(f"Something remains unexplained: {unexplained.signature}")
+    if not sentences:
+        sentences.append("The model explains the held-out runs; no effect is missing.")
+    return sentences

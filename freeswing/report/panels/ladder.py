@@ -1,0 +1,125 @@
+"""Panel: what was missing. Every candidate, what it gained on held-out runs, and the verdict."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from freeswing.report.figures import AFTER, BEFORE, FAINT, figure
+from freeswing.report.material import Material
+from freeswing.report.words import number, parameter_row, plain
+from freeswing.results.common import FoundEffect
+from freeswing.results.diagnosis import Candidate
+
+ORDER = ("accepted", "confounded", "rejected", "not_identifiable")
+_STYLE = {"accepted": (AFTER, ""), "confounded": (BEFORE, "////")}
+MOST_SHOWN = 12
+
+
+class EffectLadder:
+    """The candidates for what the model lacks."""
+
+    name = "ladder"
+    title = "What was missing, and how sure that is"
+
+    def values(self, material: Material) -> dict[str, Any] | None:
+        """Candidates by verdict and gain, and what no candidate explains."""
+        diagnosis = material.diagnosis
+        if diagnosis is None or not diagnosis.candidates:
+            return None
+        candidates = sorted(diagnosis.candidates, key=_rank)
+        remaining = diagnosis.unexplained
+        evidence = {
+            plain(key): number(value) if isinstance(value, int | float) else str(value)
+            for key, value in (remaining.evidence if remaining else {}).items()
+        }
+        return {
+            "effects": [row for entry in diagnosis.accepted for row in effect_rows(entry)],
+            "rivals": [_rival(one) for one in candidates if one.verdict == "confounded"],
+            "rows": [_row(entry) for entry in candidates],
+            "chart": _chart(candidates),
+            "signature": remaining.signature if remaining and remaining.present else "",
+            "evidence": evidence,
+        }
+
+
+def effect_rows(effect: FoundEffect) -> list[dict[str, str]]:
+    """The numbers of an accepted effect with their 95 % intervals."""
+    name = plain(effect.effect) + (f" (part {effect.part})" if effect.part else "")
+    rows = []
+    for parameter in effect.parameters:
+        row = parameter_row(parameter)
+        size = f"{row['value']} ± {row['half_width']} {row['unit']}"
+        rows.append({"effect": name, "number": row["name"], "value ± 95 %": size})
+    return rows
+
+
+def _rank(entry: Candidate) -> tuple[int, float]:
+    verdict = entry.verdict
+    return (ORDER.index(verdict) if verdict in ORDER else len(ORDER), -_gain(entry))
+
+
+def _gain(entry: Candidate) -> float:
+    return float("-inf") if entry.held_out_gain is None else entry.held_out_gain
+
+
+def _rival(entry: Candidate) -> str:
+    others = ", ".join(plain(name) for name in entry.confounded_with)
+    tail = f" {entry.experiment}" if entry.experiment else ""
+    return f"{plain(entry.effect)} cannot be told from {others}.{tail}"
+
+
+def _row(entry: Candidate) -> dict[str, str]:
+    row = {
+        "candidate": plain(entry.effect) + (f" ({entry.part})" if entry.part else ""),
+        "verdict": plain(entry.verdict),
+        "error taken away on held-out runs (%)": _percent(entry.held_out_gain),
+    }
+    if entry.probability is not None:
+        row["probability (%)"] = _percent(entry.probability)
+    return {
+        **row,
+        "ΔBIC": number(entry.delta_bic, 4),
+        "not told apart from": ", ".join(plain(name) for name in entry.confounded_with),
+        "why": ". ".join(text for text in (entry.reason, entry.experiment) if text),
+    }
+
+
+def _percent(share: float | None) -> str:
+    if share is None:
+        return "–"
+    return "0.0" if abs(share) < 5e-4 else f"{100.0 * share:.1f}"
+
+
+def _chart(candidates: list[Candidate]) -> object:
+    judged = [one for one in candidates if one.probability is not None]
+    shown = (judged or [one for one in candidates if _gain(one) > float("-inf")])[:MOST_SHOWN]
+    if not shown:
+        return ""
+    what = "probability (%)" if judged else "error taken away on held-out runs (%)"
+
+    def draw(sheet: Figure) -> None:
+        axes = sheet.subplots()
+        for place, one in enumerate(shown):
+            share = one.probability if one.probability is not None else _gain(one)
+            colour, hatch = _STYLE.get(one.verdict, (FAINT, ""))
+            filled = "none" if hatch else colour
+            axes.barh(place, 100.0 * share, facecolor=filled, edgecolor=colour, hatch=hatch)
+            # A bar of no length is named too: words, not colour alone, tell the verdict.
+            axes.annotate(
+                plain(one.verdict),
+                (max(100.0 * share, 0.0), place),
+                xytext=(3, 0),
+                textcoords="offset points",
+                va="center",
+                fontsize=7.5,
+            )
+        axes.set_yticks(range(len(shown)), [plain(one.effect) for one in shown])
+        axes.invert_yaxis()
+        axes.margins(x=0.25)
+        axes.set_xlabel(what)
+        axes.grid(visible=False, axis="y")
+
+    caption = f"The leading candidates by {what}: accepted filled, confounded hatched, others grey."
+    return figure(draw, 4.6, 0.7 + 0.22 * len(shown), caption)

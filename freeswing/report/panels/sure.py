@@ -1,0 +1,129 @@
+"""Panel: how sure. Intervals of every method, what they count, and what is taken as exact."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from markupsafe import Markup
+from matplotlib.figure import Figure
+
+from freeswing.report.figures import INK, MARKS, SERIES, Draw, figures, key
+from freeswing.report.material import Material
+from freeswing.report.words import ESTIMATES, HALF_WIDTH_95, number, plain, unit_of
+from freeswing.results.common import Parameter
+from freeswing.results.identification import ESTIMATE_ORDER, Estimate
+
+
+class HowSure:
+    """How far the numbers can be trusted."""
+
+    name = "sure"
+    title = "How sure"
+
+    def values(self, material: Material) -> dict[str, Any] | None:
+        """Intervals side by side, differences between methods, and the assumptions."""
+        estimates = material.estimates
+        if not estimates or material.identification is None:
+            return None
+        comparison = material.identification.comparison
+        after = material.diagnosis.parameters_after if material.diagnosis else ()
+        tables = [
+            {"method": method, "rows": [_difference(row) for row in comparison[kind]]}
+            for kind, method in (("ml", "maximum likelihood"), ("fidim", "FIDIM"))
+            if comparison.get(kind)
+        ]
+        return {
+            "chart": _chart(estimates, after),
+            "tables": tables,
+            "summary": [_summary(name, entry) for name, entry in estimates.items()],
+            "exact": exact(material),
+            "notes": [
+                f"{ESTIMATES[name]}: {note}"
+                for name in list(estimates)[:1]
+                for note in estimates[name].notes
+            ],
+        }
+
+
+def exact(material: Material) -> list[str]:
+    """What the intervals take as exactly known, and what they count."""
+    identification = material.identification
+    best = material.estimates[identification.best or ""] if identification else Estimate()
+    told = best.further
+    taken = []
+    if "geometry" not in told and not any("std" in str(one) for one in told):
+        taken.append(
+            "pulley entries, attachments and pulley radii as in robot.toml (their uncertainty "
+            "counts with --entry-std-m and --attachment-std-m)"
+        )
+    taken.append("gravity's size and direction, and the time stamps")
+    if material.tracking is None:
+        taken.append("the frame of the recorded motion: that its axes are those of robot.toml")
+    counted = "Counted are the samples' noise as it was found, the start of every run"
+    calibrated = best.calibration_modes is not None or best.calibration_std is not None
+    counted += ", its cable lengths" + (" and the cameras' calibration." if calibrated else ".")
+    return [counted, f"Taken as exact: {'; '.join(taken)}."]
+
+
+def _difference(row: Any) -> dict[str, str]:
+    return {
+        "parameter": plain(unit_of(row.name)[0]),
+        "full less free (%)": number(row.difference_percent, 3),
+        "over both standard deviations": number(row.z, 2),
+    }
+
+
+def _summary(name: str, estimate: Estimate) -> dict[str, str]:
+    samples = estimate.samples
+    return {
+        "estimate": ESTIMATES[name],
+        "samples": f"{samples:,}".replace(",", " ") if samples is not None else "–",
+        "σ_W (FIDIM)": number(estimate.sigma_W, 3),
+        "cost C (FIDIM)": number(estimate.cost_C, 3),
+    }
+
+
+def _chart(estimates: dict[str, Estimate], after: tuple[Parameter, ...]) -> Markup:
+    """Each parameter by every method; the corrected values stand apart and are named so."""
+    order = {name: k for k, name in enumerate(ESTIMATE_ORDER)}
+    by_name: dict[str, list[tuple[int, Parameter]]] = {}
+    for name, estimate in estimates.items():
+        for entry in estimate.parameters:
+            by_name.setdefault(entry.name, []).append((order[name], entry))
+    for entry in after:
+        by_name.setdefault(entry.name, []).append((-1, entry))
+    shown = [(name, points) for name, points in by_name.items() if points]
+    if not shown:
+        return Markup()
+    names = [(ESTIMATES[name], SERIES[order[name]], MARKS[order[name]]) for name in estimates]
+    legend = [("with the missing effects", INK, "*"), *names] if after else names
+    caption = "Each parameter by each method with its 95 % interval" + (
+        "; the star is the value with the effects that the model lacked, the others are without."
+        if after
+        else "."
+    )
+    return figures([_interval(*one) for one in shown] + [key(legend)], 1.45, caption)
+
+
+def _interval(name: str, points: list[tuple[int, Parameter]]) -> Draw:
+    stem, scale, unit = unit_of(name)
+
+    def draw(sheet: Figure) -> None:
+        axes = sheet.subplots()
+        for kind, entry in points:
+            if entry.value is None:
+                continue
+            half = scale * HALF_WIDTH_95 * (entry.std or 0.0)
+            colour, mark = (INK, "*") if kind < 0 else (SERIES[kind], MARKS[kind])
+            size = 9 if kind < 0 else 5
+            axes.errorbar(
+                scale * entry.value, -kind, xerr=half, fmt=mark, ms=size, capsize=3, color=colour
+            )
+        axes.set_yticks([])
+        axes.margins(y=0.3)
+        axes.locator_params(axis="x", nbins=4)
+        axes.ticklabel_format(axis="x", useOffset=False)
+        axes.set_xlabel(f"{plain(stem)} ({unit})")
+        axes.spines["left"].set_visible(False)
+
+    return draw

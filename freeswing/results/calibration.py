@@ -1,0 +1,116 @@
+"""results/calibration.json: how well the cameras, their clocks and the base frame are known."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+from freeswing.results.codec import Document, Entry, Numbers, absent, empty, entry
+
+
+@entry
+class Trust(Entry):
+    """Whether the calibration may be used, why not, and what to know."""
+
+    usable: bool = True
+    reasons: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+
+@entry
+class CalibratedCamera(Entry):
+    """One camera: values, standard deviations and residuals; poses as cameras.toml has them."""
+
+    name: str = ""
+    size_px: Numbers = ()
+    model: str = ""
+    params: Numbers = ()
+    q_camera_base: Numbers = ()
+    t_camera_base_m: Numbers = ()
+    clock_offset_s: float | None = None
+    line_time_s: float | None = None
+    views: int | None = None
+    dropped_views: int | None = None
+    corners: int | None = None
+    corner_noise_px: float | None = None
+    reprojection_px: float | None = None
+    params_std: Numbers = ()
+    position_std_m: Numbers = ()
+    rotation_std_rad: Numbers = ()
+    clock_offset_std_s: float | None = None
+    line_time_std_s: float | None = None
+    frames: int | None = None
+    frames_with_board: int | None = None
+    held_out_px: float | None = None
+    alone_px: float | None = None
+    coverage: float | None = None
+    tilt_deg: float | None = None
+    focal_std: float | None = None
+    lens_models_held_out_px: Mapping[str, float | None] = empty()
+
+
+@entry
+class Checks(Entry):
+    """Comparisons with lengths that are known, and of the footage with itself."""
+
+    length_bias: float | None = absent()
+    length_rms_m: float | None = absent()
+    lengths: int | None = absent()
+    halves_rms_m: float | None = absent()
+    halves_shape_rms_m: float | None = absent()
+    volume_std_m: float | None = absent()
+    volume_size_m: Numbers | None = absent()
+    survey_points: int | None = absent()
+    survey_scale: float | None = absent()
+    survey_rms_m: float | None = absent()
+    survey_mirrored_rms_m: float | None = absent()
+
+
+@entry
+class Vertical(Entry):
+    """The plumb line against the declared gravity: agrees, differs or inconsistent."""
+
+    verdict: str = ""
+    sentence: str = ""
+
+
+@entry
+class Covariance(Entry):
+    """Joint covariance of all cameras' parameters."""
+
+    tangent: str = ""
+    names: tuple[str, ...] = ()
+    matrix: tuple[Numbers, ...] = ()
+
+
+@entry
+class Calibration(Document):
+    """What `freeswing calibrate` found.
+
+    Attributes:
+        verdict: whether it may be used.
+        base_frame: where the base frame comes from.
+        cameras: each.
+        checks: against truth.
+        moments: instants at which the board was seen.
+        board: its kind, points and bend.
+        dropped_views: sentences on views left out.
+        trimmed_corners: how many corners were.
+        adjustment: how the fit went.
+        covariance: of all cameras together.
+        vertical: the plumb line, where there was one.
+    """
+
+    kind: ClassVar[str] = "calibration"
+
+    verdict: Trust | None = None
+    base_frame: Mapping[str, Any] = empty()
+    cameras: tuple[CalibratedCamera, ...] = ()
+    checks: Checks | None = None
+    moments: int | None = None
+    board: Mapping[str, Any] = empty()
+    dropped_views: tuple[str, ...] = ()
+    trimmed_corners: int | None = None
+    adjustment: Mapping[str, Any] = empty()
+    covariance: Covariance | None = None
+    vertical: Vertical | None = absent()

@@ -1,0 +1,116 @@
+"""results/diagnosis.json: what the model lacked, judged on runs that were never fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+from freeswing.results.codec import Document, Entry, absent, empty, entry
+from freeswing.results.common import FoundEffect, Parameter
+
+
+@entry
+class HeldOutRun(Entry):
+    """One held-out run under one model."""
+
+    run: str
+    sigma_perp: float | None = None
+    prediction_rmse_m: float | None = None
+    prediction_rmse_rad: float | None = None
+    noise_floor_m: float | None = None
+
+
+@entry
+class HeldOut(Entry):
+    """All held-out runs under one model: root mean squares, medians, and each run.
+
+    Attributes:
+        effects: of the model, on the ladder.
+        sigma_perp: error of the internal dynamics (FIDIM 2022, eq. 50), m/s2.
+        prediction_rmse_m: of positions, a coordinate.
+        noise_floor_m: what the samples' own noise leaves.
+        prediction_rmse_rad: of angles.
+        sigma_perp_median: over the runs.
+        prediction_median_m: over the runs.
+        runs: each.
+    """
+
+    effects: tuple[str, ...] | None = absent()
+    sigma_perp: float | None = None
+    prediction_rmse_m: float | None = None
+    noise_floor_m: float | None = None
+    prediction_rmse_rad: float | None = None
+    sigma_perp_median: float | None = None
+    prediction_median_m: float | None = None
+    runs: tuple[HeldOutRun, ...] = ()
+
+
+@entry
+class Candidate(Entry):
+    """An effect that was considered.
+
+    Attributes:
+        effect: its name.
+        part: of one cable or motor, its name.
+        verdict: accepted, rejected, confounded or not_identifiable.
+        delta_bic: change of the Bayesian information criterion.
+        held_out_gain: share of the excess error that it takes away on held-out runs.
+        confounded_with: what the data cannot tell it from.
+        reason: why.
+        experiment: that would tell them apart.
+        probability: that the effect is in the model, where a posterior was computed.
+    """
+
+    effect: str
+    part: str = absent("")
+    verdict: str = ""
+    delta_bic: float | None = None
+    held_out_gain: float | None = None
+    probability: float | None = None
+    confounded_with: tuple[str, ...] = ()
+    reason: str = ""
+    experiment: str = absent("")
+
+
+@entry
+class Unexplained(Entry):
+    """What no candidate explains: which coordinate, which frequency, how large."""
+
+    present: bool = False
+    signature: str = ""
+    evidence: Mapping[str, Any] = empty()
+
+
+@entry
+class Diagnosis(Document):
+    """What `freeswing diagnose` found.
+
+    Attributes:
+        before: the declared model on the held-out runs.
+        candidates: the last word on every effect of the catalogue.
+        accepted: the effects that the model lacked.
+        after: the model with them.
+        share_closed: of the way from the prediction error to the noise floor.
+        parameters_before: inertia without them.
+        parameters_after: inertia with them.
+        parameters_moved_percent: by name.
+        ladder: the models in between.
+        unexplained: what remains.
+        lengths: what the constancy of cable lengths says without any dynamics.
+        notes: sentences about the session.
+    """
+
+    kind: ClassVar[str] = "diagnosis"
+
+    before: HeldOut | None = None
+    candidates: tuple[Candidate, ...] = ()
+    accepted: tuple[FoundEffect, ...] = ()
+    after: HeldOut | None = None
+    share_closed: float | None = None
+    parameters_before: tuple[Parameter, ...] = ()
+    parameters_after: tuple[Parameter, ...] = ()
+    parameters_moved_percent: Mapping[str, float | None] = empty()
+    ladder: tuple[HeldOut, ...] = ()
+    unexplained: Unexplained | None = None
+    lengths: Any = absent()
+    notes: tuple[str, ...] = ()

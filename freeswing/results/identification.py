@@ -1,0 +1,220 @@
+"""results/identification.json: the inertial parameters by every method, and how they do."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+from freeswing.results.codec import Document, Entry, Numbers, absent, empty, entry
+from freeswing.results.common import InertiaParameter, Pose
+
+ESTIMATE_ORDER = ("ml_full", "ml_free", "fidim_full", "fidim_free")
+
+
+@entry
+class DroppedRun(Entry):
+    """A run that was left out."""
+
+    run: str
+    why: str = ""
+
+
+@entry
+class Consistency(Entry):
+    """Whether a body can have the inertia; see `ident.judge.consistency`."""
+
+    possible: bool = True
+    held: bool = False
+    least_second_moment_m2: float | None = None
+    least_second_moment_std_m2: float | None = None
+    cost: float | None = absent()
+
+
+@entry
+class Reduced(Entry):
+    """The essential parameters solved again alone (FIDIM)."""
+
+    parameters: tuple[InertiaParameter, ...] = ()
+    sigma_W: float | None = None
+    cost_C: float | None = None
+
+
+@entry
+class Estimate(Entry):
+    """One method's result.
+
+    Attributes:
+        parameters: in the contract's order; mass_kg at the end where payload runs tell it.
+        sigma_W: of the regressor (FIDIM only).
+        cost_C: excitation cost (FIDIM only).
+        samples: time samples that it rests on.
+        dropped_runs: runs left out.
+        notes: sentences that belong beside the numbers.
+        consistency: whether a body can have it.
+        reduced: FIDIM's essential parameters alone.
+        noise_m: white noise of positions (maximum likelihood).
+        noise_rad: white noise of angles (maximum likelihood).
+        stop_reason: why the fit ended (maximum likelihood).
+        weighting: of FIDIM, where it is not the published one.
+        noise_ratio: of FIDIM's weighted form.
+        calibration_std: the cameras' calibration's share of the deviations (FIDIM).
+        calibration_modes: calibration errors fitted beside (maximum likelihood).
+    """
+
+    parameters: tuple[InertiaParameter, ...] = ()
+    sigma_W: float | None = absent()
+    cost_C: float | None = absent()
+    samples: int | None = None
+    dropped_runs: tuple[DroppedRun, ...] = ()
+    notes: tuple[str, ...] = ()
+    consistency: Consistency | None = absent()
+    reduced: Reduced | None = absent()
+    noise_m: float | None = absent()
+    noise_rad: float | None = absent()
+    stop_reason: str = absent("")
+    weighting: str = absent("")
+    noise_ratio: float | None = absent()
+    calibration_std: Numbers | None = absent()
+    calibration_modes: Any = absent()
+
+
+@entry
+class Difference(Entry):
+    """Full poses less free coordinates, of one parameter (FIDIM 2022, eqs. 48, 49)."""
+
+    name: str
+    difference_percent: float | None = None
+    std_percent: float | None = None
+    z: float | None = None
+
+
+@entry
+class ValidatedRun(Entry):
+    """A held-out run beside the best estimate.
+
+    Attributes:
+        run: its name.
+        sigma_perp: error of the internal dynamics (FIDIM 2022, eq. 50), m/s2.
+        prediction_rmse_m: measured less predicted position, rms a coordinate.
+        prediction_rmse_rad: the same of angles.
+        prediction_rmse: of partial runs, in the measured column's unit.
+        noise_floor_m: what the samples' own noise leaves.
+        note: what a reader should know.
+    """
+
+    run: str
+    sigma_perp: float | None = None
+    prediction_rmse_m: float | None = None
+    prediction_rmse_rad: float | None = absent()
+    prediction_rmse: float | None = absent()
+    noise_floor_m: float | None = None
+    note: str = absent("")
+
+
+@entry
+class SwingPlace(Entry):
+    """Where a run took place; the equilibrium is absent where none is near."""
+
+    run: str
+    role: str = ""
+    equilibrium: Pose | None = absent()
+    frequencies_hz: Numbers | None = absent()
+    conditioning: float | None = absent()
+
+
+@entry
+class BodyParameter(Entry):
+    """A number of one object; what rests only on what was given is not identifiable."""
+
+    name: str
+    value: float | None = None
+    std: float | None = None
+    identifiable: bool = True
+
+
+@entry
+class Body(Entry):
+    """The platform or a load: inertia in kg m2 about its own centre of mass."""
+
+    name: str
+    runs: tuple[str, ...] | None = absent()
+    parameters: tuple[BodyParameter, ...] = ()
+
+
+@entry
+class MarkerRun(Entry):
+    """How rigid the markers were in one run: standard deviations about a rigid body.
+
+    Attributes:
+        run: its name.
+        rigidity_um: of each marker; None where it was not seen.
+        left_out: markers that the others contradict.
+        all_um: of all markers together.
+        kept_um: of those that were used.
+        frame_std_mm: of the platform frame's place.
+        frame_std_mrad: of its turn.
+        correlation_s: over which the deviations persist.
+    """
+
+    run: str
+    rigidity_um: Numbers = ()
+    left_out: tuple[str, ...] = ()
+    all_um: float | None = None
+    kept_um: float | None = None
+    frame_std_mm: tuple[float, ...] = ()
+    frame_std_mrad: tuple[float, ...] = ()
+    correlation_s: float | None = None
+
+
+@entry
+class Markers(Entry):
+    """The markers' common layout against target.toml, and each run."""
+
+    names: tuple[str, ...] = ()
+    off_target_mm: Numbers = ()
+    run_std_mm: float | None = None
+    runs: tuple[MarkerRun, ...] = ()
+
+
+@entry
+class Identification(Document):
+    """What `freeswing identify` found.
+
+    Attributes:
+        estimates: by method.
+        comparison: free coordinates against full poses, by method.
+        validation: of the best estimate, a run each.
+        validated: name of that estimate.
+        free_coordinates: those used.
+        amplification: how many times more the pose moves than they do, at worst.
+        notes: sentences about the session.
+        objects: platform and loads where the session has loads or payloads.
+        swings: where each run took place.
+        entries_m: the cables' entry points.
+        markers: what the recorded markers were worth.
+    """
+
+    kind: ClassVar[str] = "identification"
+
+    estimates: Mapping[str, Estimate] = empty()
+    comparison: Mapping[str, tuple[Difference, ...]] = empty()
+    validation: tuple[ValidatedRun, ...] = ()
+    validated: str = ""
+    free_coordinates: tuple[str, ...] = ()
+    amplification: float | None = None
+    notes: tuple[str, ...] = ()
+    objects: tuple[Body, ...] | None = absent()
+    swings: tuple[SwingPlace, ...] = ()
+    entries_m: tuple[Numbers, ...] = ()
+    markers: Markers | None = None
+
+    @property
+    def ranked(self) -> dict[str, Estimate]:
+        """The estimates that are there, best first."""
+        found = {name: self.estimates.get(name) for name in ESTIMATE_ORDER}
+        return {name: one for name, one in found.items() if one is not None and one.parameters}
+
+    @property
+    def best(self) -> str | None:
+        """Name of the best estimate; None without any."""
+        return next(iter(self.ranked), None)

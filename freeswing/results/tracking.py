@@ -1,0 +1,101 @@
+"""results/tracking.json: how the cameras agree on the platform, run by run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+from freeswing.results.codec import Document, Entry, Numbers, absent, empty, entry
+from freeswing.results.common import FoundEffect
+
+
+@entry
+class Outlier(Entry):
+    """A tag or marker whose sightings were left out: how often, from when, how far off."""
+
+    what: str = ""
+    count: int | None = None
+    first_frame: int | None = None
+    worst_px: float | None = None
+
+
+@entry
+class CameraShare(Entry):
+    """One camera's part in one run; `outliers` are things that disagreed with the rest."""
+
+    camera: str
+    frames_seen: int | None = None
+    frames_used: int | None = None
+    frames_rejected: Mapping[str, int | None] = empty()
+    frames_dropped: int | None = None
+    sightings_used: int | None = None
+    reprojection_px: float | None = None
+    beyond_pixel_noise_px: float | None = None
+    consistency_mm: float | None = None
+    outliers: tuple[Outlier, ...] = ()
+
+
+@entry
+class TrackedRun(Entry):
+    """One tracked run.
+
+    Attributes:
+        run: its name.
+        samples: time steps.
+        known: those with a pose.
+        rate_hz: of the samples.
+        position_std_mm: scatter of single poses.
+        rotation_std_mrad: likewise.
+        calibration_std_mm: how far the calibration may shift all of them together.
+        calibration_std_mrad: likewise.
+        reprojection_px: over all cameras.
+        consistency_mm: each camera's rays beside the platform that all agree on.
+        cameras: each.
+        problems: sentences.
+        calibration_errors: how the calibration may shift the poses.
+    """
+
+    run: str
+    samples: int | None = None
+    known: int | None = None
+    rate_hz: float | None = None
+    position_std_mm: float | None = None
+    rotation_std_mrad: float | None = None
+    calibration_std_mm: float | None = None
+    calibration_std_mrad: float | None = None
+    reprojection_px: float | None = None
+    consistency_mm: float | None = None
+    cameras: tuple[CameraShare, ...] = ()
+    problems: tuple[str, ...] = ()
+    calibration_errors: Any = None
+
+
+@entry
+class TagPlace(Entry):
+    """Where a tag sits against target.toml."""
+
+    family: str = ""
+    id: int | None = None
+    mismatch_mm: float | None = None
+    std_mm: float | None = None
+    corners_platform_m: tuple[Numbers, ...] = ()
+
+
+@entry
+class Layout(Entry):
+    """The places of all tags; refined where the track uses the fitted ones."""
+
+    refined: bool = False
+    worst_mismatch_mm: float | None = None
+    tags: tuple[TagPlace, ...] = ()
+
+
+@entry
+class Tracking(Document):
+    """What `freeswing track` found."""
+
+    kind: ClassVar[str] = "tracking"
+
+    runs: tuple[TrackedRun, ...] = ()
+    layout: Layout | None = absent()
+    effects: tuple[FoundEffect, ...] = ()
