@@ -32,6 +32,7 @@ class Trajectory:
             (R_true = exp(delta) R); otherwise those of the angles themselves.
         provenance: one line: where the numbers come from.
         slow: how far all samples err together (markers that sit elsewhere or drift), None: unknown.
+        notes: what was left out of the recording and why, one sentence each.
     """
 
     times_s: Array
@@ -40,6 +41,7 @@ class Trajectory:
     covariances: Array | None = None
     provenance: str = ""
     slow: SlowErrors | None = None
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         coordinates = tuple(self.coordinates)

@@ -10,8 +10,10 @@ from freeswing.console import Console
 
 if TYPE_CHECKING:
     from freeswing.cdpr.robot import Robot
+    from freeswing.ident.runs import SwingRun
     from freeswing.results.codec import Document
     from freeswing.results.identification import Identification
+    from freeswing.session.marker_runs import MarkerRuns
     from freeswing.session.session_file import Session
     from freeswing.workers.crew import Crew
 
@@ -65,7 +67,6 @@ def make(
 ) -> list[tuple[str, Document]]:
     """identification.json and motion.json as documents."""
     from freeswing.cdpr.files.documents import InputError
-    from freeswing.doctor.markers import marker_findings
     from freeswing.ident.identify import IdentifySettings, identify
     from freeswing.ident.likelihood.cable_ends import GeometryPriors
     from freeswing.ident.swing_places import swing_places
@@ -94,7 +95,7 @@ def make(
         geometry=geometry,
     )
     found = identify(list(swings), robot, chosen, console.progress)
-    noted = [one.sentence() for one in marker_findings(markers) if one.level == "warning"]
+    noted = _recording_notes(session, swings, markers)
     told = found.document()
     document = Identification.from_json(
         {
@@ -125,6 +126,22 @@ def _make_bench(session: Session, console: Console, robot: Robot) -> list[tuple[
         console.say(line)
     document = Identification.from_json({**told, "entries_m": robot.entries_m})
     return [("identification.json", document), ("motion.json", Motion())]
+
+
+def _recording_notes(
+    session: Session, swings: tuple[SwingRun, ...], markers: MarkerRuns
+) -> list[str]:
+    """What of the recordings was left out, put right or contradicts the session file."""
+    from freeswing.doctor.markers import marker_findings
+    from freeswing.doctor.motion import stamp_findings
+
+    found = list(marker_findings(markers))
+    notes = []
+    for run in swings:
+        subject = f"run {run.name}"
+        found += stamp_findings(subject, run.trajectory, session.frame_rate_hz)
+        notes += [f"{subject}: {note}" for note in run.trajectory.notes]
+    return notes + [finding.sentence() for finding in found if finding.level == "warning"]
 
 
 def _summarise(document: Identification, best: str, console: Console) -> None:

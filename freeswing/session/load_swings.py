@@ -10,6 +10,7 @@ from freeswing.cdpr.files.documents import DataError, InputError
 from freeswing.cdpr.files.robot_file import read_robot
 from freeswing.cdpr.files.trajectory_files import read_trajectory
 from freeswing.cdpr.measured.pose_errors import PoseErrors, read_pose_errors
+from freeswing.cdpr.measured.sound_samples import check_stamps, sound_samples
 from freeswing.cdpr.measured.target import Target, read_target
 from freeswing.cdpr.measured.trajectory import Trajectory
 from freeswing.cdpr.robot import Robot
@@ -112,4 +113,7 @@ def load_trajectory(
     trajectory = markers.trajectory(run.name)
     if trajectory is None:
         trajectory = read_trajectory(path, robot, target)
+    if run.trajectory is not None:
+        check_stamps(trajectory, path.name)
+        trajectory = sound_samples(trajectory)
     return replace(trajectory, provenance=trajectory.provenance or path.name)

@@ -81,7 +81,7 @@ def said(run, words, rate_hz=None):
 
 
 @pytest.mark.parametrize(
-    ("rate_hz", "levels"), [(98.1, []), (101.9, []), (97.9, ["warning"]), (102.2, ["warning"])]
+    ("rate_hz", "levels"), [(99.96, []), (100.04, []), (99.85, ["warning"]), (100.15, ["warning"])]
 )
 def test_rates(rate_hz, levels) -> None:
     assert said(swing(), "the session says", rate_hz) == levels

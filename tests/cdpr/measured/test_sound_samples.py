@@ -1,0 +1,81 @@
+import numpy as np
+import pytest
+
+from freeswing.cdpr.files.problems import InputError
+from freeswing.cdpr.measured.sound_samples import check_stamps, sound_samples
+from freeswing.cdpr.measured.trajectory import Trajectory
+
+TIMES = np.arange(400) / 100.0
+
+
+def swing(noise=1e-4, step=1e-9, seed=0):
+    """X and y in m, printed to a step."""
+    waves = np.stack([0.1 * np.sin(4.0 * TIMES), 0.08 * np.cos(3.0 * TIMES)], axis=1)
+    values = waves + noise * np.random.default_rng(seed).normal(size=waves.shape)
+    return np.round(values / step) * step
+
+
+def sound(values, times=TIMES):
+    return sound_samples(Trajectory(times, ("x", "y"), values))
+
+
+def test_a_clean_swing_is_left_as_it_is():
+    made = Trajectory(TIMES, ("x", "y"), swing())
+    assert sound_samples(made) is made
+
+
+def test_a_capture_that_stalls_loses_its_repeats_alone():
+    values = swing()
+    values[100:131] = values[100]
+    found = sound(values)
+    assert np.flatnonzero(~found.is_known).tolist() == list(range(101, 131))
+    assert found.notes == (
+        "the same sample stands from 1.00 s on for 0.30 s: the capture stalled; the repeats are "
+        "left out",
+    )
+
+
+@pytest.mark.parametrize(("alike", "is_held"), [(5, False), (6, True)])
+def test_so_many_samples_alike_are_held(alike, is_held):
+    values = swing()
+    values[100 : 100 + alike] = values[100]
+    assert bool(sound(values).notes) == is_held
+
+
+def test_coarse_numbers_that_repeat_are_no_stall():
+    values = swing(noise=0.0, step=0.02)
+    assert (np.diff(values, axis=0) == 0.0).all(axis=1).mean() > 0.5
+    assert sound(values).notes == ()
+
+
+@pytest.mark.parametrize("times_each", [2, 3])
+def test_samples_written_several_times_are_used_once(times_each):
+    values = np.repeat(swing(), times_each, axis=0)
+    times = np.arange(len(values)) / (100.0 * times_each)
+    found = sound(values, times)
+    assert np.array_equal(found.values, swing())
+    assert found.sample_rate_hz == pytest.approx(100.0)
+    assert f"every sample stands {times_each} times" in found.notes[0]
+
+
+@pytest.mark.parametrize(("size_m", "is_wild"), [(1.0, True), (0.05, True), (2e-3, False)])
+def test_a_wild_sample_is_left_out_and_named(size_m, is_wild):
+    values = swing()
+    values[250, 1] += size_m
+    found = sound(values)
+    assert np.flatnonzero(~found.is_known).tolist() == ([250] if is_wild else [])
+    if is_wild:
+        assert f"the sample at 2.50 s is {1e3 * size_m:.0f}." in found.notes[0].replace(
+            "999.", "1000."
+        ).replace("49.", "50.")
+        assert "off its neighbours in y" in found.notes[0]
+
+
+@pytest.mark.parametrize(
+    ("factor", "unit"), [(1e3, "milliseconds"), (1e6, "microseconds"), (1e9, "nanoseconds")]
+)
+def test_times_in_another_unit_are_named(factor, unit):
+    with pytest.raises(InputError, match=rf"as {unit} that is 100 Hz: times are in seconds"):
+        check_stamps(Trajectory(factor * TIMES, ("x", "y"), swing()), "a.csv")
+    check_stamps(Trajectory(1.7e9 + TIMES, ("x", "y"), swing()), "a.csv")
+    check_stamps(Trajectory(50.0 * TIMES, ("x", "y"), swing()), "a.csv")
