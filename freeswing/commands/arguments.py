@@ -81,10 +81,19 @@ def not_negative(text: str) -> float:
 
 
 def open_session(options: Namespace) -> Session:
-    """The session that the flags of `add_session` name."""
+    """The session that the flags of `add_session` name.
+
+    Raises:
+        InputError: also for a driven robot's session, which other commands take.
+    """
+    from freeswing.cdpr.files.problems import InputError
+    from freeswing.session.drive_session import drive_path
     from freeswing.session.session_file import read_session
 
     session, results = options.session, options.results
+    driven = drive_path(session)
+    if driven is not None:
+        raise InputError(f"{driven}: a driven robot's session; drive, check and run take it")
     if getattr(options, "cluster", None):  # whose workers start in other folders
         session, results = Path(session).resolve(), results and Path(results).resolve()
     return read_session(session, results)

@@ -16,9 +16,15 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(options: Namespace, console: Console) -> None:
     """Examine the session; fails where a finding keeps a command from a result."""
     from freeswing.cdpr.files.documents import DataError, write_json
+    from freeswing.commands.drive import check as check_drive
     from freeswing.doctor.examine import examine
     from freeswing.results.check import Check, Found
+    from freeswing.session.drive_session import drive_path
 
+    driven = drive_path(options.session)
+    if driven is not None:
+        check_drive(driven, options.results, console)
+        return
     session = open_session(options)
     findings = examine(session, console.progress)
     result = session.results / "check.json"

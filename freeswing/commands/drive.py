@@ -26,7 +26,10 @@ def run(options: Namespace, console: Console) -> None:
     """Look the recordings over, estimate, write, say."""
     from freeswing.session.drive_session import drive_path, read_drive_session
 
-    path = drive_path(options.session) or Path(options.session)
+    path = drive_path(options.session)
+    if path is None:
+        named = Path(options.session)
+        path = named / "drive.toml" if named.is_dir() else named
     identify(read_drive_session(path, options.results), console)
 
 
@@ -66,6 +69,28 @@ def identify(file: DriveFile, console: Console) -> Path:
     console.say(str(result))
     console.show_file(result)
     return result
+
+
+def check(path: Path, results: str | None, console: Console) -> None:
+    """check.json of a session of a driven robot.
+
+    Raises:
+        DataError: when a finding keeps it from a result.
+    """
+    from freeswing.cdpr.files.documents import DataError, write_json
+    from freeswing.ident.drive.checks import findings
+    from freeswing.session.drive_session import read_drive_session
+
+    file = read_drive_session(path, results)
+    found = findings(file.session)
+    entries = [{"level": "error", "text": text} for text in found]
+    write_json(file.results / "check.json", {"format": "freeswing-check/1", "findings": entries})
+    for text in found:
+        console.say(text)
+    console.show_file(file.results / "check.json")
+    if found:
+        raise DataError(f"{path}: {len(found)} to mend before a result")
+    console.say(f"{file.name}: nothing keeps it from a result (0 findings)")
 
 
 def _say(document: dict[str, Any], console: Console) -> None:

@@ -24,6 +24,13 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(options: Namespace, console: Console) -> None:
     """Take each step that is due; the page is always written anew."""
+    from freeswing.commands.drive import identify as identify_drive
+    from freeswing.session.drive_session import drive_path, read_drive_session
+
+    driven = drive_path(options.session)
+    if driven is not None:
+        identify_drive(read_drive_session(driven, options.results), console)
+        return
     session = open_session(options)
     with crew_of(options, session) as crew:
         run_session(session, console, crew)

@@ -46,10 +46,15 @@ class DriveFile:
 
 
 def drive_path(session: Path | str) -> Path | None:
-    """The drive.toml that a session argument names, None where it is another session's."""
+    """The drive.toml that a session argument names, None where it is another session's.
+
+    A folder that also holds session.toml is a session of free swings, unless the file is named.
+    """
     path = Path(session)
     if path.is_dir():
+        both = (path / "session.toml").is_file()
         path = path / "drive.toml"
+        return path if path.is_file() and not both else None
     return path if path.name == "drive.toml" or _says_drive(path) else None
 
 

@@ -1,5 +1,7 @@
 """Recordings that must never be reported as a fit, through the command line."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -62,8 +64,15 @@ def moving(names, values):
     return values
 
 
-def test_a_sound_session_has_no_finding(made):
+def test_a_sound_session_has_no_finding(made, tmp_path):
     assert findings(read_drive_session(made / "drive.toml").session) == []
+    assert main(["check", str(made), "--results", str(tmp_path), "--quiet"]) == 0
+    assert json.loads((tmp_path / "check.json").read_text())["findings"] == []
+
+
+def test_commands_of_free_swings_say_which_take_it(made, capsys):
+    assert main(["identify", str(made)]) == 2
+    assert "drive, check and run take it" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
