@@ -7,10 +7,12 @@ from collections.abc import Iterator
 import numpy as np
 
 from freeswing.cdpr.files.documents import DataError
+from freeswing.cdpr.measured.frame_change import UP_TURNS, moved_trajectory
 from freeswing.cdpr.measured.trajectory import Trajectory
 from freeswing.cdpr.model.batch import evaluate
 from freeswing.cdpr.model.equations import build_model
 from freeswing.cdpr.robot import Robot
+from freeswing.cdpr.rotation import transform
 from freeswing.doctor.finding import Finding
 from freeswing.ident.runs import SwingRun
 
@@ -27,6 +29,10 @@ ROUNDING_S = 1e-3
 # Beyond every hall; and beside it twenty times the pulleys' own distance, for stadium cameras.
 FARTHEST_M = 100.0
 FARTHEST_REACHES = 20.0
+# Geometry that is known to a centimetre changes lengths by some mm along a swing; turned axes by
+# as much as the swing is wide, and the right ones by a fifth of that or less.
+TURNED_CHANGE_M = 0.01
+TURNED_BETTER = 0.2
 # Locked cables keep their length to the poses' noise: 0.1 to 0.5 mm, of which 98 % of the samples
 # span 4.7 deviations. 3 mm is more than that, and less than any slip of a drum's turn.
 LENGTH_CHANGE_M = 0.003
@@ -131,6 +137,32 @@ def _places(subject: str, part: Trajectory, robot: Robot) -> Iterator[Finding]:
         yield Finding("warning", subject, text, "set it swinging, or correct window_s")
 
 
+def _turned(subject: str, part: Trajectory, robot: Robot, lengths: np.ndarray) -> Iterator[Finding]:
+    """Whether the cables would keep their length were another axis of the recording up."""
+    model = build_model(robot)
+    found = _spread(lengths)
+    if found < TURNED_CHANGE_M:
+        return
+    known = part.take(part.is_known)
+    spreads = {}
+    for axis, turn in UP_TURNS.items():
+        poses = moved_trajectory(known, transform(turn, np.zeros(3))).values
+        turned = evaluate(model.lengths, poses, model.start_values)[0].reshape(len(poses), -1)
+        spreads[axis] = _spread(turned) if np.isfinite(turned).all() else np.inf
+    best = min(spreads, key=spreads.__getitem__)
+    if best != "z" and spreads[best] < TURNED_BETTER * found:
+        text = (
+            f"cable lengths change by {1e3 * found:.0f} mm as recorded, by "
+            f"{1e3 * spreads[best]:.1f} mm if its axis {best} points up"
+        )
+        remedy = f'say so in session.toml: [mocap] up = "{best}"'
+        yield Finding("warning", subject, text, remedy)
+
+
+def _spread(lengths: np.ndarray) -> float:
+    return float(np.ptp(np.percentile(lengths, [1.0, 99.0], axis=0), axis=0).max())
+
+
 def _cables(subject: str, run: SwingRun, part: Trajectory, robot: Robot) -> Iterator[Finding]:
     model = build_model(robot)
     poses = part.values[part.is_known]
@@ -139,6 +171,7 @@ def _cables(subject: str, run: SwingRun, part: Trajectory, robot: Robot) -> Iter
         text = "the poses put a cable inside its pulley or on its swivel axis"
         yield Finding("error", subject, text, "check the base frame of the poses and entry_m")
         return
+    yield from _turned(subject, part, robot, lengths)
     for cable, column in zip(robot.cables, lengths.T, strict=True):
         spread = float(np.ptp(np.percentile(column, [1.0, 99.0])))
         if spread > LENGTH_CHANGE_M:

@@ -9,6 +9,7 @@ from pathlib import Path
 from freeswing.cdpr.files.documents import DataError, InputError
 from freeswing.cdpr.files.robot_file import read_robot
 from freeswing.cdpr.files.trajectory_files import read_trajectory
+from freeswing.cdpr.measured.frame_change import moved_trajectory
 from freeswing.cdpr.measured.pose_errors import PoseErrors, read_pose_errors
 from freeswing.cdpr.measured.sound_samples import check_stamps, sound_samples
 from freeswing.cdpr.measured.target import Target, read_target
@@ -101,6 +102,16 @@ def load_swing(
     )
 
 
+def _in_base(session: Session, run: Run, trajectory: Trajectory) -> Trajectory:
+    """A measured trajectory turned from the frame of the recordings, where the session names it."""
+    if session.T_base_recorded is None or run.trajectory is None:
+        return trajectory
+    try:
+        return moved_trajectory(trajectory, session.T_base_recorded)
+    except InputError as failure:
+        raise InputError(f"{session.path}: mocap: run {run.name}: {failure}") from failure
+
+
 def load_trajectory(
     session: Session, run: Run, robot: Robot, target: Target | None, markers: MarkerRuns
 ) -> Trajectory:
@@ -113,6 +124,7 @@ def load_trajectory(
     trajectory = markers.trajectory(run.name)
     if trajectory is None:
         trajectory = read_trajectory(path, robot, target)
+        trajectory = _in_base(session, run, trajectory)
     if run.trajectory is not None:
         check_stamps(trajectory, path.name)
         trajectory = sound_samples(trajectory)

@@ -9,6 +9,7 @@ from freeswing.cdpr.files.trajectory_files import holds_markers, read_recording
 from freeswing.cdpr.markers.from_recording import fixes_poses
 from freeswing.cdpr.markers.layout import SessionLayout
 from freeswing.cdpr.markers.session import Examined, RunMarkers, common_layout, examine, place
+from freeswing.cdpr.measured.frame_change import moved_recording
 from freeswing.cdpr.measured.target import Target
 from freeswing.cdpr.measured.trajectory import Trajectory
 from freeswing.session.session_file import Session
@@ -57,6 +58,8 @@ def read_marker_runs(session: Session, target: Target | None) -> MarkerRuns:
             if run.trajectory is None or not holds_markers(run.trajectory):
                 continue
             recording = read_recording(run.trajectory)
+            if session.T_base_recorded is not None:
+                recording = moved_recording(recording, session.T_base_recorded)
             if fixes_poses(recording, target):
                 examined[run.name] = examine(recording, target, run.window_s)
         except (InputError, DataError) as failure:

@@ -21,6 +21,7 @@ from freeswing.session.bench_keys import (
     read_payloads,
     read_placed,
 )
+from freeswing.session.mocap_frame import read_mocap_frame
 
 Array = NDArray[np.float64]
 
@@ -118,6 +119,7 @@ class Session:
         runs: the recorded swings.
         channels: uncalibrated signals that runs may hold.
         loads: objects to be measured.
+        T_base_recorded: frame of measured trajectories, (4, 4), None: it is the base frame.
         results: folder that takes everything the commands write.
     """
 
@@ -132,6 +134,7 @@ class Session:
     runs: tuple[Run, ...] = field(default=())
     channels: tuple[Channel, ...] = ()
     loads: tuple[Load, ...] = ()
+    T_base_recorded: Array | None = None
 
     @property
     def folder(self) -> Path:
@@ -179,6 +182,7 @@ def read_session(path: Path | str, results: Path | str | None = None) -> Session
     runs = tuple(_read_run(table, paths) for table in tables)
     _check_runs(reader, runs)
     channels, loads = read_channels(reader), read_loads(reader)
+    frame = read_mocap_frame(reader.child("mocap", required=False))
     check_loads(reader, loads, [(run.name, run.loads) for run in runs])
     reader.finish()
     problems.raise_if_any(path)
@@ -188,7 +192,18 @@ def read_session(path: Path | str, results: Path | str | None = None) -> Session
     if results is not None and (beside.is_file() or not cameras.is_file()):
         cameras = beside
     return Session(
-        path, name, robot, folder, cameras, target, rate, calibration, runs, channels, loads
+        path,
+        name,
+        robot,
+        folder,
+        cameras,
+        target,
+        rate,
+        calibration,
+        runs,
+        channels,
+        loads,
+        frame,
     )
 
 
