@@ -14,12 +14,14 @@ from freeswing.console import Console
 
 COMMANDS = (
     "demo",
+    "new",
     "check",
     "calibrate",
     "track",
     "identify",
     "diagnose",
     "report",
+    "compare",
     "run",
     "convert",
     "export",

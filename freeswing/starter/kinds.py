@@ -1,0 +1,72 @@
+"""What may hang there, and the robot file that it begins with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+MISSING = "nan"  # a number that robot.toml does not take: nothing runs before it was measured
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """What hangs on how many strings.
+
+    Attributes:
+        says: one line for people.
+        cables: how many, where the kind settles it.
+        free_coordinates: what stays free, as robot.toml has it.
+        radius_m: of the pulleys; zero for eyelets and knots, None where it has to be measured.
+    """
+
+    says: str
+    cables: int
+    free_coordinates: str
+    radius_m: float | None = 0.0
+
+
+KINDS = {
+    "cable-robot": Kind("a platform on cables over pulleys", 4, '["x", "y"]', None),
+    "plate": Kind("a plate on four strings from fixed points", 4, '"auto"'),
+    "trifilar": Kind("a plate on three parallel strings", 3, '["x", "y", "chi"]'),
+    "bifilar": Kind("a bar on two parallel strings, along x", 2, '["x", "y", "phi", "chi"]'),
+    "hook": Kind("a body on one string or a crane's hook", 1, '["x", "y", "phi", "theta", "chi"]'),
+}
+
+
+def robot_toml(name: str, kind: Kind, cables: int, mass_kg: float | None) -> str:
+    """The text of robot.toml with every number that has to be measured marked `nan`."""
+    free = kind.free_coordinates if cables == kind.cables else '"auto"'
+    mass = f"mass_kg = {mass_kg:g}" if mass_kg else "# mass_kg = 8.0     # weigh it: optional"
+    lines = [
+        'format = "freeswing-robot/1"',
+        f'name = "{name}"',
+        f"# {kind.says}. Every `nan` below has to be measured: docs/formats.md says what each is.",
+        "# Base frame: that of the recordings, in metres. Platform frame: see target.toml.",
+        "gravity_m_s2 = [0.0, 0.0, -9.80665]   # z up; another vertical axis: put -9.80665 there",
+        f"free_coordinates = {free}",
+        "",
+        "[platform]",
+        mass,
+    ]
+    for k in range(1, cables + 1):
+        lines += ["", *_cable(k, kind)]
+    return "\n".join([*lines, ""])
+
+
+def _cable(k: int, kind: Kind) -> list[str]:
+    what = "where the cable enters the pulley" if kind.radius_m is None else "upper end"
+    lines = [
+        "[[cables]]",
+        f'name = "{k}"',
+        f"entry_m = [{MISSING}, {MISSING}, {MISSING}]        # {what}, base frame",
+        f"attachment_m = [{MISSING}, {MISSING}, {MISSING}]   # lower end, platform frame",
+    ]
+    if kind.radius_m is not None:
+        return [*lines, f"pulley_radius_m = {kind.radius_m:g}"]
+    return [
+        *lines,
+        f"pulley_radius_m = {MISSING}",
+        f"swivel_z = [{MISSING}, {MISSING}, {MISSING}]       # axis about which the pulley swivels",
+        f"swivel_x = [{MISSING}, {MISSING}, {MISSING}]       # square to it, towards the pulley",
+        f"swivel_y = [{MISSING}, {MISSING}, {MISSING}]       # square to both, right-handed",
+    ]

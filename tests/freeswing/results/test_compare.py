@@ -1,0 +1,64 @@
+"""Results side by side, through the command line."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from freeswing.cdpr.files.documents import write_json
+from freeswing.main import main
+from freeswing.results.common import Parameter
+from freeswing.results.comparison import NOTABLE_Z, Side, compare
+
+
+def left(folder: Path, com_x_m: float, std: float = 1e-5) -> str:
+    rows = [{"name": "com_x_m", "value": com_x_m, "std": std}]
+    estimates = {"ml_full": {"parameters": rows}, "fidim_free": {"parameters": rows}}
+    document = {"format": "freeswing-identification/1", "estimates": estimates}
+    write_json(folder / "results" / "identification.json", document)
+    return str(folder)
+
+
+def side(name: str, value: float, std: float | None) -> Side:
+    return Side(name=name, parameters=(Parameter(name="com_x_m", value=value, std=std),))
+
+
+@pytest.mark.parametrize(("shift", "word"), [(-0.01, "agree"), (0.01, "differ")])
+def test_the_limit_from_both_sides(shift: float, word: str) -> None:
+    spread = 5.0  # of 3 and 4
+    found = compare([side("a", 0.0, 3.0), side("b", (NOTABLE_Z + shift) * spread, 4.0)])
+    assert found.rows[0].z == (pytest.approx(NOTABLE_Z + shift),)
+    assert word in found.verdicts[0], found.verdicts
+
+
+def test_without_deviations_nothing_is_said_of_agreement() -> None:
+    assert (
+        "nothing to compare by" in compare([side("a", 0.0, None), side("b", 1.0, None)]).verdicts[0]
+    )
+
+
+def test_sessions_are_compared(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    before, after = left(tmp_path / "a", 0.002), left(tmp_path / "b", 0.003)
+    assert main(["compare", before, f"{after}:fidim_free"]) == 0
+    told = capsys.readouterr().out
+    assert "differ beyond 3 standard deviations in com_x_m" in told, told
+    assert "70.7" in told, told
+    assert main(["compare", before, after, "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["format"] == "freeswing-comparison/1"
+    assert document["rows"][0]["values"] == [0.002, 0.003]
+
+
+def test_what_cannot_be_compared_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = left(tmp_path / "a", 0.002)
+    assert main(["compare", before]) == 2
+    assert main(["compare", before, str(tmp_path / "b")]) == 2
+    assert main(["compare", before, f"{before}:ml_free"]) == 2
+    told = capsys.readouterr().err
+    assert "at least two" in told
+    assert "run freeswing identify first" in told
+    assert "it holds ml_full, fidim_free" in told
