@@ -9,6 +9,7 @@ from freeswing.commands.arguments import add_session, open_session
 from freeswing.console import Console
 
 if TYPE_CHECKING:
+    from freeswing.calib.calibrate import CalibrationResult
     from freeswing.results.codec import Document
     from freeswing.session.session_file import Session
     from freeswing.workers.crew import Crew
@@ -19,6 +20,8 @@ def add_arguments(parser: ArgumentParser) -> None:
     add_session(parser)
     models = ("PINHOLE", "OPENCV", "FULL_OPENCV", "OPENCV_FISHEYE")
     parser.add_argument("--model", choices=models, default="OPENCV", help="default OPENCV")
+    text = "adjust the same corners by COLMAP as well, and say where the two differ"
+    parser.add_argument("--check-with", choices=("pycolmap",), help=text)
 
 
 def run(options: Namespace, console: Console) -> None:
@@ -26,7 +29,10 @@ def run(options: Namespace, console: Console) -> None:
     from freeswing.session.stages import CALIBRATE
 
     session = open_session(options)
-    result = CALIBRATE.take(session, console, {"model": options.model})
+    settings = {"model": options.model}
+    if options.check_with:
+        settings["check_with"] = options.check_with
+    result = CALIBRATE.take(session, console, settings)
     console.say(str(session.cameras))
     console.show_file(result)
 
@@ -59,7 +65,8 @@ def make(
         gravity_m_s2=gravity_m_s2,
         progress=console.progress,
     )
-    document = Calibration.from_json(found.document)
+    beside = _beside_colmap(found, console) if settings.get("check_with") else {}
+    document = Calibration.from_json({**found.document, **beside})
     for entry in document.cameras:
         console.say(f"camera {entry.name}: {entry.views} views, {entry.reprojection_px:.3f} px")
     vertical = document.vertical
@@ -68,3 +75,19 @@ def make(
     for warning in document.verdict.warnings if document.verdict else ():
         console.complain(warning)
     return [("calibration.json", document)]
+
+
+def _beside_colmap(found: CalibrationResult, console: Console) -> dict[str, Any]:
+    """What COLMAP's solution adds to the document; tells what came of it."""
+    from freeswing.calib.verdict.colmap_check import beside_colmap, complaints, document
+
+    beside = beside_colmap(found.rig)
+    for one in beside:
+        console.say(
+            f"camera {one.camera} by COLMAP: focal length {100 * one.focal:+.3f} % (ours is known "
+            f"to {100 * one.focal_std:.3f} %), place {one.place_mm:.2f} mm, direction "
+            f"{one.turn_mrad:.2f} mrad away"
+        )
+    verdict = found.document["verdict"]
+    warned = {**verdict, "warnings": [*verdict["warnings"], *complaints(beside)]}
+    return {"beside_colmap": document(beside), "verdict": warned}

@@ -75,6 +75,19 @@ class Vertical(Entry):
 
 
 @entry
+class BesideColmap(Entry):
+    """One camera by COLMAP's bundle adjustment less the same by ours."""
+
+    camera: str = ""
+    focal: float | None = None
+    focal_std: float | None = None
+    centre_px: float | None = None
+    place_mm: float | None = None
+    turn_mrad: float | None = None
+    agrees: bool = True
+
+
+@entry
 class Covariance(Entry):
     """Joint covariance of all cameras' parameters."""
 
@@ -99,6 +112,7 @@ class Calibration(Document):
         adjustment: how the fit went.
         covariance: of all cameras together.
         vertical: the plumb line, where there was one.
+        beside_colmap: each camera by COLMAP, where that was asked for.
     """
 
     kind: ClassVar[str] = "calibration"
@@ -114,3 +128,4 @@ class Calibration(Document):
     adjustment: Mapping[str, Any] = empty()
     covariance: Covariance | None = None
     vertical: Vertical | None = absent()
+    beside_colmap: tuple[BesideColmap, ...] = absent(())
