@@ -21,6 +21,7 @@ from freeswing.cdpr.files.documents import (
     read_text,
     replace_file,
 )
+from freeswing.cdpr.files.number_table import comma_separated
 from freeswing.cdpr.files.robot_file import read_robot
 from freeswing.cdpr.robot import Robot
 
@@ -155,7 +156,7 @@ def read_readings(path: Path, n_cables: int) -> Readings:
         InputError: for unknown or missing columns, text that is not a number, a first row that is
             not zero.
     """
-    rows = list(csv.reader(io.StringIO(read_text(path, _MOST_CSV_BYTES))))
+    rows = list(csv.reader(io.StringIO(comma_separated(read_text(path, _MOST_CSV_BYTES)))))
     rows = [(line, row) for line, row in enumerate(rows, start=1) if any(c.strip() for c in row)]
     if not rows:
         raise InputError(f"{path}: empty; give a header and one static pose a row")

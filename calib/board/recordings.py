@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from freeswing.calib.footage.presentation import presentation_of, turn_of, upright
 from freeswing.cdpr.files.documents import InputError, read_text
+from freeswing.cdpr.files.number_table import comma_separated
 
 Image = NDArray[np.uint8]
 
@@ -178,7 +179,7 @@ def stamp_rows(path: Path) -> Iterator[tuple[int, int, float]]:
     Raises:
         InputError: when the file does not hold such rows.
     """
-    lines = read_text(path, _MOST_STAMP_BYTES).splitlines()
+    lines = comma_separated(read_text(path, _MOST_STAMP_BYTES)).splitlines()
     if not lines or [part.strip() for part in lines[0].split(",")][:2] != ["frame", "t_s"]:
         raise InputError(f"{path}: the first line must be frame,t_s")
     for row, line in enumerate(lines[1:], start=2):

@@ -12,6 +12,7 @@ import numpy as np
 from freeswing.calib.camera.lens_models import Array
 from freeswing.calib.verdict.plumb_line import StringView, Vertical
 from freeswing.cdpr.files.documents import InputError, read_text
+from freeswing.cdpr.files.number_table import comma_separated
 
 CLICK_STD_PX = 0.5
 _COLUMNS = ("camera", "u_px", "v_px")
@@ -32,7 +33,7 @@ def read_plumb_line(path: Path | str, cameras: Collection[str]) -> tuple[StringV
         InputError: not such a table, a camera that is not there, too few or too close points,
             or fewer than two views.
     """
-    lines = read_text(path, _MOST_BYTES).splitlines()
+    lines = comma_separated(read_text(path, _MOST_BYTES)).splitlines()
     table = csv.DictReader(lines, skipinitialspace=True)
     missing = [name for name in _COLUMNS if name not in (table.fieldnames or ())]
     if missing:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from freeswing.cdpr.driven.record import DriveRecord
 from freeswing.cdpr.files.documents import InputError, replace_file
-from freeswing.cdpr.files.number_table import check_times, read_lines, read_numbers
+from freeswing.cdpr.files.number_table import check_times, comma_separated, read_lines, read_numbers
 
 Array = NDArray[np.float64]
 
@@ -86,7 +86,7 @@ def _write(path: Path | str, names: list[str], table: Array) -> None:
 
 
 def _read(path: Path | str, wanted: tuple[str, ...]) -> tuple[Array, NDArray[np.intp]]:
-    lines = read_lines(path)
+    lines = comma_separated("\n".join(read_lines(path))).split("\n")
     found = tuple(cell.strip() for cell in lines[0].split(","))
     extra = [name for name in found[len(wanted) :] if not (name[:1] == "T" and name.endswith("_N"))]
     if found[: len(wanted)] != wanted or extra:

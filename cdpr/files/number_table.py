@@ -43,6 +43,17 @@ def read_lines(path: Path | str) -> list[str]:
     return text.split("\n")
 
 
+def comma_separated(text: str) -> str:
+    """CSV text with commas between cells, also of spreadsheets that write 0,5;1,2 for 0.5,1.2.
+
+    The header decides: with semicolons and without commas in it, they separate the cells.
+    """
+    header = text.lstrip("\ufeff").split("\n", 1)[0]
+    if ";" not in header or "," in header:
+        return text
+    return text.replace(",", ".").replace(";", ",")
+
+
 def check_width(path: Path | str, number: int, line: str, separator: str) -> None:
     """Refuse a header of more columns than any recording has.
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from freeswing.cdpr.files.documents import InputError, replace_file
-from freeswing.cdpr.files.number_table import check_width, read_lines, read_numbers
+from freeswing.cdpr.files.number_table import check_width, comma_separated, read_lines, read_numbers
 from freeswing.cdpr.frozen import freeze
 from freeswing.servo.synthesis.state_space import Array
 
@@ -49,7 +49,7 @@ def read_wrenches(path: Path | str, reach_m: Array, most_moment_N_m: float) -> W
     Raises:
         InputError: naming line and column.
     """
-    lines = read_lines(path)
+    lines = comma_separated("\n".join(read_lines(path))).split("\n")
     check_width(path, 1, lines[0], ",")
     names = tuple(cell.strip() for cell in lines[0].split(","))
     _check_header(path, names)
