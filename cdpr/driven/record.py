@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from freeswing.cdpr.driven.elastic import ElasticMotion
 from freeswing.cdpr.driven.motion import DrivenMotion
 from freeswing.cdpr.driven.slopes import moved
 
@@ -65,7 +66,7 @@ class Instruments:
 
 
 def observed(
-    motion: DrivenMotion,
+    motion: DrivenMotion | ElasticMotion,
     zero_pose: Array,
     instruments: Instruments,
     generator: np.random.Generator,

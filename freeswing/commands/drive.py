@@ -83,7 +83,7 @@ def check(path: Path, results: str | None, console: Console) -> None:
 
     file = read_drive_session(path, results)
     found = findings(file.session)
-    entries = [{"level": "error", "text": text} for text in found]
+    entries = [{"level": "error", "subject": "", "text": text, "remedy": ""} for text in found]
     write_json(file.results / "check.json", {"format": "freeswing-check/1", "findings": entries})
     for text in found:
         console.say(text)

@@ -34,6 +34,9 @@ def add_drive_arguments(parser: ArgumentParser) -> None:
     group.add_argument("--pose-rate-hz", type=positive, default=200.0, help="default 200")
     group.add_argument("--latency-s", type=not_negative, default=0.0, help="of the poses")
     group.add_argument("--encoder-step-rad", type=not_negative, default=0.0)
+    group.add_argument(
+        "--elastic-n", type=float, metavar="EA", help="elastic cables of EA newton: slack is exact"
+    )
     group.add_argument("--current-noise-a", type=not_negative, default=0.0)
 
 
@@ -41,6 +44,7 @@ def run_drive(options: Namespace, console: Console) -> None:
     """Start from rest without current, integrate, measure, write."""
     import numpy as np
 
+    from freeswing.cdpr.driven.elastic import elastic_rest, simulate_elastic
     from freeswing.cdpr.driven.motion import simulate_driven
     from freeswing.cdpr.driven.record import Instruments, observed
     from freeswing.cdpr.driven.statics import CENTRE, static_pose
@@ -56,9 +60,17 @@ def run_drive(options: Namespace, console: Console) -> None:
     limits = model.robot.drive.current_limits_A
     references = np.clip(asked, limits[:, 0], limits[:, 1])
     still = np.zeros(model.n_cables)
-    rest = static_pose(model, still, theta)
-    state = np.concatenate([rest.pose, np.zeros(6)])
-    motion = simulate_driven(model, state, references, rate_hz, theta, currents_A=still)
+    if options.elastic_n is not None and not options.elastic_n > 0.0:
+        raise InputError(f"--elastic-n {options.elastic_n:g}: a stiffness must be > 0")
+    if options.elastic_n is not None:
+        pose, out = elastic_rest(model, still, options.elastic_n, theta)
+        motion = simulate_elastic(
+            model, pose, out, references, rate_hz, options.elastic_n, theta, still
+        )
+    else:
+        rest = static_pose(model, still, theta)
+        state = np.concatenate([rest.pose, np.zeros(6)])
+        motion = simulate_driven(model, state, references, rate_hz, theta, currents_A=still)
     instruments = Instruments(
         pose_rate_hz=options.pose_rate_hz,
         latency_s=options.latency_s + values.get("pose_latency.added_s", 0.0),
@@ -88,12 +100,18 @@ def _said_of_limits(model: DrivenModel, asked: ndarray, given: ndarray) -> list[
 
 
 def _said_of_slack(model: DrivenModel, motion) -> list[str]:
-    """The rigid model pulls with a negative tension in silence; here it is said."""
+    """Which cables are slack, or would be: the rigid model pulls with a negative tension."""
     import numpy as np
 
     lines = []
     for index in np.flatnonzero(motion.slack.any(axis=0)):
         rows = np.flatnonzero(motion.slack[:, index])
+        if motion.tensions_N.min() >= 0.0:  # elastic cables: slack is in the motion
+            lines.append(
+                f"cable {model.robot.cables[index].name} is slack at {len(rows)} samples, first at "
+                f"{motion.times_s[rows[0]]:.3f} s"
+            )
+            continue
         lines.append(
             f"cable {model.robot.cables[index].name} would have to push at {len(rows)} samples, "
             f"first at {motion.times_s[rows[0]]:.3f} s, down to "

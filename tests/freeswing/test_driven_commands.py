@@ -44,6 +44,15 @@ def test_a_cable_that_would_push_is_named(tmp_path, capsys):
     assert "cable 2 would have to push" in capsys.readouterr().err
 
 
+def test_elastic_cables_go_slack_instead(tmp_path, capsys):
+    flags = ["prbs", "--band-hz", "5", "--duration-s", "0.4", "--levels-a", "0", "2.5"]
+    assert simulate(tmp_path / "a.csv", *flags, "--elastic-n", "3000", "--seed", "3") == 0
+    said = capsys.readouterr().err
+    assert "is slack at" in said
+    assert "have to push" not in said
+    assert simulate(tmp_path / "a.csv", *flags, "--elastic-n", "0") == 2
+
+
 @pytest.mark.parametrize(
     ("flags", "words"),
     [
