@@ -46,10 +46,11 @@ def make(
     import os
 
     from freeswing.cdpr.effects import catalogue
-    from freeswing.cdpr.files.documents import InputError
+    from freeswing.cdpr.files.documents import DataError, InputError
     from freeswing.ident.diagnose.diagnose import diagnose
     from freeswing.results.diagnosis import Diagnosis
     from freeswing.results.motions import ladder_motions
+    from freeswing.session.load_bench import is_bench
     from freeswing.session.load_swings import load_robot, load_swings, load_target
 
     only = settings["only"]
@@ -57,6 +58,12 @@ def make(
         if name not in catalogue():
             raise InputError(f"--only {name}: not one of {', '.join(sorted(catalogue()))}")
     robot = load_robot(session)
+    if is_bench(session, robot):
+        raise DataError(
+            f"{session.path}: a bench (channels, loads, partial runs or parallel wires): diagnose "
+            "looks for effects in sessions of poses or free coordinates alone; what a bench's runs "
+            "contradict is said by identify"
+        )
     swings = list(load_swings(session, robot, load_target(session)))
     candidates = None if only is None else tuple(only)
     count = crew.processes or os.cpu_count() or 1

@@ -13,6 +13,7 @@ from freeswing.cdpr.files.documents import InputError, replace_file
 from freeswing.report.material import Material
 from freeswing.report.panels.advice import Advice
 from freeswing.report.panels.answer import Answer
+from freeswing.report.panels.bench import BenchPanel
 from freeswing.report.panels.cameras import Cameras
 from freeswing.report.panels.change import Change
 from freeswing.report.panels.dropped import Dropped
@@ -49,6 +50,7 @@ class Panel(Protocol):
 
 PANELS: tuple[Panel, ...] = (
     Answer(),
+    BenchPanel(),
     HowSure(),
     EffectLadder(),
     Change(),

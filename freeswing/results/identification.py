@@ -98,6 +98,8 @@ class ValidatedRun(Entry):
         prediction_rmse_m: measured less predicted position, rms a coordinate.
         prediction_rmse_rad: the same of angles.
         prediction_rmse: of partial runs, in the measured column's unit.
+        column: of partial runs, which one that is.
+        noise_floor: the same unit: what was left where the start was fitted.
         noise_floor_m: what the samples' own noise leaves.
         note: what a reader should know.
     """
@@ -107,6 +109,8 @@ class ValidatedRun(Entry):
     prediction_rmse_m: float | None = None
     prediction_rmse_rad: float | None = absent()
     prediction_rmse: float | None = absent()
+    column: str = absent("")
+    noise_floor: float | None = absent()
     noise_floor_m: float | None = None
     note: str = absent("")
 
@@ -139,6 +143,44 @@ class Body(Entry):
     name: str
     runs: tuple[str, ...] | None = absent()
     parameters: tuple[BodyParameter, ...] = ()
+
+
+@entry
+class ChannelGain(Entry):
+    """A term of a channel, in column units per rad or m."""
+
+    name: str
+    value: float | None = None
+    std: float | None = None
+
+
+@entry
+class ChannelResult(Entry):
+    """An uncalibrated signal: its gains and its noise, in the column's unit."""
+
+    name: str
+    gains: tuple[ChannelGain, ...] = ()
+    noise: float | None = None
+
+
+@entry
+class ClassicReason(Entry):
+    """Why the classic formula is off, as far as one reason goes."""
+
+    what: str
+    percent: float = 0.0
+
+
+@entry
+class ClassicRow(Entry):
+    """The classic formula of two or three wires beside the fit, of one run."""
+
+    run: str
+    period_s: float | None = None
+    Izz_kg_m2: float | None = None
+    fitted_Izz_kg_m2: float | None = None
+    off_percent: float = 0.0
+    reasons: tuple[ClassicReason, ...] = ()
 
 
 @entry
@@ -189,6 +231,9 @@ class Identification(Document):
         amplification: how many times more the pose moves than they do, at worst.
         notes: sentences about the session.
         objects: platform and loads where the session has loads or payloads.
+        channels: uncalibrated signals of a bench.
+        classic: the classic formula of benches, by run.
+        scatter_between_runs_kg_m2: of Izz on a bench beyond noise; 0: none was seen.
         swings: where each run took place.
         entries_m: the cables' entry points.
         markers: what the recorded markers were worth.
@@ -204,6 +249,9 @@ class Identification(Document):
     amplification: float | None = None
     notes: tuple[str, ...] = ()
     objects: tuple[Body, ...] | None = absent()
+    channels: tuple[ChannelResult, ...] | None = absent()
+    classic: tuple[ClassicRow, ...] | None = absent()
+    scatter_between_runs_kg_m2: float | None = absent()
     swings: tuple[SwingPlace, ...] = ()
     entries_m: tuple[Numbers, ...] = ()
     markers: Markers | None = None

@@ -125,6 +125,14 @@ def _has_its_cameras(session: Session) -> bool:
     return made is not None and {camera.name for camera in made.cameras} <= known
 
 
+def _is_bench(session: Session) -> bool:
+    """Whether all runs go into one fit, which says itself what they contradict."""
+    from freeswing.session.load_bench import is_bench
+    from freeswing.session.load_swings import load_robot
+
+    return is_bench(session, load_robot(session))
+
+
 def _needs_calibration(session: Session) -> bool:
     """Cameras that came from elsewhere are not calibrated again."""
     source = session.calibration
@@ -163,7 +171,7 @@ DIAGNOSE = Stage(
     "diagnose",
     "diagnosis.json",
     _motion_files,
-    lambda session: any(run.role == "validate" for run in session.runs),
+    lambda session: any(run.role == "validate" for run in session.runs) and not _is_bench(session),
     {"only": None},
     lambda session: [session.results / "diagnosis_motion.json"],
 )

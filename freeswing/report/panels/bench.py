@@ -1,0 +1,65 @@
+"""Panel: a bench's bodies, its channels, and the classic formula beside the fit."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from freeswing.report.bench_words import HALF_WIDTH_95
+from freeswing.report.material import Material
+from freeswing.report.words import number
+from freeswing.results.identification import BodyParameter, ChannelGain, ClassicRow
+
+
+class BenchPanel:
+    """Absolute inertia of platform and objects; what the textbook formula would have said."""
+
+    name = "bench"
+    title = "The bench"
+
+    def values(self, material: Material) -> dict[str, Any] | None:
+        """Rows by body, channel and run; None where the session is no bench."""
+        found = material.identification
+        if found is None or not found.objects or not found.classic:
+            return None
+        return {
+            "objects": [
+                {"name": one.name, "rows": [_row(row) for row in one.parameters]}
+                for one in found.objects
+            ],
+            "channels": [
+                {
+                    "name": one.name,
+                    "noise": number(one.noise),
+                    "rows": [_gain(g) for g in one.gains],
+                }
+                for one in found.channels or ()
+            ],
+            "classic": [_classic(row) for row in found.classic],
+        }
+
+
+def _row(row: BodyParameter) -> dict[str, str]:
+    known = row.value is not None
+    word = "as given: the runs tell no more" if known else "not told by these runs"
+    return {
+        "parameter": row.name,
+        "value": number(row.value, 5),
+        "± 95 %": "–" if row.std is None else number(HALF_WIDTH_95 * row.std, 2),
+        "remark": "" if row.identifiable else word,
+    }
+
+
+def _gain(row: ChannelGain) -> dict[str, str]:
+    half = "–" if row.std is None else number(HALF_WIDTH_95 * row.std, 2)
+    return {"entry": row.name, "gain": number(row.value, 5), "± 95 %": half}
+
+
+def _classic(row: ClassicRow) -> dict[str, str]:
+    return {
+        "run": row.run,
+        "period (s)": number(row.period_s, 5),
+        "formula (kg m²)": number(row.Izz_kg_m2, 5),
+        "fit (kg m²)": number(row.fitted_Izz_kg_m2, 5),
+        "off (%)": f"{row.off_percent:+.2f}",
+        "why": "; ".join(f"{one.what} {one.percent:+.2f} %" for one in row.reasons),
+    }
