@@ -6,6 +6,7 @@ I = m g R r T^2 / (4 pi^2 L): equal wires, the centre of mass in their middle, s
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,6 +18,8 @@ from freeswing.ident.bench.solve import Solved
 from freeswing.ident.bench.swing import IZZ, BenchSwing, Column
 
 LEAST_PERIODS = 2.0
+BESIDE = "centre of mass beside the middle: yaw moves it along"
+LEANING_PERCENT = 1.0  # of Izz: what a bench is asked for
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,7 +132,7 @@ def _reasons(
     off_centre = float(total[0] * centre @ centre / total[IZZ])
     return (
         ("mass that payload runs contradict", 100.0 * (mass / total[0] - 1.0)),
-        ("centre of mass beside the middle: yaw moves it along", -100.0 * off_centre),
+        (BESIDE, -100.0 * off_centre),
         ("amplitude: the period grows with it", 100.0 * amplitude**2 / 8.0),
         ("wire length", 100.0 * (fitted / length - 1.0)),
     )
@@ -151,6 +154,24 @@ def group_sentence(solved: Solved) -> str:
         "platform with all that hangs on it: if the declared mass was wrong, all is settled; if it "
         "was right, measure R and L again, then film a clock. The platform's inertia in kg m2 is "
         "the same for the first two, and goes with the payloads' masses and squared distances"
+    )
+
+
+def leaning_sentence(classic: Sequence[ClassicRun], sway_seen: bool) -> str:
+    """A warning where Izz leans on a centre of mass that no calibrated column has shown.
+
+    Args:
+        classic: the runs by the formula.
+        sway_seen: whether some run measures x or y itself.
+    """
+    shares = [-share for run in classic for what, share in run.reasons if what == BESIDE]
+    if sway_seen or not shares or float(np.median(shares)) < LEANING_PERCENT:
+        return ""
+    return (
+        f"DO NOT RELY ON Izz about P: {np.median(shares):.1f} % of it comes from a centre of mass "
+        "beside the middle, which only shows in sway, and no run measures x or y itself: how an "
+        "uncalibrated signal or yaw alone answers to sway may look the same. Give com_m, measure x "
+        "and y in one run, or hang the platform so that its wires share the weight alike"
     )
 
 

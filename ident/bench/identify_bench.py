@@ -12,7 +12,12 @@ from freeswing.cdpr.model.batch import evaluate
 from freeswing.cdpr.model.equations import Model, build_model
 from freeswing.cdpr.robot import INERTIA_NAMES, POSE_COORDINATES, Array, Robot
 from freeswing.ident.bench.assemble import EFFECTS, assembled
-from freeswing.ident.bench.classic import ClassicRun, classic_runs, group_sentence
+from freeswing.ident.bench.classic import (
+    ClassicRun,
+    classic_runs,
+    group_sentence,
+    leaning_sentence,
+)
 from freeswing.ident.bench.held_out import HeldOut, held_out
 from freeswing.ident.bench.objects import moments, moments_slope, specific, specific_slope
 from freeswing.ident.bench.report_objects import (
@@ -129,7 +134,10 @@ def identify_bench(bench: Bench, robot: Robot) -> BenchResult:
     checked = [run for run in bench.runs if run.role == "validate"]
     validation = tuple(held_out(model, bench, found, run) for run in checked)
     classic = tuple(classic_runs(found, robot.platform.mass_kg))
-    return BenchResult(found, bench, classic, validation, tuple(_notes(found, bench, robot)))
+    sway = any({"x", "y"} & set(run.coordinates) for run in fitted)
+    leaning = leaning_sentence(classic, sway)
+    notes = [*([leaning] if leaning else []), *_notes(found, bench, robot)]
+    return BenchResult(found, bench, classic, validation, tuple(notes))
 
 
 def _check(bench: Bench, robot: Robot) -> None:

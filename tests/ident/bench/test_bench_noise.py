@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from freeswing.ident.bench.averaged import averaged
+from freeswing.ident.bench.classic import BESIDE, ClassicRun, leaning_sentence
 from freeswing.ident.bench.noise import scatter_std
 from freeswing.ident.bench.runs import BenchRun, Signal
 from freeswing.ident.bench.solve import _without_prior
@@ -66,3 +67,13 @@ def test_dense_samples_are_averaged_and_others_left(rate_hz: float, kept: int) -
     run = averaged(BenchRun("run", "identify", times, (Signal("chi", values),)))
     assert len(run.times_s) == 481 // kept
     np.testing.assert_allclose(run.signals[0].values, np.sin(5.0 * run.times_s), atol=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("share", "sway_seen", "warned"), [(0.9, False, False), (1.1, False, True), (5.0, True, False)]
+)
+def test_an_izz_that_leans_on_unseen_sway_is_not_to_be_relied_on(
+    share: float, sway_seen: bool, warned: bool
+) -> None:
+    runs = [ClassicRun(str(k), 1.0, 0.01, 0.01, ((BESIDE, -share),)) for k in range(3)]
+    assert ("DO NOT RELY" in leaning_sentence(runs, sway_seen)) == warned
