@@ -202,17 +202,18 @@ def _preferred(markers: list[tuple[str, int]], types: list[str]) -> list[tuple[s
 
 def _vicon(path: Path | str, lines: list[str]) -> Layout:
     """Vicon Nexus: the block `Trajectories`, rate, labels every third column, axes, units."""
-    separator = ";" if lines[2].count(";") > lines[2].count(",") else ","
     at = next((k for k, line in enumerate(lines) if line.startswith("Trajectories")), None)
     if at is None or len(lines) < at + 6:
         raise InputError(f"{path}: no block 'Trajectories'; export the trajectories too")
+    separator = ";" if lines[at + 3].count(";") > lines[at + 3].count(",") else ","
     rate = _rate(path, lines[at + 1].split(separator)[0])
     labels = [cell.strip() for cell in lines[at + 2].split(separator)]
     axes = [cell.strip() for cell in lines[at + 3].split(separator)]
     units = [cell.strip() for cell in lines[at + 4].split(separator)]
     if axes[:2] != ["Frame", "Sub Frame"]:
         raise InputError(f"{path}: line {at + 4}: must start with Frame and Sub Frame")
-    markers = tuple((label, k) for k, label in enumerate(labels) if label and k >= 2)
+    last = len(axes) - 3
+    markers = tuple((label, k) for k, label in enumerate(labels) if label and 2 <= k <= last)
     if not markers:
         raise InputError(f"{path}: line {at + 3}: no labels; label the markers and export again")
     metres = _metres(path, units[2] if len(units) > 2 else "")

@@ -4,6 +4,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from freeswing.cdpr.files.problems import InputError
 from freeswing.cdpr.files.trajectory_files import (
@@ -137,6 +139,24 @@ def test_what_is_wrong_in_an_export_is_named(tmp_path: Path, old, new, message) 
     (tmp_path / "a.csv").write_text(text.replace(old, new), encoding="utf-8")
     with pytest.raises(InputError, match=message):
         read_recording(tmp_path / "a.csv")
+
+
+@pytest.mark.parametrize("name", EXPORTS)
+@settings(max_examples=60, deadline=None)
+@given(data=st.data())
+def test_damaged_exports_are_read_or_refused(tmp_path_factory, name, data) -> None:
+    content = bytearray(EXPORTS[name].encode())
+    for _ in range(data.draw(st.integers(1, 5))):
+        at = data.draw(st.integers(0, len(content) - 1))
+        content[at] = data.draw(st.sampled_from([*b"0129-.,;\t\n e_Xx", 0, 1, 127, 128, 255]))
+    end = data.draw(st.integers(0, len(content)) | st.just(len(content)))
+    path = tmp_path_factory.mktemp("damaged") / name
+    path.write_bytes(bytes(content[:end]))
+    try:
+        found = read_recording(path)
+    except InputError:
+        return
+    assert found.positions_m.shape == (len(found.times_s), len(found.names), 3)
 
 
 TRC = """PathFileType\t4\t(X/Y/Z)\ta.trc
