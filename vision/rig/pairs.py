@@ -24,7 +24,8 @@ _LEAST_OVERLAP = 20
 _STEPS_A_FRAME = 2
 _NEARLY_BEST = 0.25
 """Lags whose speeds correlate worse than the best by more are not looked at by poses."""
-_MOST_CANDIDATES = 16
+_MOST_CANDIDATES = 100
+_MOST_REFINED = 12
 _PLAUSIBLE, _PLAUSIBLE_M = 3.0, 0.02
 """Cameras that were knocked by less than this leave the choice of the lag to their calibration."""
 _HALVINGS = 7
@@ -110,7 +111,8 @@ def pair_of(first: OwnTrack, second: OwnTrack, T_known: Array) -> Pair | None:
             fit = min([fit, *(f for f in near if f is not None)], key=size)
         return fit
 
-    tried = sorted((refined(fit) for fit in found), key=size)
+    near_best = sorted(found, key=size)[:_MOST_REFINED]
+    tried = sorted((refined(fit) for fit in near_best), key=size)
     best = tried[0]
     rivals: list[tuple[float, float]] = []
     for fit in tried[1:]:
