@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from freeswing.calib.board.board_check import marker_warning, settled_board
 from freeswing.calib.board.boards import Board, board_from
 from freeswing.calib.board.recordings import find_recordings
 from freeswing.calib.board.sightings import Sightings, gather, see_boards
@@ -116,9 +117,10 @@ def calibrate_session(
         lambda label, share: told(label, 0.7 * share),
     )
     told("adjusting", 0.7)
+    board, said = settled_board(board, np.concatenate([s.pixels for s in sightings]))
     std = SURVEY_STD_M if survey_std_m is None else survey_std_m
     rig, alone_px = rig_from_sightings(sightings, board, frame_rate_hz, model, base_tags, std)
-    warnings: list[str] = []
+    warnings = [text for text in (said, _marker(board, rig)) if text is not None]
     survey: SurveyCheck | None = None
     if base_tags:
         told("base tags", 0.8)
@@ -247,6 +249,10 @@ def clock_warnings(rig: Rig) -> list[str]:
         "the board moved too little for the cameras' clocks: they are taken to agree here, and "
         "`track` measures them from the swing; wave the board about to have them calibrated"
     ]
+
+
+def _marker(board: Board, rig: Rig) -> str | None:
+    return marker_warning(board, float(rig.adjustment.scene.warp_m[2]))
 
 
 def _group_warnings(rig: Rig) -> list[str]:

@@ -20,6 +20,8 @@ from freeswing.cdpr.files.documents import InputError, read_text
 
 KINDS = ("charuco", "chessboard", "aprilgrid")
 _MOST_YAML_BYTES = 1 << 20
+LARGEST_SQUARE_M = 1.0
+"""A board that a person can wave has squares of 10 to 200 mm."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +56,11 @@ class Board:
             )
         if not (np.isfinite(self.square_m) and self.square_m > 0.0):
             raise ValueError(f"board: square side is {self.square_m} m, must be above 0")
+        if self.square_m > LARGEST_SQUARE_M:
+            raise ValueError(
+                f"board: a square or tag of {self.square_m:g} m: lengths are in metres, "
+                f"{1e-3 * self.square_m:g} if these are millimetres"
+            )
         if self.kind == "charuco" and not 0.0 < self.marker_m < self.square_m:
             raise ValueError(
                 f"board: marker_m is {self.marker_m}, must lie between 0 and {self.square_m}"

@@ -49,9 +49,13 @@ class BoardCorners:
 
 @dataclass(slots=True)
 class BoardDetector:
-    """Detector of one board; keeps OpenCV's set-up between images."""
+    """Detector of one board; keeps OpenCV's set-up between images.
+
+    Boards printed white on black are found in the negative: the first image with a board decides.
+    """
 
     board: Board
+    is_negative: bool | None = field(default=None, init=False)
     _points: int = field(init=False, repr=False)
     _tags: list[tuple[int, cv2.aruco.ArucoDetector]] = field(init=False, repr=False)
 
@@ -81,6 +85,17 @@ class BoardDetector:
             corners = self._find_chessboard(image)
             alike = np.tile(np.eye(2), (self._points, 1, 1))
             return None if corners is None else BoardCorners(corners, alike)
+        if self.is_negative is not None:
+            return self._detect_tags(255 - image if self.is_negative else image)
+        for negative in (False, True):
+            found = self._detect_tags(255 - image if negative else image)
+            if found is not None:
+                self.is_negative = negative
+                return found
+        return None
+
+    def _detect_tags(self, image: Image) -> BoardCorners | None:
+        """Tags of a board that is black on white in the image."""
         best = self.nothing()
         for border, detector in self._tags:
             found = self._tag_corners(image, border, detector)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from freeswing.calib.board.board_check import is_mirrored
 from freeswing.calib.board.board_motion import Timeline, linked, timeline
 from freeswing.calib.board.boards import Board
 from freeswing.calib.board.detection import BoardDetector
@@ -15,6 +16,7 @@ from freeswing.calib.board.recordings import Recording, read_frames
 from freeswing.calib.camera.lens_models import Array
 from freeswing.calib.footage.frame_times import frame_times
 from freeswing.calib.rig.views import Views, make_views
+from freeswing.cdpr.files.documents import DataError
 
 Progress = Callable[[str, float], None]
 
@@ -23,6 +25,7 @@ BURST = 5
 LEAST_FLOW = 4
 _LARGEST_BEND = 0.35
 _WORKERS = 2
+_LOOKED_AT_AGAIN, _EVERY = 6, 5
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,6 +91,7 @@ def _see_board(
     wanted = _wanted(count)
     still_at = set(np.linspace(0, count - 1, n_still).round().astype(int)) if n_still else set()
     detector = BoardDetector(board)
+    without: list[np.ndarray] = []  # some images without a board
     numbers, labels, found, stills, size = [], [], [], [], (0, 0)
     for position, (number, label, image) in enumerate(read_frames(recording)):
         size = (image.shape[1], image.shape[0])
@@ -100,6 +104,13 @@ def _see_board(
             numbers.append(number)
             labels.append(label)
             found.append(corners)
+        elif len(without) < _LOOKED_AT_AGAIN and position % _EVERY == 0:
+            without.append(image)
+    if not found and board.kind != "chessboard" and is_mirrored(board, without):
+        raise DataError(
+            f"{recording.path}: shows the board's mirrored image: its pictures are flipped, or the "
+            "board is seen through its back. Record without a mirror"
+        )
     frames = np.array(numbers, dtype=int)
     empty = detector.nothing()
     return Sightings(
