@@ -33,6 +33,7 @@ from freeswing.vision.rig.rig_effects import (
     rig_step,
 )
 from freeswing.vision.rig.rig_kernels import CLOCK, LINE, PER_CAMERA, POSE
+from freeswing.vision.rig.stamp_jitter import stamp_jitter_s, widened_poses, widened_step
 
 Array = NDArray[np.float64]
 
@@ -101,11 +102,18 @@ def correct_rig(
         current[index] = views[index].believed(
             repose_by_base_tags(views[index], watch, survey_std_m)
         )
-    clocks, lines, last = _estimate(current, watch, instants, moved, survey_std_m, poses)
+    clocks, lines, last, jitter = _estimate(current, watch, instants, moved, survey_std_m, poses)
     clocks = clocks + lags
+    remarks += tuple(
+        f"{view.camera.name}: its stamps jitter by {1e3 * own:.2f} ms (standard deviation), which "
+        "the deviations of poses, clocks and line times count"
+        for view, own in zip(views, jitter, strict=True)
+        if own
+    )
     if not (moved or clocks.any() or lines.any()):
         refuse_disagreement(views, before)
-        return Corrected(tuple(views), poses, before, before, ())
+        poses = widened_poses(poses, jitter)
+        return Corrected(tuple(views), poses, before, before, (), remarks)
     final = [
         _decided(view, own, clock, line)
         for view, own, clock, line in zip(current, calibrated, clocks, lines, strict=True)
@@ -114,6 +122,7 @@ def correct_rig(
     poses, after = fuse(final, watch, instants_of(final), start=_restarted(final, watch, start))
     refuse_disagreement(final, after)
     findings = _findings(calibrated, final, moved, clocks, lines, last)
+    poses = widened_poses(poses, jitter)
     return Corrected(tuple(final), poses, before, after, findings, remarks)
 
 
@@ -152,8 +161,11 @@ def _estimate(
     moved: dict[int, float],
     survey_std_m: float,
     poses: Poses,
-) -> tuple[Array, Array, RigStep]:
-    """Changes of clock and line time that are real, (n_c,) each; moved cameras in place."""
+) -> tuple[Array, Array, RigStep, Array]:
+    """Changes of clock and line time that are real, (n_c,) each; moved cameras in place.
+
+    With the last step, and the jitter of each camera's stamps.
+    """
     n_c = len(current)
     clock_free = np.arange(n_c) != _reference(current)
     free = np.zeros((n_c, PER_CAMERA), dtype=bool)
@@ -165,17 +177,20 @@ def _estimate(
     with_lines = free.copy()
     with_lines[:, LINE] = True
     poses, fit = fuse(current, watch, instants, start=poses, passes=2, rough=True)
+    jitter = stamp_jitter_s(current, watch, poses, fit)
     trial = rig_step(current, watch, poses, fit, with_lines, survey_std_m)
+    trial = widened_step(trial, current, jitter)
     lines = trial.changes[:, LINE]
     real = is_real(lines, trial.deviations[:, LINE], LEAST_LINE_S)
     real &= np.abs(lines) < _longest_lines(current)
     if real.any():
         free[:, LINE] = real
         step = _iterate(current, watch, poses, fit, free, total, survey_std_m)
+    step = widened_step(step, current, jitter)
     clocks = total[:, CLOCK] - (np.median(total[:, CLOCK]) if n_c > 2 else 0.0)
     deviation = np.where(clock_free, step.deviations[:, CLOCK], step.deviations[:, CLOCK].max())
     sure = is_real(clocks, deviation, LEAST_CLOCK_S)
-    return np.where(sure, clocks, 0.0), np.where(real, total[:, LINE], 0.0), step
+    return np.where(sure, clocks, 0.0), np.where(real, total[:, LINE], 0.0), step, jitter
 
 
 def is_real(values: Array, deviations: Array, least: float) -> NDArray[np.bool_]:

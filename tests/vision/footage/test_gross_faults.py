@@ -75,6 +75,7 @@ def exchanged_ids(text: str) -> str:
     return re.sub(r"^id = ([01])$", lambda m: f"id = {swapped[m[1]]}", text, flags=re.M)
 
 
+@pytest.mark.slow
 def test_exchanged_ids_are_put_right_from_the_first_frame(tmp_path) -> None:
     folder = write_session(tmp_path, target=exchanged_ids)
     assert track(folder) == 0
