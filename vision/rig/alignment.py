@@ -18,8 +18,9 @@ Array = NDArray[np.float64]
 REACH_FRAMES = 0.5
 """Smaller lags are left to the adjustment of the clocks, which is exact that near."""
 CLEARLY_BETTER = 1.5
-"""A start is believed when poses fit so many times better there than at no offset, and cameras at
-any other start."""
+"""An offset is looked for when poses fit so many times better there than as stamped."""
+SURE_SIGMAS = 4.0
+"""A start is believed when the variance between cameras is so many deviations below any other's."""
 IN_EARNEST = 3.0
 """Starts that leave poses no more times as far apart as the best are tried with everything free."""
 MOST_TRIED = 10
@@ -44,8 +45,9 @@ class Aligned:
     remarks: tuple[str, ...]
 
 
-Misfit = Callable[[CameraViews, CameraViews], float]
-"""How far two cameras disagree, in px, with clocks and rolling shutters free to be put right."""
+Misfit = Callable[[CameraViews, CameraViews], tuple[float, int]]
+"""How far the second camera is from what both agree on, in px, with clocks and rolling shutters
+free to be put right; and in how many frames it was compared."""
 
 
 def aligned(views: Sequence[CameraViews], reference: int, misfit: Misfit) -> Aligned:
@@ -74,19 +76,19 @@ def aligned(views: Sequence[CameraViews], reference: int, misfit: Misfit) -> Ali
         step = min(tracks[known].step_s, tracks[new].step_s)
         if abs(pair.lag_s) < REACH_FRAMES * step or not _needed(pair):
             continue
-        lag, best_px, rival_px = _chosen(pair, current[known], views[new], misfit)
+        lag, best_px, rival_px, sure = _chosen(pair, current[known], views[new], misfit)
         here, there = views[new].camera.name, views[known].camera.name
-        if rival_px < CLEARLY_BETTER * best_px:
+        if sure < SURE_SIGMAS:
             raise DataError(
                 f"cameras {there} and {here} were started apart, and the swing does not tell by "
-                f"how much: {lag:+.3f} s leaves {best_px:.2f} px, another start {rival_px:.2f} px. "
+                f"how much: {lag:+.3f} s leaves {best_px:.3f} px, another start {rival_px:.3f} px. "
                 "Record the release too, or stamps of one clock"
             )
         lags[new] = lag
         current[new] = _later(views[new], lag)
         remarks.append(
             f"{here}: its clock is {lag:+.3f} s from {there}'s: they then disagree by "
-            f"{best_px:.2f} px, next best start {_px(rival_px)} (as stamped poses are "
+            f"{best_px:.3f} px, next best start {_px(rival_px)} (as stamped poses are "
             f"{_mm(pair.at_zero_m)} apart)"
         )
     return Aligned(tuple(current), lags, pairs, tuple(remarks))
@@ -94,14 +96,24 @@ def aligned(views: Sequence[CameraViews], reference: int, misfit: Misfit) -> Ali
 
 def _chosen(
     pair: Pair, known: CameraViews, new: CameraViews, misfit: Misfit
-) -> tuple[float, float, float]:
-    """The best lag with its misfit, and that of the next best, in px."""
+) -> tuple[float, float, float, float]:
+    """The best lag, its misfit and the next best's in px, and how many deviations apart they are.
+
+    Logarithms of variances have deviations of sqrt(2 / n): n counts two numbers a frame, since the
+    errors of one frame's corners are much alike.
+    """
     lags = [pair.lag_s]
     lags += [lag for lag, miss_m in pair.rivals if miss_m < IN_EARNEST * pair.decided_m]
-    sizes = [misfit(known, _later(new, lag)) for lag in lags[:MOST_TRIED]]
-    order = np.argsort(sizes, kind="stable")
-    rival = sizes[order[1]] if len(sizes) > 1 else float("inf")
-    return lags[order[0]], sizes[order[0]], rival
+    tried = [misfit(known, _later(new, lag)) for lag in lags[:MOST_TRIED]]
+    order = sorted(range(len(tried)), key=lambda k: tried[k][0])
+    best_px, count = tried[order[0]]
+    sure, rival_px = float("inf"), float("inf")
+    for k in order[1:]:
+        size, frames = tried[k]
+        rival_px = min(rival_px, size)
+        spread = np.sqrt(1.0 / max(count, 1) + 1.0 / max(frames, 1))
+        sure = min(sure, float(2.0 * np.log(size / best_px) / spread))
+    return lags[order[0]], best_px, rival_px, sure
 
 
 def own_track(view: CameraViews) -> OwnTrack:
@@ -150,7 +162,7 @@ def _later(view: CameraViews, lag_s: float) -> CameraViews:
 
 
 def _px(misfit_px: float) -> str:
-    return f"{misfit_px:.2f} px" if np.isfinite(misfit_px) else "far off"
+    return f"{misfit_px:.3f} px" if np.isfinite(misfit_px) else "far off"
 
 
 def _mm(miss_m: float) -> str:

@@ -18,6 +18,7 @@ from freeswing.cdpr.rotation import log_rotation
 from freeswing.vision.fuse.fuse_cameras import Fit, fuse
 from freeswing.vision.fuse.poses import Poses
 from freeswing.vision.fuse.run_views import CameraViews, instants_of
+from freeswing.vision.look.follow import USED
 from freeswing.vision.look.label import label_markers
 from freeswing.vision.look.watched_target import Watch
 from freeswing.vision.rig.alignment import aligned
@@ -126,18 +127,22 @@ def correct_rig(
     return Corrected(tuple(final), poses, before, after, findings, remarks)
 
 
-def _misfit_px(views: Sequence[CameraViews], watch: Watch, survey_std_m: float) -> float:
-    """What is left between cameras when their clocks and line times are free."""
+def _misfit_px(
+    views: Sequence[CameraViews], watch: Watch, survey_std_m: float
+) -> tuple[float, int]:
+    """What the last camera misses, clocks and line times free, and in how many frames."""
     instants, current = instants_of(views), list(views)
     poses, fit = fuse(current, watch, instants, passes=2, rough=True)
     if int(poses.known.sum()) < _LEAST_KNOWN:
-        return float("inf")
+        return float("inf"), 0
     free = np.zeros((len(views), PER_CAMERA), dtype=bool)
     free[:, LINE] = True
     free[:, CLOCK] = np.arange(len(views)) != _reference(current)
     _iterate(current, watch, poses, fit, free, np.zeros_like(free, dtype=float), survey_std_m)
     _, fit = fuse(current, watch, instants, start=poses, passes=2, rough=True)
-    return float(np.sqrt(np.mean(fit.floor_px**2)))
+    seen = [np.sort(view.middle_times()[view.status == USED]) for view in current]
+    both = (seen[-1] > seen[0][0]) & (seen[-1] < seen[0][-1])
+    return float(fit.floor_px[-1]), int(both.sum())
 
 
 def _refuse_far(views: Sequence[CameraViews], final: Sequence[CameraViews]) -> None:

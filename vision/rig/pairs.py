@@ -20,6 +20,9 @@ Array = NDArray[np.float64]
 
 MOST_LAG_S = 10.0
 LEAST_OVERLAP_S = 1.0
+OVERLAP_SHARE = 0.5
+"""Recordings of one run share at least so much of the shorter one: on less, a swing that nearly
+repeats itself fits itself by chance."""
 _LEAST_OVERLAP = 20
 _STEPS_A_FRAME = 2
 _NEARLY_BEST = 0.25
@@ -189,7 +192,8 @@ def _fitted(first: OwnTrack, second: OwnTrack, lag: float, T_known: Array) -> Fi
     inside = (right > 1) & (right < len(times) - 1)
     four = np.clip(right, 2, len(times) - 2)[:, None] + np.arange(-2, 2)
     inside &= np.diff(times[four], axis=1).max(axis=1) < 1.5 * first.step_s
-    if inside.sum() < _LEAST_OVERLAP or np.ptp(at[inside]) < LEAST_OVERLAP_S:
+    least = max(_LEAST_OVERLAP, OVERLAP_SHARE * min(len(at), len(times)))
+    if inside.sum() < least or np.ptp(at[inside]) < LEAST_OVERLAP_S:
         return None
     four, own = four[inside], _points(second)[inside]
     weights = _cubic(times[four], at[inside])
