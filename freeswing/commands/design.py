@@ -10,7 +10,9 @@ from freeswing.commands.arguments import add_results
 from freeswing.console import Console
 
 if TYPE_CHECKING:
+    from freeswing.cdpr.driven.model import DrivenModel
     from freeswing.servo.design.controller import Controller
+    from freeswing.servo.design.offer import Order
     from freeswing.servo.files.weights_file import Goals
 
 METHODS = ("hinf", "lqg", "pid", "joint-pid", "all")
@@ -60,7 +62,7 @@ def run(options: Namespace, console: Console) -> None:
     folder = path.parent / "results" if options.results is None else Path(options.results)
     wanted = FAMILY if options.method == "all" else (options.method,)
     order = Order(goals, tuple(options.at), options.order)
-    documents = {}
+    documents, first = {}, None
     for k, method in enumerate(wanted):
         console.progress("design", k / len(wanted))
         try:
@@ -69,6 +71,7 @@ def run(options: Namespace, console: Console) -> None:
             raise InputError(f"{options.weights or path}: {error}") from error
         except ValueError as error:
             raise DataError(f"{path}: {method}: {error}") from error
+        first = first or found
         documents[method] = _write(folder, found, method == wanted[0])
         _say(console, found, goals)
     result = folder / "controller.json"
@@ -76,7 +79,8 @@ def run(options: Namespace, console: Console) -> None:
         _robustness(console, model, order, folder)
     if options.method == "all":
         write_json(folder / "controllers.json", _table(documents))
-    _figures(folder, model, goals, order)
+    if first is not None:
+        _figures(folder, model, goals, order, first)
     console.say(str(result))
     console.show_file(result)
 
@@ -127,7 +131,7 @@ def _say(console: Console, found: Controller, goals: Goals) -> None:
         console.complain(f"warning: {found.method}: {warning}")
 
 
-def _robustness(console: Console, model, order, folder: Path) -> None:
+def _robustness(console: Console, model: DrivenModel, order: Order, folder: Path) -> None:
     from freeswing.cdpr.files.documents import write_json
     from freeswing.servo.design.robustness import survey_document
 
@@ -137,15 +141,15 @@ def _robustness(console: Console, model, order, folder: Path) -> None:
         console.say(line)
 
 
-def _figures(folder: Path, model, goals: Goals, order) -> None:
+def _figures(
+    folder: Path, model: DrivenModel, goals: Goals, order: Order, found: Controller
+) -> None:
+    """Figs. 12 and 13 of the first controller."""
     from freeswing.cdpr.files.documents import replace_file
     from freeswing.report.servo_figures import controller_gains, templates
-    from freeswing.servo.design.offer import offer
 
-    found = offer(model, "hinf", order)
-    plant = order.plant(model)
     for name, svg in (
         ("controller-gains.svg", controller_gains(found)),
-        ("controller-templates.svg", templates(found, plant, goals.weights)),
+        ("controller-templates.svg", templates(found, order.plant(model), goals.weights)),
     ):
         replace_file(folder / name, svg.encode())

@@ -62,7 +62,8 @@ def finished(
     if fastest > np.pi * CONTROL_RATE_HZ and method != "hinf":
         raise ValueError(f"a pole at {fastest:.3g} rad/s is too fast for {CONTROL_RATE_HZ} Hz")
     late = plant.delay_s + HALF_HOLD_S
-    undelayed, delayed = examine(plant.system, system), examine(plant.system, system, late)
+    undelayed = examine(plant.system, system)
+    delayed = examine(plant.system, system, late, undelayed)
     return Controller(
         method,
         system,

@@ -46,16 +46,22 @@ def open_response(plant: StateSpace, controller: StateSpace, rates: Array) -> Co
     return plant.at(rates) @ controller.at(rates)
 
 
-def examine(plant: StateSpace, controller: StateSpace, delay_s: float = 0.0) -> Loop:
+def examine(
+    plant: StateSpace, controller: StateSpace, delay_s: float = 0.0, before: Loop | None = None
+) -> Loop:
     """Margins of the loop; with a delay it is stable while that is below the delay margin.
 
     Args:
         plant: continuous, wrench to pose.
         controller: continuous, pose error to wrench.
         delay_s: of the pose on its way to the controller.
+        before: the same loop at another delay, to spare its stability and delay margin.
     """
-    stable = close(bare(plant).plant, controller).is_stable()
-    margin = delay_margin(plant, controller) if stable else 0.0
+    if before is not None:
+        stable, margin = before.delay_margin_s > 0.0, before.delay_margin_s
+    else:
+        stable = close(bare(plant).plant, controller).is_stable()
+        margin = delay_margin(plant, controller) if stable else 0.0
     S = sensitivity(plant, controller, np.r_[AT_REST_RAD_S, RATES_RAD_S], delay_s)
     return Loop(stable and margin > delay_s, _half(S[:, :3, :3]), _half(S[:, 3:, 3:]), margin)
 
