@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from markupsafe import Markup
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from freeswing.report.figures import INK, MARKS, SERIES, Draw, figures, key
@@ -86,13 +88,7 @@ def _summary(name: str, estimate: Estimate) -> dict[str, str]:
 def _chart(estimates: dict[str, Estimate], after: tuple[Parameter, ...]) -> Markup:
     """Each parameter by every method; the corrected values stand apart and are named so."""
     order = {name: k for k, name in enumerate(ESTIMATE_ORDER)}
-    by_name: dict[str, list[tuple[int, Parameter]]] = {}
-    for name, estimate in estimates.items():
-        for entry in estimate.parameters:
-            by_name.setdefault(entry.name, []).append((order[name], entry))
-    for entry in after:
-        by_name.setdefault(entry.name, []).append((-1, entry))
-    shown = [(name, points) for name, points in by_name.items() if points]
+    shown = list(_by_name(estimates, after).items())
     if not shown:
         return Markup()
     names = [(ESTIMATES[name], SERIES[order[name]], MARKS[order[name]]) for name in estimates]
@@ -105,25 +101,53 @@ def _chart(estimates: dict[str, Estimate], after: tuple[Parameter, ...]) -> Mark
     return figures([_interval(*one) for one in shown] + [key(legend)], 1.45, caption)
 
 
-def _interval(name: str, points: list[tuple[int, Parameter]]) -> Draw:
-    stem, scale, unit = unit_of(name)
+def _by_name(
+    estimates: dict[str, Estimate], after: Sequence[Parameter]
+) -> dict[str, list[tuple[int, Parameter]]]:
+    """The points of each parameter."""
+    order = {name: k for k, name in enumerate(ESTIMATE_ORDER)}
+    found: dict[str, list[tuple[int, Parameter]]] = {}
+    for name, estimate in estimates.items():
+        for entry in estimate.parameters:
+            found.setdefault(entry.name, []).append((order[name], entry))
+    for entry in after:
+        found.setdefault(entry.name, []).append((-1, entry))
+    return found
 
+
+def _interval(name: str, points: list[tuple[int, Parameter]]) -> Draw:
     def draw(sheet: Figure) -> None:
-        axes = sheet.subplots()
-        for kind, entry in points:
-            if entry.value is None:
-                continue
-            half = scale * HALF_WIDTH_95 * (entry.std or 0.0)
-            colour, mark = (INK, "*") if kind < 0 else (SERIES[kind], MARKS[kind])
-            size = 9 if kind < 0 else 5
-            axes.errorbar(
-                scale * entry.value, -kind, xerr=half, fmt=mark, ms=size, capsize=3, color=colour
-            )
-        axes.set_yticks([])
-        axes.margins(y=0.3)
-        axes.locator_params(axis="x", nbins=4)
-        axes.ticklabel_format(axis="x", useOffset=False)
-        axes.set_xlabel(f"{plain(stem)} ({unit})")
-        axes.spines["left"].set_visible(False)
+        draw_interval(sheet.subplots(), name, points)
 
     return draw
+
+
+def interval_sheet(estimates: dict[str, Estimate], after: Sequence[Parameter]) -> Figure:
+    """The same as one figure, for notebooks."""
+    shown = list(_by_name(estimates, after).items())
+    across = 3
+    sheet = Figure(figsize=(9.0, 0.3 + 1.3 * -(-len(shown) // across)), layout="constrained")
+    for k, (name, points) in enumerate(shown):
+        axes = sheet.add_subplot(-(-len(shown) // across), across, k + 1)
+        draw_interval(axes, name, points)
+    return sheet
+
+
+def draw_interval(axes: Axes, name: str, points: list[tuple[int, Parameter]]) -> None:
+    """One parameter by each method; the kind of a point is its method's rank, -1 the corrected."""
+    stem, scale, unit = unit_of(name)
+    for kind, entry in points:
+        if entry.value is None:
+            continue
+        half = scale * HALF_WIDTH_95 * (entry.std or 0.0)
+        colour, mark = (INK, "*") if kind < 0 else (SERIES[kind], MARKS[kind])
+        size = 9 if kind < 0 else 5
+        axes.errorbar(
+            scale * entry.value, -kind, xerr=half, fmt=mark, ms=size, capsize=3, color=colour
+        )
+    axes.set_yticks([])
+    axes.margins(y=0.3)
+    axes.locator_params(axis="x", nbins=4)
+    axes.ticklabel_format(axis="x", useOffset=False)
+    axes.set_xlabel(f"{plain(stem)} ({unit})")
+    axes.spines["left"].set_visible(False)

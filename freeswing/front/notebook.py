@@ -1,0 +1,76 @@
+"""A session as Python works with it: the commands' own steps, quietly."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from freeswing.commands.report import write_report
+from freeswing.console import Console
+from freeswing.front.found import Found, diagnosed, identified
+from freeswing.results.codec import Document
+from freeswing.results.diagnosis import Diagnosis
+from freeswing.results.files import read_document
+from freeswing.results.identification import Identification
+from freeswing.session.session_file import Session, read_session
+from freeswing.session.stages import DIAGNOSE, IDENTIFY, Stage
+from freeswing.workers.crew import Crew
+
+
+@dataclass(frozen=True, slots=True)
+class LabSession:
+    """A session on disk; its results are written as the commands write them.
+
+    Attributes:
+        session: session.toml, read.
+    """
+
+    session: Session
+
+    @property
+    def runs(self) -> tuple[str, ...]:
+        """Names of the recorded swings."""
+        return tuple(run.name for run in self.session.runs)
+
+    def identify(self, **settings: Any) -> Found:
+        """The inertial parameters; taken from the file where it is up to date.
+
+        Args:
+            settings: those of `freeswing identify`, such as `consistent=True`.
+
+        Raises:
+            InputError: a file is wrong.
+            DataError: the data cannot give a result.
+        """
+        return identified(self._taken(IDENTIFY, Identification, settings, Crew()))
+
+    def diagnose(self, *, workers: int = 0, only: tuple[str, ...] | None = None) -> Found:
+        """What the model lacks, judged on held-out runs; taken from the file where up to date.
+
+        Raises:
+            InputError: a file is wrong.
+            DataError: the data cannot give a result.
+        """
+        settings = {} if only is None else {"only": list(only)}
+        return diagnosed(self._taken(DIAGNOSE, Diagnosis, settings, Crew(workers)))
+
+    def report(self) -> Path:
+        """Write the page of all results that there are; gives its path."""
+        return write_report(self.session)[0]
+
+    def _taken(self, stage: Stage, kind: type[Any], settings: dict[str, Any], crew: Crew) -> Any:
+        path = self.session.results / stage.result
+        if settings or not stage.is_current(self.session):
+            path = stage.take(self.session, Console(quiet=True), settings, crew)
+        document: Document | None = read_document(path, kind)
+        return document
+
+
+def open_lab(path: Path | str, results: Path | str | None = None) -> LabSession:
+    """A session by its folder or session.toml.
+
+    Raises:
+        InputError: naming every problem of the file.
+    """
+    return LabSession(read_session(path, results))
