@@ -52,6 +52,7 @@ def make(
     from freeswing.results.motions import ladder_motions
     from freeswing.session.load_bench import is_bench
     from freeswing.session.load_swings import load_robot, load_swings, load_target
+    from freeswing.session.repeated_runs import refuse_repeated
 
     only = settings["only"]
     for name in only or ():
@@ -65,6 +66,7 @@ def make(
             "contradict is said by identify"
         )
     swings = list(load_swings(session, robot, load_target(session)))
+    refuse_repeated(swings)
     candidates = None if only is None else tuple(only)
     count = crew.processes or os.cpu_count() or 1
     found = diagnose(swings, robot, console.progress, count, candidates, crew.executor)

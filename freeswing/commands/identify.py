@@ -76,6 +76,7 @@ def make(
     from freeswing.session.load_bench import is_bench
     from freeswing.session.load_swings import load_robot, load_swings, load_target
     from freeswing.session.marker_runs import read_marker_runs
+    from freeswing.session.repeated_runs import refuse_repeated
 
     robot = load_robot(session)
     if is_bench(session, robot):
@@ -83,6 +84,7 @@ def make(
     target = load_target(session)
     markers = read_marker_runs(session, target)
     swings = load_swings(session, robot, target, markers)
+    refuse_repeated(swings)
     try:
         geometry = GeometryPriors(settings.get("entry_std_m"), settings.get("attachment_std_m"))
     except ValueError as error:
