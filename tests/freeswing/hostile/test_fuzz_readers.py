@@ -38,7 +38,7 @@ from freeswing.homing.homing_files import read_homing
 from freeswing.report.material import read_material
 from freeswing.report.page import render_page
 from freeswing.vision.fuse.calibration_share import read_calibration_noise
-from tests.freeswing.hostile_files import broken
+from tests.freeswing.hostile.hostile_files import broken
 from tests.freeswing.report.report_material import whole_material
 from tests.places import SAMPLES
 
