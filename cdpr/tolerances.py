@@ -23,6 +23,9 @@ class Tolerances:
         pulley_radius_m: of the groove's radius with half the cable's diameter: a calliper.
         swivel_rad: of a swivel axis: a spirit level on a bracket.
         reference_m: of the measured point's place in the platform frame.
+        frame_m: of the platform frame that markers or tags give, from run to run, where poses
+            state how far they err together; beside what is stated.
+        frame_rad: of its orientation.
         clock_s: between the clocks of positions and orientations.
         creep_m_s: of a cable on a locked winch.
         stretch_s2_m: mass of the platform over EA: steel of 1 mm under 8 kg has 1e-4.
@@ -34,6 +37,8 @@ class Tolerances:
     pulley_radius_m: float = 2e-4
     swivel_rad: float = 0.01
     reference_m: float = 5e-4
+    frame_m: float = 5e-4
+    frame_rad: float = 2e-3
     clock_s: float = 5e-4
     creep_m_s: float = 1e-6
     stretch_s2_m: float = 1e-4

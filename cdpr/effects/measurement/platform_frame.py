@@ -8,8 +8,6 @@ from freeswing.cdpr.effects.base import Effect, Instant, Parameter, Recorded
 from freeswing.cdpr.model.body import Expression
 from freeswing.cdpr.robot import Robot
 
-SHIFT_M, TURN_RAD = 5e-4, 2e-3
-
 
 class PlatformFrame(Effect):
     """A constant small shift and turn of the measured frame in the platform, new in each run.
@@ -25,7 +23,8 @@ class PlatformFrame(Effect):
 
     def parameters(self, robot: Robot) -> tuple[Parameter, ...]:
         """Shift and rotation vector in the platform frame."""
-        sizes = {"shift": ("m", SHIFT_M), "turn": ("rad", TURN_RAD)}
+        known = robot.tolerances
+        sizes = {"shift": ("m", known.frame_m), "turn": ("rad", known.frame_rad)}
         return tuple(
             Parameter(f"{stem}_{axis}_{unit}", -3.0 * size, 3.0 * size, size, per_run=True)
             for stem, (unit, size) in sizes.items()

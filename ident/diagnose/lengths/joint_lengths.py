@@ -54,21 +54,19 @@ class Normal:
         rights: (r, p).
         squares: of what is left with all unknowns at zero, (r,).
         rows: of the runs.
-        size: of the slow errors.
-        repetition: see `length_noise.repetition`.
+        sizes: of the slow errors of each run, (r,).
     """
 
     matrices: Array
     rights: Array
     squares: Array
     rows: tuple[LengthRows, ...]
-    size: float
-    repetition: float
+    sizes: Array
 
     def variation_m(self, values: Array) -> float:
         """What unknowns (p,) leave of the lengths' variation along the runs, root mean square."""
-        weighed = self.size * float(np.sqrt(self.repetition))
-        left = [_left(one, _reduced(one, weighed), values) for one in self.rows]
+        pairs = zip(self.rows, self.sizes, strict=True)
+        left = [_left(one, _reduced(one, size), values) for one, size in pairs]
         return float(np.sqrt(np.mean(np.concatenate([rest.reshape(-1) for rest in left]) ** 2)))
 
 
@@ -88,29 +86,30 @@ class Solved:
 
 
 def normal_equations(rows: Sequence[LengthRows], widest: Array) -> Normal:
-    """Normal equations with slow errors as large, and as repetitive, as what is left asks for.
+    """Normal equations with slow errors as large, and as repetitive, as each run asks for.
+
+    A run with a spoiled marker has larger ones than the others, and weighs less.
 
     Args:
         rows: of all runs.
         widest: prior standard deviations with everything wrong, (p,).
     """
-    least = max(one.least_size for one in rows)
-    size, repeats = least, 1.0
-    freedom = float(sum(one.right.size - one.own.shape[2] for one in rows)) - len(widest)
-    if freedom <= 0.0:
+    least = np.array([one.least_size for one in rows])
+    sizes = least
+    share = len(widest) / len(rows)
+    freedom = [one.right.size - one.own.shape[2] - share for one in rows]
+    if min(freedom) <= 0.0:
         raise ValueError("too few samples for the unknowns of the geometry")
     for _ in range(3):
-        found = [_reduced(one, size * np.sqrt(repeats)) for one in rows]
+        found = [_reduced(*pair) for pair in zip(rows, sizes, strict=True)]
         solution = solved(_summed(found), widest)
         left = [_left(one, part, solution.values) for one, part in zip(rows, found, strict=True)]
-        estimated = slow_size(rows, left, freedom)
-        white = [_whitened(one, estimated, rest) for one, rest in zip(rows, left, strict=True)]
-        repeated = estimated**2 * (repetition(white) if estimated > 0.0 else 1.0)
-        size, repeats = max(least, float(np.sqrt(repeated))), 1.0
-    found = [_reduced(one, size * np.sqrt(repeats)) for one in rows]
+        own = [_own_size(*run) for run in zip(rows, left, freedom, strict=True)]
+        sizes = np.maximum(least, own)
+    found = [_reduced(*pair) for pair in zip(rows, sizes, strict=True)]
     matrices = np.array([part.matrix for part in found])
     rights, squares = np.array([p.right for p in found]), np.array([p.square for p in found])
-    return Normal(matrices, rights, squares, tuple(rows), size, repeats)
+    return Normal(matrices, rights, squares, tuple(rows), sizes)
 
 
 def solved(summed: tuple[Array, Array, float], spread: Array) -> Solved:
@@ -212,6 +211,12 @@ def _left(rows: LengthRows, part: _Part, values: Array) -> Array:
     change = np.concatenate([values, [1.0]])
     own = -part.own_inverse @ (part.own[:n_own, n_own:] @ change)
     return rows.right + rows.shared @ values + rows.own @ own
+
+
+def _own_size(rows: LengthRows, left: Array, freedom: float) -> float:
+    """Size of a run's slow errors, as large as if their repetitions were independent."""
+    size = slow_size([rows], [left], freedom)
+    return size * float(np.sqrt(repetition([_whitened(rows, size, left)]))) if size else 0.0
 
 
 def _whitened(rows: LengthRows, size: float, left: Array) -> Array:

@@ -96,7 +96,9 @@ def length_rows(
     if samples.slow is not None:
         least = LEAST_SIZE
         drift = drift + samples.slow.drift_covariance
-        own.append(in_platform @ _root(samples.slow.frame_covariance))
+        known = model.robot.tolerances
+        usual = np.diag([known.frame_m**2] * 3 + [known.frame_rad**2] * 3)
+        own.append(in_platform @ _root(samples.slow.frame_covariance + usual))
     mean_in_platform = _means(in_platform, blocks)
     counts = np.bincount(blocks)[:, None, None]
     return LengthRows(

@@ -77,14 +77,14 @@ class Kinematics:
     Attributes:
         wrong: blocks that are off, the surest first.
         probabilities: of each block to be off.
-        size: of the slow errors over their stated or usual size.
+        sizes: of each run's slow errors over their usual size.
         besides: values of effects that make lengths vary, with standard deviations, by effect:
             fitted jointly, and left to the dynamics to accept.
     """
 
     wrong: tuple[WrongPlace, ...]
     probabilities: dict[str, float]
-    size: float
+    sizes: tuple[float, ...]
     besides: dict[str, tuple[Array, Array]]
 
     def document(self) -> dict[str, Any]:
@@ -102,7 +102,7 @@ class Kinematics:
                 for one in self.wrong
             ],
             "probabilities": self.probabilities,
-            "slow_errors": self.size,
+            "slow_errors": list(self.sizes),
             "besides": {
                 name: {"values": values.tolist(), "std": stds.tolist()}
                 for name, (values, stds) in self.besides.items()
@@ -154,7 +154,7 @@ def kinematics(fit: LikelihoodFit, keys: Sequence[str], noise_scales: Array) -> 
                 WrongPlace(key, named, found_there, block, single[key], against, *variation)
             )
     rest = {name: _told(blocks.columns[name], found, covariance) for name in patterns[0]}
-    return Kinematics(tuple(places), single, normal.size, rest)
+    return Kinematics(tuple(places), single, tuple(normal.sizes.tolist()), rest)
 
 
 def _told(columns: np.ndarray, found: Solved, covariance: Array) -> tuple[Array, Array]:
