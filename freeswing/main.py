@@ -12,30 +12,31 @@ from types import ModuleType
 from freeswing import __version__
 from freeswing.console import Console
 
-COMMANDS = (
-    "demo",
-    "new",
-    "check",
-    "calibrate",
-    "track",
-    "identify",
-    "diagnose",
-    "report",
-    "compare",
-    "run",
-    "convert",
-    "export",
-    "simulate",
-    "linearise",
-    "drive",
-    "effects",
-    "board",
-    "home",
-    "excite",
-    "design",
-    "servo",
-    "tensions",
-)
+# Each command with the room of `freeswing/commands` that its file stands in, as help lists them.
+COMMANDS = {
+    "demo": "session",
+    "new": "session",
+    "check": "session",
+    "calibrate": "session",
+    "track": "session",
+    "identify": "session",
+    "diagnose": "session",
+    "report": "session",
+    "compare": "session",
+    "run": "session",
+    "convert": "files",
+    "export": "files",
+    "simulate": "robot",
+    "linearise": "robot",
+    "drive": "session",
+    "effects": "robot",
+    "board": "files",
+    "home": "robot",
+    "excite": "robot",
+    "design": "control",
+    "servo": "control",
+    "tensions": "control",
+}
 DONE, NO_RESULT, WRONG_INPUT, INTERRUPTED = 0, 1, 2, 130
 
 
@@ -102,8 +103,8 @@ def build_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"freeswing {__version__}")
     choices = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    for name in COMMANDS:
-        _add_command(choices, name, importlib.import_module(f"freeswing.commands.{name}"))
+    for name, room in COMMANDS.items():
+        _add_command(choices, name, importlib.import_module(f"freeswing.commands.{room}.{name}"))
     return parser
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from freeswing.commands.report import write_report
+from freeswing.commands.session.report import write_report
 from freeswing.console import Console
 from freeswing.front.found import Found, diagnosed, identified
 from freeswing.results.codec import Document

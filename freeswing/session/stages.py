@@ -64,7 +64,7 @@ class Stage:
         chosen = self.settings | (settings or {})
         # Inputs are hashed first: what changes meanwhile makes the result out of date.
         made_of = provenance(session, self.inputs(session), chosen)
-        make: Make = importlib.import_module(f"freeswing.commands.{self.name}").make
+        make: Make = importlib.import_module(f"freeswing.commands.session.{self.name}").make
         documents = make(session, console, chosen, crew or Crew())
         main, *beside = documents
         for name, document in reversed(beside):

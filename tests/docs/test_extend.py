@@ -156,8 +156,8 @@ def test_cameras_in_another_format_come_back(tmp_path, monkeypatch) -> None:
 
 
 def test_a_command_is_run(monkeypatch, capsys) -> None:
-    module_of("A command", "freeswing.commands.runs", monkeypatch)
-    monkeypatch.setattr(freeswing.main, "COMMANDS", (*freeswing.main.COMMANDS, "runs"))
+    module_of("A command", "freeswing.commands.session.runs", monkeypatch)
+    monkeypatch.setattr(freeswing.main, "COMMANDS", {**freeswing.main.COMMANDS, "runs": "session"})
     assert main(["runs", str(SAMPLES / "undeclared-drag")]) == 0
     said = capsys.readouterr().out.splitlines()
     roles = {line.partition(": ")[2] for line in said}

@@ -14,8 +14,6 @@ from tests.places import ROOT
 
 FLOORS = ("calib", "cdpr", "excite", "freeswing", "homing", "ident", "servo", "vision")
 MOST_FILES = 16
-# One file a command, named as it is typed: there is nothing to search for.
-MOST_COMMANDS = 26
 MOST_FILE_LINES = 400
 MOST_FUNCTION_LINES = 80
 MEAN_COMPLEXITY = 2.5
@@ -75,8 +73,7 @@ def test_no_room_is_crowded() -> None:
     counts = Counter(path.parent for path in SOURCES if path.name != "__init__.py")
     tests = [path for path in _walk(ROOT / "tests") if "oracle" not in path.parts]
     counts += Counter(path.parent for path in tests)
-    limits = {ROOT / "freeswing" / "commands": MOST_COMMANDS}
-    crowded = {name_of(p): n for p, n in counts.items() if n > limits.get(p, MOST_FILES)}
+    crowded = {name_of(p): n for p, n in counts.items() if n > MOST_FILES}
     assert crowded == {}, crowded
 
 

@@ -1,6 +1,6 @@
 """What `diagnose` says of the directions in which a point is known."""
 
-from freeswing.commands.diagnose import seen_directions
+from freeswing.commands.session.diagnose import seen_directions
 
 
 def test_best_and_worst_direction_of_each_point_are_told():

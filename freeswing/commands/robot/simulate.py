@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from freeswing.commands.arguments import not_negative, positive, whole
-from freeswing.commands.simulate_drive import add_drive_arguments, run_drive
+from freeswing.commands.robot.simulate_drive import add_drive_arguments, run_drive
 from freeswing.console import Console
 
 if TYPE_CHECKING:

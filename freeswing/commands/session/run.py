@@ -24,7 +24,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(options: Namespace, console: Console) -> None:
     """Take each step that is due; the page is always written anew."""
-    from freeswing.commands.drive import identify as identify_drive
+    from freeswing.commands.session.drive import identify as identify_drive
     from freeswing.session.drive_session import drive_path, read_drive_session
 
     driven = drive_path(options.session)
@@ -44,7 +44,7 @@ def run_session(session: Session, console: Console, crew: Crew) -> None:
         DataError: where a step came to no result; the report is written all the same and says so.
     """
     from freeswing.cdpr.files.documents import DataError
-    from freeswing.commands.report import NO_VALIDATION, write_report
+    from freeswing.commands.session.report import NO_VALIDATION, write_report
     from freeswing.session.stages import DIAGNOSE, STAGES
 
     failures: dict[str, DataError] = {}

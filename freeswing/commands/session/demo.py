@@ -24,7 +24,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(options: Namespace, console: Console) -> None:
     """Record, solve, and end with the report's path."""
     from freeswing.cdpr.files.documents import InputError
-    from freeswing.commands.run import run_session
+    from freeswing.commands.session.run import run_session
     from freeswing.session.session_file import read_session
 
     folder = Path(options.folder)

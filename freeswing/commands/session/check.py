@@ -16,7 +16,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(options: Namespace, console: Console) -> None:
     """Examine the session; fails where a finding keeps a command from a result."""
     from freeswing.cdpr.files.documents import DataError, write_json
-    from freeswing.commands.drive import check as check_drive
+    from freeswing.commands.session.drive import check as check_drive
     from freeswing.doctor.examine import examine
     from freeswing.results.check import Check, Found
     from freeswing.session.drive_session import drive_path

@@ -1,0 +1,1 @@
+"""Commands for the driven robot under control."""

@@ -1,0 +1,1 @@
+"""Commands on single files: other programs' formats, boards to print."""
