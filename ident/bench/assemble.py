@@ -11,6 +11,7 @@ from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.robot import POSE_COORDINATES, Array, Robot
 from freeswing.ident.bench.averaged import averaged
 from freeswing.ident.bench.begin import Glimpse, best_size, first_gains, glimpse, sight, thinned
+from freeswing.ident.bench.channel_blocks import channel_blocks
 from freeswing.ident.bench.channels import Channel
 from freeswing.ident.bench.chart import Chart
 from freeswing.ident.bench.objects import body_of, moments, specific
@@ -31,13 +32,7 @@ UPRIGHT = 0.9  # of gravity along a platform axis: along it the centre may hang 
 CENTRED_COM = 0.05  # the same of a platform, across: its wires share the weight to a tenth
 WIDE_TENSOR = 2.0  # of mass x spread^2: twice a hoop through the wires
 WIDE_MASS = 0.5  # of the declared mass, where payloads are to say it
-BENT = 2.0  # squares of a channel per rad, over its gain: a wall hit at 45 degrees
-TWICE_BENT = 4.0  # cubes likewise
-UNKNOWN_GAIN = 0.5  # of a gain guessed from a usual twist
-OWN_LEVER = 2.0  # gains for sway over that for yaw, 1/m: a dot on a wall half a metre away
-OFFSET = 10.0  # times a channel's spread
 SCANNED_RUNS = 4
-FOLLOWED_RIDGE = 1e-4  # of the motion's variance: coordinates that hardly move get no large gain
 
 
 Gains = Mapping[str, Array]
@@ -260,7 +255,7 @@ def _unknowns(
     blocks.append(_starts(swings, glimpses))
     for channel in bench.channels:
         if channel.name in gains:
-            blocks += _channel_blocks(channel, swings, glimpses, gains[channel.name])
+            blocks += channel_blocks(channel, swings, glimpses, gains[channel.name])
     return Unknowns(tuple(blocks))
 
 
@@ -335,95 +330,3 @@ def _loose(columns: Sequence[Column], lengths_m: Array) -> Array:
     found = np.repeat([SWAY_RAD * float(np.mean(lengths_m)), UNSEEN_RAD], 3)
     found[seen] = np.inf
     return found
-
-
-def _channel_blocks(
-    channel: Channel, swings: Sequence[BenchSwing], glimpses: Sequence[Glimpse], gains: Array
-) -> list[Unknown]:
-    """The offset of every run, and the gains with what is known of them."""
-    mine = [column for swing in swings for column in swing.columns if column.channel == channel]
-    spread = max(float(np.nanstd(column.values)) for column in mine)
-    offsets = np.zeros((len(swings), 1))
-    for run, swing in enumerate(swings):
-        for column in swing.columns:
-            if column.channel == channel:
-                offsets[run] = np.nanmean(column.values)
-    loose = Gaussian(
-        np.array([offsets.mean()]),
-        np.array([OFFSET * spread + np.ptp(offsets) + 1e-9]),
-        "unknown zero",
-    )
-    if any(swing.columns[0].channel != channel for swing in swings) and not channel.gains:
-        gains = _followed_gains(channel, swings, glimpses, gains)
-    std = gain_spread(channel, gains)
-    exact = np.array(
-        [
-            len(term) == 1
-            and channel.coordinates[term[0]] in channel.gains
-            and channel.coordinates[term[0]] not in channel.gains_std
-            for term in channel.terms
-        ]
-    )
-    mean = np.where(
-        [
-            len(term) == 1
-            and (
-                channel.coordinates[term[0]] in channel.gains
-                or channel.coordinates[term[0]] == channel.main_coordinate
-            )
-            for term in channel.terms
-        ],
-        gains,
-        0.0,
-    )
-    prior = Gaussian(mean, std, "gains" if channel.gains else "a usual twist")
-    values = np.tile(gains, (len(swings), 1)) if channel.per_run else gains
-    return [
-        Unknown(f"offset.{channel.name}", offsets, np.array([spread]), loose, each_run=True),
-        Unknown(
-            f"channel.{channel.name}",
-            values,
-            std,
-            prior,
-            ~exact,
-            each_run=channel.per_run,
-        ),
-    ]
-
-
-def _followed_gains(
-    channel: Channel, swings: Sequence[BenchSwing], glimpses: Sequence[Glimpse], gains: Array
-) -> Array:
-    """Linear gains by which a channel follows the motion that other columns tell, (terms,)."""
-    rows, right, linear = [], [], len(channel.coordinates)
-    for swing, first in zip(swings, glimpses, strict=True):
-        for place, column in enumerate(swing.columns):
-            if column.channel == channel:
-                moved, values = first.moved[:, channel.columns], first.values[:, place]
-                known = np.isfinite(values)
-                rows.append((moved - moved.mean(axis=0))[known])
-                right.append(values[known] - values[known].mean())
-    design, told = np.vstack(rows), np.concatenate(right)
-    held = np.sqrt(FOLLOWED_RIDGE * len(told)) * np.abs(design).max() * np.eye(linear)
-    found = np.linalg.lstsq(
-        np.vstack([design, held]), np.append(told, np.zeros(linear)), rcond=None
-    )[0]
-    return np.concatenate([found, np.zeros(len(gains) - linear)])
-
-
-def gain_spread(channel: Channel, gains: Array) -> Array:
-    """Prior standard deviations of a channel's terms, (terms,)."""
-    place = channel.coordinates.index(channel.main_coordinate)
-    main = abs(float(gains[place])) or 1.0
-    found = []
-    for term in channel.terms:
-        levers = sum(channel.coordinates[k] in POSE_COORDINATES[:3] for k in term)
-        size = main * OWN_LEVER**levers * (1.0, BENT, TWICE_BENT)[len(term) - 1]
-        if len(term) == 1:
-            name = channel.coordinates[term[0]]
-            if name in channel.gains:
-                size = channel.gains_std.get(name, 1e-6 * abs(channel.gains[name]) + 1e-12)
-            elif name == channel.coordinates[place]:
-                size = UNKNOWN_GAIN * main
-        found.append(size)
-    return np.array(found)
