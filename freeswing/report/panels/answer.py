@@ -65,7 +65,9 @@ def best_parameters(material: Material) -> tuple[tuple[Parameter, ...], str]:
     if corrected:
         names = {one.name for one in corrected}
         more = tuple(one for one in own if one.name not in names)
-        return (*corrected, *more), "with the effects that the model lacked"
+        found = material.diagnosis is not None and material.diagnosis.accepted
+        source = "with the effects that the model lacked" if found else "no effect was missing"
+        return (*corrected, *more), source
     return own, ESTIMATES.get(best, "")
 
 

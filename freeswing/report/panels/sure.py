@@ -28,7 +28,8 @@ class HowSure:
         if not estimates or material.identification is None:
             return None
         comparison = material.identification.comparison
-        after = material.diagnosis.parameters_after if material.diagnosis else ()
+        diagnosis = material.diagnosis
+        after = diagnosis.parameters_after if diagnosis and diagnosis.accepted else ()
         tables = [
             {"method": method, "rows": [_difference(row) for row in comparison[kind]]}
             for kind, method in (("ml", "maximum likelihood"), ("fidim", "FIDIM"))
