@@ -76,7 +76,6 @@ def make(
 
 
 def _summarise(document: Diagnosis, console: Console) -> None:
-    from freeswing.report.material import Material
     from freeswing.report.panels.answer import verdict
     from freeswing.report.words import millimetres, number, plain
 
@@ -85,7 +84,7 @@ def _summarise(document: Diagnosis, console: Console) -> None:
         console.say(f"  accepted: {plain(entry.effect)} ({values})")
         for sentence in seen_directions(entry.directions):
             console.say(f"    {sentence}")
-    for sentence in verdict(Material("", diagnosis=document)):
+    for sentence in verdict(document):
         console.say(f"  {sentence}")
     before, after = document.before, document.after
     if before is not None and after is not None:
