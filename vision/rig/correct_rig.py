@@ -41,7 +41,9 @@ Array = NDArray[np.float64]
 # A rig has two dozen numbers that could be off, deviations are good to some ten percent, and what
 # is changed for nothing spoils every pose: six of them leave no room for chance.
 SIGMAS = 6.0
-_STEPS = 3
+_STEPS, _MOST_STEPS = 3, 20
+_SETTLED = 0.3
+"""Steps go on while one changes a number by more than this share of its deviation."""
 _LEAST_KNOWN = 20
 
 
@@ -214,11 +216,12 @@ def _iterate(
 ) -> RigStep:
     """Gauss-Newton over rig and poses in turn; `current` and `total` are brought up to date."""
     step = rig_step(current, watch, poses, fit, free, survey_std_m)
-    for k in range(_STEPS):
+    for k in range(_MOST_STEPS):
         for index, change in enumerate(step.changes):
             current[index] = applied(current[index], change)
         total += step.changes
-        if k + 1 == _STEPS:
+        settled = bool((np.abs(step.changes) <= _SETTLED * step.deviations).all())
+        if k + 1 == _MOST_STEPS or (settled and k + 1 >= _STEPS):
             break
         poses, fit = fuse(current, watch, poses.times_s, start=poses, passes=2, rough=True)
         step = rig_step(current, watch, poses, fit, free, survey_std_m)
