@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,7 +38,9 @@ class Judgement:
     loss_limit: float
     share: float
 
-    def explains(self, solution: ArrowSolution | None, problem: StartProblem) -> bool:
+    def explains(
+        self, solution: ArrowSolution | None, problem: StartProblem
+    ) -> TypeGuard[ArrowSolution]:
         """Whether the squares of that share of the poses are what noise leaves."""
         if solution is None or not solution.converged:
             return False

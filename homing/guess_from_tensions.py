@@ -76,7 +76,8 @@ class TensionEnergy:
         """
         poses = np.array(poses, dtype=np.float64)
         forces = (pulls, np.zeros(6) if pushes is None else pushes)
-        inside = np.isfinite(evaluate_evenly(self._all, poses, *forces)[2]).all(axis=(1, 2))
+        computed = np.isfinite(evaluate_evenly(self._all, poses, *forces)[2])
+        inside = np.asarray(computed.all(axis=(1, 2)))
         if not inside.all():  # a start within a pulley, or at angles that no rotation has
             return self._among(inside, poses, forces)
         energy, slope, curvature = evaluate_evenly(self._all, poses, *forces)

@@ -93,7 +93,7 @@ class Readings:
     tension_N: Array | None = None
     tilt_rad: Array | None = None
 
-    def rows(self, chosen: Array) -> Readings:
+    def rows(self, chosen: NDArray[np.intp]) -> Readings:
         """Some of the static poses alone."""
         tension = None if self.tension_N is None else self.tension_N[chosen]
         tilt = None if self.tilt_rad is None else self.tilt_rad[chosen]

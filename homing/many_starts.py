@@ -52,7 +52,7 @@ def many_starts(energy: TensionEnergy, n_cables: int) -> Array:
     return poses[np.sort(first)]
 
 
-def far_rows(readings: Readings) -> Array:
+def far_rows(readings: Readings) -> NDArray[np.intp]:
     """The start's row and those whose readings lie farthest apart, `ROWS` of them, rising."""
     table = np.nan_to_num(np.hstack([readings.sigma_rad, readings.length_m]))
     chosen, distance = [0], np.linalg.norm(table - table[0], axis=1)

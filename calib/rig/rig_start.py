@@ -108,12 +108,12 @@ def _through_base(
     if tie is None:
         return None
     T = tie.T_cameras_base
-    known = next((index for index in placed if T[index] is not None), None)
-    new = next((index for index in outside if T[index] is not None), None)
+    poses = {k: pose for k, pose in enumerate(T) if pose is not None}
+    known = next((k for k in placed if k in poses), None)
+    new = next((k for k in outside if k in poses), None)
     if known is None or new is None:
         return None
-    T_known, T_new = T[known], T[new]
-    return {new: T_new @ invert(T_known) @ placed[known]}
+    return {new: poses[new] @ invert(poses[known]) @ placed[known]}
 
 
 def board_groups(count: int, views: Views) -> np.ndarray:

@@ -72,7 +72,7 @@ def align(points: Array, onto: Array, scale_m: float, use: Array | None = None) 
         scale_m: of the Student law of a coordinate of a marker's difference.
         use: weight factor of each marker, 0 to leave it out, (n_m,).
     """
-    known = np.isfinite(points).all(axis=1) & np.isfinite(onto).all(axis=1)
+    known = np.asarray(np.isfinite(points).all(axis=1) & np.isfinite(onto).all(axis=1))
     factors = np.where(known, 1.0 if use is None else use, 0.0)
     if not is_planar_or_better(onto[factors > 0.0]):
         return None
@@ -143,7 +143,7 @@ def session_layout(nominal: Array, runs: Sequence[Array], noise_m: float) -> Ses
         scale = _scale(changes - step, noise_m)
         if np.abs(step).max() < SETTLED_M:
             break
-    seen = np.isfinite(np.array(runs)).any(axis=(0, 2))
+    seen = np.asarray(np.isfinite(np.array(runs)).any(axis=(0, 2)))
     onto = align_to_target(np.where(seen[:, None], layout, np.nan), nominal)
     if onto is None:
         return SessionLayout(nominal, np.full_like(nominal, np.nan), scale, None)
@@ -161,7 +161,7 @@ def align_to_target(points: Array, onto: Array) -> Alignment | None:
         points: what is moved, NaN where unknown, (n_m, 3).
         onto: target.toml's places, (n_m, 3).
     """
-    known = np.isfinite(points).all(axis=1)
+    known = np.asarray(np.isfinite(points).all(axis=1))
     if not is_planar_or_better(onto[known]):
         return None
     filled = np.where(known[:, None], points, 0.0)
@@ -204,7 +204,7 @@ def _settled(
 ) -> tuple[Array, Array, Array]:
     """Points moved (k, n_m, 3), weights (k, n_m) and costs (k,) of the fits from k starts."""
     goal = np.broadcast_to(onto, (len(weights), *onto.shape))
-    moved = np.broadcast_to(points, goal.shape)
+    moved, squares = np.broadcast_to(points, goal.shape), np.zeros(goal.shape[:2])
     for _ in range(ROUNDS):
         before, moved = moved, _moved(points, goal, weights)
         squares = np.sum((moved - onto) ** 2, axis=2) / scale**2

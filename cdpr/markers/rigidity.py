@@ -62,7 +62,7 @@ def rigidity(nominal: Array, points: Array) -> Rigidity:
         nominal: rough layout, (n_m, 3).
         points: (n_t, n_m, 3), NaN where missing.
     """
-    use = np.isfinite(points).all(axis=2).any(axis=0)
+    use = np.asarray(np.isfinite(points).all(axis=2).any(axis=0))
     some = points[_some_frames(len(points), ENOUGH_TO_COMPARE)]
     many = points[_some_frames(len(points), ENOUGH_FOR_LAYOUT)]
     first = level = _level(nominal, some, use)
@@ -119,7 +119,7 @@ def mean_layout(nominal: Array, points: Array, weights: Array) -> Array:
         layout = moved
         if step < SETTLED_M:
             break
-    seen = np.isfinite(points).all(axis=2).any(axis=0)
+    seen = np.asarray(np.isfinite(points).all(axis=2).any(axis=0))
     return np.where(seen[:, None], layout, np.nan)
 
 
@@ -134,7 +134,7 @@ def _level(nominal: Array, points: Array, use: Mask) -> float:
     weights = use.astype(float)
     layout = mean_layout(nominal, points, weights)
     residuals = _residuals(layout, points, weights)[:, use]
-    seen = np.isfinite(residuals).all(axis=2)
+    seen = np.asarray(np.isfinite(residuals).all(axis=2))
     determined = seen.sum(axis=1) >= FEWEST_KEPT
     freedom = (
         3 * int(seen[determined].sum()) - 6 * int(determined.sum()) - max(3 * int(use.sum()) - 6, 0)
@@ -161,9 +161,9 @@ def _own_deviations(layout: Array, residuals: Array, use: Mask) -> Array:
 
     Markers that are not used get their residual against the others, less what those add.
     """
-    seen = np.isfinite(residuals).all(axis=2)
+    seen = np.asarray(np.isfinite(residuals).all(axis=2))
     patterns, which = np.unique(seen, axis=0, return_inverse=True)
-    n = seen.shape[1]
+    n = residuals.shape[1]
     mixing, squares = np.zeros((n, n)), np.zeros(n)
     for k, pattern in enumerate(patterns):
         if not is_planar_or_better(layout[pattern & use]):

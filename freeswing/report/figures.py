@@ -57,7 +57,7 @@ _STYLE: Any = {
 Draw = Callable[[Figure], None]
 
 
-def figure_style() -> dict[str, Any]:
+def figure_style() -> Any:
     """The one style, for figures that are files of their own."""
     return dict(_STYLE)
 
@@ -91,7 +91,9 @@ def key(entries: Sequence[tuple[str, str, str]]) -> Draw:
 
     def draw(sheet: Figure) -> None:
         for label, colour, dash in entries:
-            style = {"ls": dash} if dash in DASHES else {"ls": "", "marker": dash, "ms": 5}
+            style: dict[str, Any] = (
+                {"ls": dash} if dash in DASHES else {"ls": "", "marker": dash, "ms": 5}
+            )
             sheet.gca().plot([], [], color=colour, label=label, **style)
         sheet.gca().set_axis_off()
         sheet.legend(loc="center left", ncols=1, fontsize=9)

@@ -41,7 +41,7 @@ def controller_gains(found: Controller) -> str:
     def draw(sheet: Figure) -> None:
         axes = sheet.subplots()
         for half, name, colour in HALVES:
-            values = np.linalg.svd(K[:, half, half], compute_uv=False)
+            values = np.asarray(np.linalg.svd(K[:, half, half], compute_uv=False), float)
             _bundle(axes, values, name, colour)
         _log(axes, "gain (N/m, N m/rad)")
         axes.legend()
@@ -66,8 +66,10 @@ def templates(found: Controller, plant: Plant, weights: Weights) -> str:
                     size = getattr(part, w_out).at(RATES_RAD_S)
                     if w_in:
                         size = size * getattr(part, w_in).at(RATES_RAD_S)
-                    values = np.linalg.svd(block[:, half, half], compute_uv=False)
-                    _bundle(grid[i, j], values, name, colour)
+                    values = np.asarray(
+                        np.linalg.svd(block[:, half, half], compute_uv=False), float
+                    )
+                    _bundle(grid[i, j], np.asarray(values, float), name, colour)
                     grid[i, j].plot(RATES_RAD_S, gamma / size, color=colour, ls="--", lw=0.9)
                 _log(grid[i, j], f"from {into} to {out}")
         grid[0, 0].legend()
@@ -140,7 +142,7 @@ def _log(axes: Axes, label: str) -> None:
 
 
 def _svg(draw: Callable[[Figure], None], width_in: float, height_in: float, title: str) -> str:
-    with mpl.rc_context({**figure_style(), "svg.hashsalt": title}):
+    with mpl.rc_context(figure_style() | {"svg.hashsalt": title}):
         sheet = Figure(figsize=(width_in, height_in), layout="constrained")
         draw(sheet)
         buffer = io.StringIO()

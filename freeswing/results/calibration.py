@@ -46,24 +46,24 @@ class CalibratedCamera(Entry):
     coverage: float | None = None
     tilt_deg: float | None = None
     focal_std: float | None = None
-    lens_models_held_out_px: Mapping[str, float | None] = empty()
+    lens_models_held_out_px: Mapping[str, float | None] = empty(default_factory=dict)
 
 
 @entry
 class Checks(Entry):
     """Comparisons with lengths that are known, and of the footage with itself."""
 
-    length_bias: float | None = absent()
-    length_rms_m: float | None = absent()
-    lengths: int | None = absent()
-    halves_rms_m: float | None = absent()
-    halves_shape_rms_m: float | None = absent()
-    volume_std_m: float | None = absent()
-    volume_size_m: Numbers | None = absent()
-    survey_points: int | None = absent()
-    survey_scale: float | None = absent()
-    survey_rms_m: float | None = absent()
-    survey_mirrored_rms_m: float | None = absent()
+    length_bias: float | None = absent(default=None)
+    length_rms_m: float | None = absent(default=None)
+    lengths: int | None = absent(default=None)
+    halves_rms_m: float | None = absent(default=None)
+    halves_shape_rms_m: float | None = absent(default=None)
+    volume_std_m: float | None = absent(default=None)
+    volume_size_m: Numbers | None = absent(default=None)
+    survey_points: int | None = absent(default=None)
+    survey_scale: float | None = absent(default=None)
+    survey_rms_m: float | None = absent(default=None)
+    survey_mirrored_rms_m: float | None = absent(default=None)
 
 
 @entry
@@ -118,14 +118,14 @@ class Calibration(Document):
     kind: ClassVar[str] = "calibration"
 
     verdict: Trust | None = None
-    base_frame: Mapping[str, Any] = empty()
+    base_frame: Mapping[str, Any] = empty(default_factory=dict)
     cameras: tuple[CalibratedCamera, ...] = ()
     checks: Checks | None = None
     moments: int | None = None
-    board: Mapping[str, Any] = empty()
+    board: Mapping[str, Any] = empty(default_factory=dict)
     dropped_views: tuple[str, ...] = ()
     trimmed_corners: int | None = None
-    adjustment: Mapping[str, Any] = empty()
+    adjustment: Mapping[str, Any] = empty(default_factory=dict)
     covariance: Covariance | None = None
-    vertical: Vertical | None = absent()
-    beside_colmap: tuple[BesideColmap, ...] = absent(())
+    vertical: Vertical | None = absent(default=None)
+    beside_colmap: tuple[BesideColmap, ...] = absent(default=())

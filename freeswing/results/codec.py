@@ -36,9 +36,12 @@ def absent(default: Any = None) -> Any:
     return dataclasses.field(default=default, metadata={"absent": True})
 
 
-def empty() -> Any:
-    """A mapping that is written always and read as empty where it is not there."""
-    return dataclasses.field(default_factory=dict)
+def empty(*, default_factory: Callable[[], Any] = dict) -> Any:
+    """A mapping that is written always and read as empty where it is not there.
+
+    Type checkers see a default only where the call names its factory.
+    """
+    return dataclasses.field(default_factory=default_factory)
 
 
 @dataclass_transform(
@@ -57,7 +60,7 @@ class Entry:
         further: keys that this version does not name, as they were read.
     """
 
-    further: Table = empty()
+    further: Table = empty(default_factory=dict)
 
     @classmethod
     def from_json(cls, table: Table) -> Self:
@@ -89,7 +92,7 @@ class Document(Entry):
     kind: ClassVar[str] = ""
     version: ClassVar[int] = 1
 
-    provenance: Table = empty()
+    provenance: Table = empty(default_factory=dict)
 
     @classmethod
     def format(cls) -> str:

@@ -54,15 +54,15 @@ class FoundEffect(Entry):
     """
 
     effect: str
-    part: str = absent("")
-    verdict: str = absent("")
-    run: str = absent("")
-    camera: str = absent("")
+    part: str = absent(default="")
+    verdict: str = absent(default="")
+    run: str = absent(default="")
+    camera: str = absent(default="")
     parameters: tuple[Parameter, ...] = ()
-    confounded_with: tuple[str, ...] | None = absent()
-    directions: tuple[SeenDirection, ...] = absent(())
-    before: Agreement | None = absent()
-    after: Agreement | None = absent()
+    confounded_with: tuple[str, ...] | None = absent(default=None)
+    directions: tuple[SeenDirection, ...] = absent(default=())
+    before: Agreement | None = absent(default=None)
+    after: Agreement | None = absent(default=None)
 
 
 @entry

@@ -35,7 +35,7 @@ class HeldOut(Entry):
         runs: each.
     """
 
-    effects: tuple[str, ...] | None = absent()
+    effects: tuple[str, ...] | None = absent(default=None)
     sigma_perp: float | None = None
     prediction_rmse_m: float | None = None
     noise_floor_m: float | None = None
@@ -62,14 +62,14 @@ class Candidate(Entry):
     """
 
     effect: str
-    part: str = absent("")
+    part: str = absent(default="")
     verdict: str = ""
     delta_bic: float | None = None
     held_out_gain: float | None = None
     probability: float | None = None
     confounded_with: tuple[str, ...] = ()
     reason: str = ""
-    experiment: str = absent("")
+    experiment: str = absent(default="")
 
 
 @entry
@@ -78,7 +78,7 @@ class Unexplained(Entry):
 
     present: bool = False
     signature: str = ""
-    evidence: Mapping[str, Any] = empty()
+    evidence: Mapping[str, Any] = empty(default_factory=dict)
 
 
 @entry
@@ -109,8 +109,8 @@ class Diagnosis(Document):
     share_closed: float | None = None
     parameters_before: tuple[Parameter, ...] = ()
     parameters_after: tuple[Parameter, ...] = ()
-    parameters_moved_percent: Mapping[str, float | None] = empty()
+    parameters_moved_percent: Mapping[str, float | None] = empty(default_factory=dict)
     ladder: tuple[HeldOut, ...] = ()
     unexplained: Unexplained | None = None
-    lengths: Any = absent()
+    lengths: Any = absent(default=None)
     notes: tuple[str, ...] = ()

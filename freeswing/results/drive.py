@@ -63,7 +63,7 @@ def unknown(std: float, value: float) -> bool:
 
 
 def _parameters(
-    names: Sequence[str], values: Array, std: Array, on_bound: Array | None = None
+    names: Sequence[str], values: Array, std: Array, on_bound: NDArray[np.bool_] | None = None
 ) -> list[dict[str, Any]]:
     entries = []
     for k, name in enumerate(names):

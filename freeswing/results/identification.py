@@ -27,7 +27,7 @@ class Consistency(Entry):
     held: bool = False
     least_second_moment_m2: float | None = None
     least_second_moment_std_m2: float | None = None
-    cost: float | None = absent()
+    cost: float | None = absent(default=None)
 
 
 @entry
@@ -62,20 +62,20 @@ class Estimate(Entry):
     """
 
     parameters: tuple[InertiaParameter, ...] = ()
-    sigma_W: float | None = absent()
-    cost_C: float | None = absent()
+    sigma_W: float | None = absent(default=None)
+    cost_C: float | None = absent(default=None)
     samples: int | None = None
     dropped_runs: tuple[DroppedRun, ...] = ()
     notes: tuple[str, ...] = ()
-    consistency: Consistency | None = absent()
-    reduced: Reduced | None = absent()
-    noise_m: float | None = absent()
-    noise_rad: float | None = absent()
-    stop_reason: str = absent("")
-    weighting: str = absent("")
-    noise_ratio: float | None = absent()
-    calibration_std: Numbers | None = absent()
-    calibration_modes: Any = absent()
+    consistency: Consistency | None = absent(default=None)
+    reduced: Reduced | None = absent(default=None)
+    noise_m: float | None = absent(default=None)
+    noise_rad: float | None = absent(default=None)
+    stop_reason: str = absent(default="")
+    weighting: str = absent(default="")
+    noise_ratio: float | None = absent(default=None)
+    calibration_std: Numbers | None = absent(default=None)
+    calibration_modes: Any = absent(default=None)
 
 
 @entry
@@ -107,12 +107,12 @@ class ValidatedRun(Entry):
     run: str
     sigma_perp: float | None = None
     prediction_rmse_m: float | None = None
-    prediction_rmse_rad: float | None = absent()
-    prediction_rmse: float | None = absent()
-    column: str = absent("")
-    noise_floor: float | None = absent()
+    prediction_rmse_rad: float | None = absent(default=None)
+    prediction_rmse: float | None = absent(default=None)
+    column: str = absent(default="")
+    noise_floor: float | None = absent(default=None)
     noise_floor_m: float | None = None
-    note: str = absent("")
+    note: str = absent(default="")
 
 
 @entry
@@ -121,9 +121,9 @@ class SwingPlace(Entry):
 
     run: str
     role: str = ""
-    equilibrium: Pose | None = absent()
-    frequencies_hz: Numbers | None = absent()
-    conditioning: float | None = absent()
+    equilibrium: Pose | None = absent(default=None)
+    frequencies_hz: Numbers | None = absent(default=None)
+    conditioning: float | None = absent(default=None)
 
 
 @entry
@@ -141,7 +141,7 @@ class Body(Entry):
     """The platform or a load: inertia in kg m2 about its own centre of mass."""
 
     name: str
-    runs: tuple[str, ...] | None = absent()
+    runs: tuple[str, ...] | None = absent(default=None)
     parameters: tuple[BodyParameter, ...] = ()
 
 
@@ -241,17 +241,17 @@ class Identification(Document):
 
     kind: ClassVar[str] = "identification"
 
-    estimates: Mapping[str, Estimate] = empty()
-    comparison: Mapping[str, tuple[Difference, ...]] = empty()
+    estimates: Mapping[str, Estimate] = empty(default_factory=dict)
+    comparison: Mapping[str, tuple[Difference, ...]] = empty(default_factory=dict)
     validation: tuple[ValidatedRun, ...] = ()
     validated: str = ""
     free_coordinates: tuple[str, ...] = ()
     amplification: float | None = None
     notes: tuple[str, ...] = ()
-    objects: tuple[Body, ...] | None = absent()
-    channels: tuple[ChannelResult, ...] | None = absent()
-    classic: tuple[ClassicRow, ...] | None = absent()
-    scatter_between_runs_kg_m2: float | None = absent()
+    objects: tuple[Body, ...] | None = absent(default=None)
+    channels: tuple[ChannelResult, ...] | None = absent(default=None)
+    classic: tuple[ClassicRow, ...] | None = absent(default=None)
+    scatter_between_runs_kg_m2: float | None = absent(default=None)
     swings: tuple[SwingPlace, ...] = ()
     entries_m: tuple[Numbers, ...] = ()
     markers: Markers | None = None

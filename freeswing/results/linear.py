@@ -63,4 +63,4 @@ def linear_panels(rates: Array, response: Any) -> tuple[Panel, ...]:
 
 
 def _values(blocks: Any) -> Array:
-    return np.linalg.svd(blocks, compute_uv=False)
+    return np.asarray(np.linalg.svd(blocks, compute_uv=False), float)

@@ -26,8 +26,8 @@ class RunMotion(Entry):
     times_s: Numbers = ()
     coordinates: tuple[str, ...] = ()
     measured: tuple[Numbers, ...] = ()
-    before: tuple[Numbers, ...] | None = absent()
-    after: tuple[Numbers, ...] | None = absent()
+    before: tuple[Numbers, ...] | None = absent(default=None)
+    after: tuple[Numbers, ...] | None = absent(default=None)
 
 
 @entry

@@ -84,7 +84,7 @@ class HomingAdvice(Document):
 
     kind: ClassVar[str] = "homing-advice"
 
-    assumed_std: Mapping[str, float | None] = empty()
+    assumed_std: Mapping[str, float | None] = empty(default_factory=dict)
     declared: HomingQuality
     advised: HomingQuality
     cables: tuple[AdvisedCable, ...] = ()
@@ -112,8 +112,8 @@ class PlannedSwing(Entry):
     tension_range_N: tuple[float, ...] = ()
     frequencies_hz: Numbers = ()
     conditioning: float | None = None
-    reach: Mapping[str, float | None] = empty()
-    winch_release: Any = absent("not asked for")
+    reach: Mapping[str, float | None] = empty(default_factory=dict)
+    winch_release: Any = absent(default="not asked for")
 
 
 @entry
@@ -137,10 +137,10 @@ class Excitation(Document):
     free_coordinates: tuple[str, ...] = ()
     samples_per_swing: int | None = None
     duration_s: float | None = None
-    limits: Mapping[str, Any] = empty()
+    limits: Mapping[str, Any] = empty(default_factory=dict)
     mass_kg: float | None = None
-    predicted_std: Mapping[str, float | None] = empty()
-    starts: Mapping[str, Any] = empty()
+    predicted_std: Mapping[str, float | None] = empty(default_factory=dict)
+    starts: Mapping[str, Any] = empty(default_factory=dict)
     refinement: Numbers = ()
-    seconds: Mapping[str, float | None] = empty()
+    seconds: Mapping[str, float | None] = empty(default_factory=dict)
     random_plans: RandomPlans | None = None

@@ -26,7 +26,7 @@ class CameraShare(Entry):
     camera: str
     frames_seen: int | None = None
     frames_used: int | None = None
-    frames_rejected: Mapping[str, int | None] = empty()
+    frames_rejected: Mapping[str, int | None] = empty(default_factory=dict)
     frames_dropped: int | None = None
     sightings_used: int | None = None
     reprojection_px: float | None = None
@@ -97,5 +97,5 @@ class Tracking(Document):
     kind: ClassVar[str] = "tracking"
 
     runs: tuple[TrackedRun, ...] = ()
-    layout: Layout | None = absent()
+    layout: Layout | None = absent(default=None)
     effects: tuple[FoundEffect, ...] = ()

@@ -185,7 +185,8 @@ def _groups(path: Path, model: DrivenModel, key: str, text: str) -> list[Group]:
     if key == "kinematic" and text in POINTS:
         prefix = f"{POINTS[text]}."
         return [Group(name, (name,)) for name in model.names if name.startswith(prefix)]
-    shape = model.robot.drive.shape.free
+    drive = model.robot.drive
+    shape = () if drive is None else drive.shape.free
     members = tuple(part.strip() for part in text.split("="))
     for member in members:
         is_geometry = member in shape or member.startswith("drum_radius_m")

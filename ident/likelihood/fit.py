@@ -26,15 +26,18 @@ class Swing(Protocol):
     @property
     def name(self) -> str:
         """Of the run, for messages."""
+        ...
 
     def simulated(self, values: Mapping[str, Array]) -> Any:
         """What is costly at the values of the blocks, once; ValueError: no motion there."""
 
     def residuals(self, values: Mapping[str, Array], made: Any) -> Array:
         """Whitened residuals (m,) at values, of which `made` was simulated."""
+        ...
 
     def linearised(self, values: Mapping[str, Array], made: Any) -> tuple[Array, dict[str, Array]]:
         """The same with their slopes (m, size) by block; a block left out has none."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -206,13 +209,13 @@ def _linearised(swings: Sequence[Swing], unknowns: Unknowns, made: Sequence[Any]
 def _columns(block: Unknown, slopes: Mapping[str, Array], rows: int) -> Array:
     if block.name not in slopes:
         return np.zeros((rows, block.size))
-    return np.asarray(slopes[block.name] * np.where(block.estimated, block.scale, 0.0))
+    return np.asarray(slopes[block.name] * np.where(block.mask, block.scale, 0.0))
 
 
 def _step(parts: list[Part], unknowns: Unknowns, damping: float) -> _Step:
     """A damped Gauss-Newton step."""
     n_own = sum(block.size for block in unknowns.own)
-    held = np.where(_joined([block.estimated for block in unknowns.own]), 0.0, 1.0)
+    held = np.where(_joined([block.mask for block in unknowns.own]), 0.0, 1.0)
     reduced, triangles = [], []
     curvature = _shared_priors(unknowns)[:, :-1].diagonal() ** 2
     for residuals, own, shared in parts:
@@ -221,15 +224,15 @@ def _step(parts: list[Part], unknowns: Unknowns, damping: float) -> _Step:
         more[:n_own, :n_own] = np.diag(np.sqrt(damping) * np.linalg.norm(own, axis=0))
         more[n_own:, :n_own] = np.diag(held)
         curvature = curvature + np.sum(shared**2, axis=0)
-        triangle = np.linalg.qr(np.vstack([rows, more]), mode="r")
+        triangle = _triangle(np.vstack([rows, more]))
         triangles.append(triangle[:n_own])
         reduced.append(triangle[n_own:, n_own:])
     damped = np.zeros((len(curvature), len(curvature) + 1))
     damped[:, :-1] = np.diag(np.sqrt(damping * curvature))
     rows = np.vstack([*reduced, _shared_priors(unknowns), damped])
-    free = _joined([block.estimated for block in unknowns.shared]).astype(bool)
+    free = _joined([block.mask for block in unknowns.shared]).astype(bool)
     kept = np.append(free, True)
-    full = np.linalg.qr(np.vstack([rows[:, kept], np.zeros((kept.sum(), kept.sum()))]), mode="r")
+    full = _triangle(np.vstack([rows[:, kept], np.zeros((kept.sum(), kept.sum()))]))
     count = int(free.sum())
     triangle, right = full[:count, :count], full[:count, -1]
     left, singular, back = np.linalg.svd(triangle)
@@ -248,6 +251,10 @@ def _step(parts: list[Part], unknowns: Unknowns, damping: float) -> _Step:
         singular,
         gain,
     )
+
+
+def _triangle(rows: Array) -> Array:
+    return np.asarray(np.linalg.qr(rows, mode="r"))
 
 
 def _solved(triangle: Array, right: Array) -> Array:
@@ -283,7 +290,7 @@ def _packed(
     parts: list[Part], unknowns: Unknowns, cost: float, taken: int, reason: str, converged: bool
 ) -> Solution:
     step = _step(parts, unknowns, 0.0)
-    free = _joined([block.estimated for block in unknowns.shared]).astype(bool)
+    free = _joined([block.mask for block in unknowns.shared]).astype(bool)
     scales = _joined([block.scale for block in unknowns.shared])
     covariance = np.zeros((len(free), len(free)))
     kept = step.singular_values > RANK_LIMIT * step.singular_values.max(initial=0.0)

@@ -84,6 +84,11 @@ class Unknown:
         object.__setattr__(self, "estimated", mask)
 
     @property
+    def mask(self) -> Mask:
+        """Which of the block's numbers are fitted, (size,)."""
+        return np.asarray(self.estimated, dtype=bool)
+
+    @property
     def size(self) -> int:
         """How many numbers (a run)."""
         return int(self.value.shape[-1])

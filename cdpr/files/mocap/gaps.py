@@ -27,7 +27,7 @@ def without_gaps(positions: Array, names: tuple[str, ...]) -> tuple[Array, tuple
     notes = [
         f"{what} is taken as a gap in {count}"
         for what, gaps in (("0 0 0", zero), ("9999999", filled))
-        if (count := _counts(gaps, names))
+        if (count := _counts(np.asarray(gaps), names))
     ]
     return result, tuple(notes)
 

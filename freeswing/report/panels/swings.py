@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
 from matplotlib.figure import Figure
 
+from freeswing.cdpr.robot import Array
 from freeswing.report.figures import AFTER, BEFORE, INK, Draw, figures
 from freeswing.report.material import Material
 from freeswing.report.words import number
@@ -60,14 +63,19 @@ def _chart(swings: tuple[SwingPlace, ...], entries: tuple[Numbers, ...]) -> obje
     return figures([_view(places, entries, *view) for view in views], 2.8, caption)
 
 
+def _column(points: Sequence[Numbers], k: int) -> Array:
+    """One coordinate of points, NaN where it is not known."""
+    return np.array([point[k] for point in points], dtype=float)
+
+
 def _view(places: list, entries: tuple[Numbers, ...], first: int, second: int, title: str) -> Draw:
     def draw(sheet: Figure) -> None:
         axes = sheet.subplots()
         for role, colour, mark in (("identify", AFTER, "o"), ("validate", BEFORE, "s")):
             points = [place for found, place in places if found == role]
-            across, up = ([point[k] for point in points] for k in (first, second))
+            across, up = (_column(points, k) for k in (first, second))
             axes.plot(across, up, mark, ms=4, color=colour)
-        across, up = ([point[k] for point in entries] for k in (first, second))
+        across, up = (_column(entries, k) for k in (first, second))
         axes.plot(across, up, "^", color=INK, ms=5)
         axes.set_aspect("equal", adjustable="datalim")
         axes.set_xlabel("x (m)")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from freeswing.cdpr.robot import Array, Robot
 from freeswing.cdpr.simulation.free_swing import Motion
 from freeswing.ident.diagnose.lengths.joint_lengths import (
     Blocks,
+    Normal,
     Solved,
     honest_covariance,
     log_odds,
@@ -110,6 +111,35 @@ class Kinematics:
         }
 
 
+class _Linearised(NamedTuple):
+    """What the lengths say, linearised at values."""
+
+    normal: Normal
+    chances: dict[tuple[str, ...], float]
+    wrong: tuple[str, ...]
+    found: Solved
+
+
+def _linearised(
+    fit: LikelihoodFit,
+    model: Model,
+    patterns: Sequence[dict[str, Array]],
+    blocks: Blocks,
+    noise_scales: Array,
+    values: Array,
+) -> _Linearised:
+    """Chances of every set of gross blocks, and the solution with the likeliest."""
+    at = np.where(_displaces(model), values, 0.0)
+    rows = [
+        length_rows(model, motion, samples, noise_scales, at, pattern)
+        for motion, samples, pattern in zip(fit.motions, fit.samples, patterns, strict=True)
+    ]
+    normal = normal_equations(rows, blocks.gross)
+    chances = set_probabilities(normal, blocks)
+    best = max(chances, key=lambda one: chances[one])
+    return _Linearised(normal, chances, best, solved(total(normal), blocks.spread(best)))
+
+
 def kinematics(fit: LikelihoodFit, keys: Sequence[str], noise_scales: Array) -> Kinematics | None:
     """The joint model of lengths along runs with full poses; None where there are none.
 
@@ -124,21 +154,15 @@ def kinematics(fit: LikelihoodFit, keys: Sequence[str], noise_scales: Array) -> 
     keys = _finest([key for key in keys if effect_of(key) not in patterns[0]])
     model = build_model(fit.model.robot, tuple(dict.fromkeys(map(effect_of, keys))))
     blocks = _blocks(model, keys, patterns[0])
-    values, wrong = np.zeros(len(model.parameters)), None
-    for _ in range(LINEARISATIONS):
-        at = np.where(_displaces(model), values, 0.0)
-        rows = [
-            length_rows(model, motion, samples, noise_scales, at, pattern)
-            for motion, samples, pattern in zip(fit.motions, fit.samples, patterns, strict=True)
-        ]
-        normal = normal_equations(rows, blocks.gross)
-        chances = set_probabilities(normal, blocks)
-        best = max(chances, key=lambda one: chances[one])
-        found = solved(total(normal), blocks.spread(best))
-        values, before = found.values[: len(values)], wrong
-        wrong = best
-        if wrong == before or not wrong:
+    last = _linearised(fit, model, patterns, blocks, noise_scales, np.zeros(len(model.parameters)))
+    for _ in range(LINEARISATIONS - 1):
+        if not last.wrong:
             break
+        values, before = last.found.values[: len(model.parameters)], last.wrong
+        last = _linearised(fit, model, patterns, blocks, noise_scales, values)
+        if last.wrong == before:
+            break
+    normal, chances, wrong, found = last
     single = {key: sum(p for one, p in chances.items() if key in one) for key in blocks.columns}
     covariance = honest_covariance(normal, blocks.spread(wrong), found)
     variation = normal.variation_m(0.0 * found.values), normal.variation_m(found.values)
