@@ -112,4 +112,4 @@ def evened(times_s: Array, tick_s: float) -> tuple[Array, float, bool, int]:
     off = float(np.abs(times_s - start - beat * count).max())
     even = off <= _TICK_SHARE * tick_s and tick_s < _LONGEST_TICK * beat
     missing = int(count[-1]) + 1 - len(times_s)
-    return (beat * count if even else times_s), float(beat), even, missing
+    return (beat * count if even else times_s), float(beat), bool(even), missing

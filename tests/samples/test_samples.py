@@ -23,7 +23,8 @@ def test_all_samples_are_tested() -> None:
 @pytest.mark.parametrize("name", NAMES)
 def test_a_sample_is_found_in_order(name: str, tmp_path: Path) -> None:
     assert main(["check", str(SAMPLES / name), "--results", str(tmp_path), "--quiet"]) == 0
-    assert result(tmp_path, "check")["findings"] == []
+    findings = result(tmp_path, "check")["findings"]
+    assert [one for one in findings if one["level"] != "note"] == []
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -63,6 +63,7 @@ def test_exact_points_give_the_exact_vertical():
     assert found.scatter < 1e-4, found.scatter
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("lens_share", "turn_std_rad"), [(0.0, 0.0), (1.0, 1.5e-3)])
 def test_the_claimed_deviation_is_the_true_one(lens_share, turn_std_rad):
     """Normalised error squared of 150 draws against chi-square of two degrees, 3.5 deviations."""
@@ -187,6 +188,7 @@ def test_a_camera_that_is_not_there_stops_the_command(tmp_path, capsys):
     assert "camera 'top' is not one of left, right" in said
 
 
+@pytest.mark.slow
 def test_a_tilted_world_is_told_through_the_command_line(tmp_path, capsys):
     """The filmed sample with strings along another vertical than its robot.toml declares."""
     folder = tmp_path / "filmed"

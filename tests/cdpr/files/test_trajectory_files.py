@@ -67,7 +67,7 @@ def test_markers_never_seen_together_are_a_data_error(tmp_path):
 
 
 def test_files_that_are_too_large_or_of_no_known_form_are_refused(tmp_path):
-    with pytest.raises(InputError, match=r"one of \.csv, \.trc"):
+    with pytest.raises(InputError, match=r"one of \.csv, \.tsv, \.trc"):
         read(tmp_path, "", "a.txt")
     for name in ("a.csv", "a.tum", "a.trc", "a.c3d"):
         with (tmp_path / name).open("wb") as file:

@@ -79,7 +79,7 @@ def page() -> str:
 def test_sections_stand_in_reading_order(page: str) -> None:
     places = [page.index(f'<section id="{panel.name}">') for panel in PANELS]
     assert places == sorted(places)
-    order = "answer sure ladder change next swings cameras markers dropped provenance"
+    order = "answer bench sure ladder change next swings cameras markers dropped provenance"
     assert [panel.name for panel in PANELS] == order.split()
 
 

@@ -63,6 +63,7 @@ def test_lengths_say_nothing_where_only_gravity_is_tilted(tmp_path):
     assert kinematics(found.final, keys, WHITE).wrong == ()
 
 
+@pytest.mark.slow
 def test_an_effect_that_a_later_one_makes_superfluous_leaves(tmp_path):
     _, found = diagnosed(tmp_path, {"gravity_tilt": "large"}, 24, ())
     first = refit(found.final, "translational_drag", np.array([0.0, 0.5]), WHITE, 100.0)
@@ -74,6 +75,7 @@ def test_an_effect_that_a_later_one_makes_superfluous_leaves(tmp_path):
     assert is_no_worse(alone, both, "translational_drag", WHITE), (alone.held_out, both.held_out)
 
 
+@pytest.mark.slow
 def test_a_cause_is_not_superfluous(tmp_path):
     _, found = diagnosed(tmp_path, {"gravity_tilt": "large"}, 25, ("gravity_tilt",))
     model = found.final.model
@@ -82,6 +84,7 @@ def test_a_cause_is_not_superfluous(tmp_path):
     assert superfluous(with_drag, ("translational_drag",)) == ""
 
 
+@pytest.mark.slow
 def test_a_cause_beside_another_is_found_where_little_is_left_of_it(tmp_path):
     """The drag leaves 2 % over the noise once the creep is in; its evidence is overwhelming."""
     effects = {"winch_creep": "large", "translational_drag": "medium"}
@@ -93,6 +96,7 @@ def test_a_cause_beside_another_is_found_where_little_is_left_of_it(tmp_path):
     assert rate == pytest.approx(0.02, abs=4 * std + 2e-4), (rate, std)
 
 
+@pytest.mark.slow
 def test_a_tilted_pulley_does_not_make_runs_slack(tmp_path):
     """With a wrong geometry the tensions of a first solution mean nothing."""
     _, found = diagnosed(tmp_path, {"pulley_axis": "large"}, 27, ("pulley_axis", "anchor_offset"))

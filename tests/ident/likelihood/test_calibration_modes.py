@@ -113,6 +113,7 @@ def test_without_known_errors_nothing_changes(estimates) -> None:
     assert len(same.amplitudes) == 0, same.amplitudes
 
 
+@pytest.mark.slow
 def test_held_out_runs_are_predicted_without_the_errors_found() -> None:
     """A tilted, wrongly scaled base frame: down to the noise (2.4 % by chance); not as recorded."""
     amplitudes = np.array([0.0, 0.0, 0.0, 3.0, 3.0, 3.0, 3.0])

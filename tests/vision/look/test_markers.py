@@ -71,6 +71,7 @@ def test_ball_centre_is_the_ray_of_its_centre() -> None:
     assert corrected < 0.5 * raw, f"raw {raw:.4f} px, corrected {corrected:.4f} px"
 
 
+@pytest.mark.slow
 def test_markers_without_names_give_the_pose(tmp_path) -> None:
     markers = [Marker(n, p, 0.03) for n, p in zip(NAMES, PLACES, strict=True)]
     _, trajectory = track(tmp_path, markers)
