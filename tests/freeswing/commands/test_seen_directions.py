@@ -1,7 +1,7 @@
 """What `diagnose` says of the directions in which a point is known."""
 
 from freeswing.commands.session.diagnose import seen_directions
-from freeswing.results.diagnosis import SeenDirection
+from freeswing.results.common import SeenDirection
 
 
 def test_best_and_worst_direction_of_each_point_are_told():
