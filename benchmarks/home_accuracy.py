@@ -19,7 +19,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "calib"))
 from freeswing.homing.acquisition import PERFECT, AcquisitionErrors, simulate_acquisition
 from freeswing.homing.home import find_start
 from freeswing.homing.homing_files import GeometryNoise, Homing, ReadingNoise, Readings
-from tests.homing.homing_robots import LARGEST_N, PERTURBED_N, START_N, bologna_3
+from tests.paper_robots import LARGEST_N, PERTURBED_N, START_N, bologna_3
 
 PAPER_ERRORS_MM = (5.7, 9.9, 11.5, 13.4, 23.4)
 

@@ -25,6 +25,19 @@ INERTIA_NAMES = (
     "Ixz_m2",
     "Iyz_m2",
 )
+# A body in absolute numbers: mass, centre of mass, tensor (about which point, its user says).
+BODY_NAMES = (
+    "mass_kg",
+    "com_x_m",
+    "com_y_m",
+    "com_z_m",
+    "Ixx_kg_m2",
+    "Iyy_kg_m2",
+    "Izz_kg_m2",
+    "Ixy_kg_m2",
+    "Ixz_kg_m2",
+    "Iyz_kg_m2",
+)
 STANDARD_GRAVITY_M_S2 = 9.80665
 
 Array = NDArray[Any]

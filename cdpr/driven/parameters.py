@@ -13,23 +13,10 @@ from numpy.typing import NDArray
 from freeswing.cdpr.driven.drive import MOTOR_NUMBERS, Drive
 from freeswing.cdpr.driven.formula import Formula
 from freeswing.cdpr.model.pulley import Geometry
-from freeswing.cdpr.robot import Robot
+from freeswing.cdpr.robot import BODY_NAMES, Robot
 
 Array = NDArray[np.float64]
 Expression = Any
-
-BODY_NAMES = (
-    "mass_kg",
-    "com_x_m",
-    "com_y_m",
-    "com_z_m",
-    "Ixx_kg_m2",
-    "Iyy_kg_m2",
-    "Izz_kg_m2",
-    "Ixy_kg_m2",
-    "Ixz_kg_m2",
-    "Iyz_kg_m2",
-)
 
 
 @dataclass(frozen=True, slots=True)

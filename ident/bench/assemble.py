@@ -56,7 +56,7 @@ class Assembled:
 
 @dataclass(frozen=True, slots=True)
 class Guess:
-    """First bodies: the platform's and every load's `OBJECT_NAMES` values."""
+    """First bodies: the platform's and every load's `BODY_NAMES` values."""
 
     platform: Array
     loads: Mapping[str, Array]

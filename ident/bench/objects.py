@@ -1,6 +1,6 @@
 """Bodies that ride on the platform and add up: absolute inertia by mass, centre and own tensor.
 
-A body is ten numbers in its own frame, `OBJECT_NAMES`: mass, centre of mass, tensor about that
+A body is ten numbers in its own frame, `BODY_NAMES`: mass, centre of mass, tensor about that
 centre. About the platform's P they become mass, first moments and tensor, which simply add.
 """
 
@@ -10,18 +10,6 @@ import numpy as np
 
 from freeswing.cdpr.robot import Array
 
-OBJECT_NAMES = (
-    "mass_kg",
-    "com_x_m",
-    "com_y_m",
-    "com_z_m",
-    "Ixx_kg_m2",
-    "Iyy_kg_m2",
-    "Izz_kg_m2",
-    "Ixy_kg_m2",
-    "Ixz_kg_m2",
-    "Iyz_kg_m2",
-)
 _ROWS, _COLUMNS = (0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2)
 _UNITS = np.zeros((6, 3, 3))  # the tensor's slope by each of its six entries
 for _entry, (_row, _column) in enumerate(zip(_ROWS, _COLUMNS, strict=True)):
@@ -47,7 +35,7 @@ def moments(body: Array, turn: Array | None = None, shift_m: Array | None = None
     """Mass, first moments and tensor about P of a body, (10,).
 
     Args:
-        body: `OBJECT_NAMES` values in its own frame, (10,).
+        body: `BODY_NAMES` values in its own frame, (10,).
         turn: R_platform_body, (3, 3); None: not turned.
         shift_m: its frame's origin in the platform frame, (3,); None: at P.
     """
@@ -86,7 +74,7 @@ def specific_slope(total: Array) -> Array:
 
 
 def body_of(mass_kg: float, inertia: Array) -> Array:
-    """`OBJECT_NAMES` values of a mass and its nine specific numbers about P, (10,)."""
+    """`BODY_NAMES` values of a mass and its nine specific numbers about P, (10,)."""
     centre = inertia[:3]
     central = mass_kg * (tensor(inertia[3:]) - spread(centre))
     return np.concatenate([[mass_kg], centre, entries(central)])

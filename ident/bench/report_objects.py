@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from freeswing.cdpr.robot import Array
-from freeswing.ident.bench.objects import OBJECT_NAMES, moments, moments_slope
+from freeswing.cdpr.robot import BODY_NAMES, Array
+from freeswing.ident.bench.objects import moments, moments_slope
 from freeswing.ident.bench.runs import Bench, BenchRun
 from freeswing.ident.bench.solve import Solved
 from freeswing.ident.bench.swing import IZZ
@@ -50,7 +50,7 @@ def told_object(solved: Solved, block: str, given: Array, one_way: bool) -> list
     prior = np.where(unknown.estimated, prior, 0.0)
     variances = np.diag(covariance) + _of_second_order(value, covariance)
     rows = []
-    for k, name in enumerate(OBJECT_NAMES):
+    for k, name in enumerate(BODY_NAMES):
         seen = k == 0 or np.diag(covariance)[k] < RESTS_ON_PRIOR * prior[k] ** 2
         std = float(np.sqrt(variances[k]))
         if seen:

@@ -49,7 +49,7 @@ class KnownBody:
 
     @property
     def body(self) -> Array:
-        """`OBJECT_NAMES` values, (10,)."""
+        """`BODY_NAMES` values, (10,)."""
         return np.concatenate([[self.mass_kg], self.position_m, self.inertia_kg_m2])
 
 

@@ -20,7 +20,7 @@ from freeswing.homing.fit_start_pose import StartProblem
 from freeswing.homing.guess_from_tensions import TensionEnergy
 from freeswing.homing.home import find_start, guess_poses, home
 from freeswing.homing.homing_files import GeometryNoise, Homing, ReadingNoise, Readings
-from tests.homing.homing_robots import LARGEST_N, PERTURBED_N, START_N, bologna_3, bologna_4
+from tests.paper_robots import LARGEST_N, PERTURBED_N, START_N, bologna_3, bologna_4
 
 REAL = AcquisitionErrors()
 STATED = ReadingNoise(REAL.sigma_std_rad, REAL.length_std_m, REAL.statics, stated=True)

@@ -6,7 +6,7 @@ import pytest
 from freeswing.cdpr.files.documents import InputError
 from freeswing.cdpr.files.robot_file import write_robot
 from freeswing.homing.homing_files import Homing, ReadingNoise, Readings, read_homing, write_homing
-from tests.homing.homing_robots import bologna_3
+from tests.paper_robots import bologna_3
 
 HEADER = "dsigma1_rad,dsigma2_rad,dsigma3_rad,dl1_m,dl2_m,dl3_m"
 TOML = """format = "freeswing-homing/1"

@@ -13,7 +13,7 @@ from freeswing.homing.home import find_start
 from freeswing.homing.homing_files import Homing, Readings
 from freeswing.homing.many_starts import far_rows, many_starts
 from freeswing.homing.rest_readings import RestModel
-from tests.homing.homing_robots import LARGEST_N, PERTURBED_N, START, START_N, bologna_3
+from tests.paper_robots import LARGEST_N, PERTURBED_N, START, START_N, bologna_3
 
 
 def exact_homing(told_N: np.ndarray, count: int = 31) -> Homing:

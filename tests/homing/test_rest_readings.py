@@ -14,7 +14,7 @@ from freeswing.homing.guess_from_tensions import (
     stable_starts,
 )
 from freeswing.homing.rest_readings import RestModel, geometry_labels, length_screws
-from tests.homing.homing_robots import LARGEST_N, PERTURBED_N, START, START_N, bologna_3, bologna_4
+from tests.paper_robots import LARGEST_N, PERTURBED_N, START, START_N, bologna_3, bologna_4
 
 WEIGHT_N = 8.0 * 9.80665
 PRINTED_START = [-1.363, 0.963, -0.460, -0.056, -0.069, -0.557]
