@@ -24,7 +24,7 @@ def sheet_pdf(sheet: Sheet) -> bytes:
     canvas = FigureCanvasPdf(figure)
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0), xlim=(0.0, width), ylim=(total, 0.0))
     axes.set_axis_off()
-    path = Path.make_compound_path(*(Path(corners, closed=True) for corners in _corners_mm(sheet)))
+    path = Path.make_compound_path(*(Path(corners, closed=True) for corners in corners_mm(sheet)))
     axes.add_patch(PathPatch(path, facecolor="black", linewidth=0.0))
     style = {"ha": "center", "va": "baseline", "fontsize": sheet.text_mm * POINTS_A_MM}
     for place, line in sheet.caption:
@@ -34,7 +34,7 @@ def sheet_pdf(sheet: Sheet) -> bytes:
     return file.getvalue()
 
 
-def _corners_mm(sheet: Sheet) -> list[np.ndarray]:
+def corners_mm(sheet: Sheet) -> list[np.ndarray]:
     """Closed outlines of the black rectangles, y downwards, (5, 2) each."""
     rows, columns = sheet.cells.shape
     cell = np.array([sheet.width_mm / columns, sheet.height_mm / rows])

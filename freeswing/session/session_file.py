@@ -14,6 +14,7 @@ from freeswing.cdpr.files.documents import InputError, Problems, Reader, inside,
 from freeswing.cdpr.robot import frozen_array
 from freeswing.ident.bench.channels import Channel
 from freeswing.ident.bench.runs import KnownBody, Load, Placed
+from freeswing.session.base_tag import BaseTag, read_base_tag
 from freeswing.session.bench_keys import (
     check_loads,
     read_channels,
@@ -35,19 +36,6 @@ BOARD_KEYS = {
 OPTIONAL_BOARD_KEYS = {"charuco": ("legacy",), "chessboard": (), "aprilgrid": ("family",)}
 MOST_RUNS = 10_000
 WRITTEN_FOLDERS = ("tracks", "tracks/.sightings", "print")  # in the results
-
-
-@dataclass(frozen=True, slots=True)
-class BaseTag:
-    """A surveyed tag fixed to the frame; corners TL TR BR BL in the base frame, (4, 3)."""
-
-    family: str
-    id: int
-    corners_base_m: Array
-
-    def __post_init__(self) -> None:
-        corners = frozen_array(self.corners_base_m, (4, 3), "corners_base_m")
-        object.__setattr__(self, "corners_base_m", corners)
 
 
 @dataclass(frozen=True, slots=True)
@@ -244,7 +232,7 @@ def _read_calibration(reader: Reader, paths: _Paths) -> CalibrationSource:
     recordings = paths.optional(reader, "recordings")
     table = reader.child("board", required=False)
     board = None if table is None else _read_board(table)
-    tags = [_read_base_tag(entry) for entry in reader.children("base_tags", required=False)]
+    tags = [read_base_tag(entry) for entry in reader.children("base_tags", required=False)]
     reader.finish()
     if (recordings is None) != (board is None):
         reader.add("recordings, board", "give both or neither: footage of a board and the board")
@@ -285,31 +273,6 @@ def _board_value(reader: Reader, key: str) -> object:
             reader.add(key, "must be true or false")
         return bool(value)
     return reader.number(key, above=0.0)
-
-
-def _read_base_tag(reader: Reader) -> BaseTag | None:
-    family = reader.string("family")
-    number = reader.integer("id", minimum=0)
-    rows = reader.raw("corners_base_m")
-    reader.finish()
-    if rows is None:
-        return None
-    if not isinstance(rows, list) or len(rows) != 4:
-        reader.add("corners_base_m", "must be four points [x, y, z], in the order TL TR BR BL")
-        return None
-    corner = Reader({str(k): row for k, row in enumerate(rows, 1)}, reader.problems, reader.where)
-    points = np.array([corner.vector(str(k), 3) for k in range(1, 5)])
-    if not np.isfinite(points).all():
-        return None
-    sides = np.linalg.norm(points - np.roll(points, -1, axis=0), axis=1)
-    diagonals = np.linalg.norm(points[:2] - points[2:], axis=1)
-    if diagonals.min() <= sides.max():
-        reader.add(
-            "corners_base_m",
-            f"its sides are {np.round(sides, 4).tolist()} m, its diagonals "
-            f"{np.round(diagonals, 4).tolist()} m: no square in the order TL TR BR BL",
-        )
-    return BaseTag(family, number, points)
 
 
 def _read_run(reader: Reader, paths: _Paths) -> Run:

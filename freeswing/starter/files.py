@@ -1,13 +1,8 @@
-"""The texts of target.toml and session.toml."""
+"""The texts of target.toml and session.toml for recordings that exist."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from freeswing.starter.markers import Recorded, role
-
-TAGS = 4
-TAG_FAMILY = "tag36h11"
 
 
 def marker_target(found: Recorded) -> str:
@@ -23,62 +18,30 @@ def marker_target(found: Recorded) -> str:
     return "\n".join([*lines, ""])
 
 
-def marker_session(name: str, found: Recorded) -> str:
-    """session.toml of recorded markers: a run a file, a third of them kept apart."""
+def recorded_session(name: str, found: Recorded) -> str:
+    """session.toml of recordings: a run a swing, a third of them kept apart."""
     lines = [
         'format = "freeswing-session/1"',
         f'name = "{name}"',
         'robot = "robot.toml"',
-        'target = "target.toml"',
+        *(['target = "target.toml"'] if found.names else []),
         f"frame_rate_hz = {found.rate_hz:g}",
+        "# Where the recordings' axes are not the base frame's (another axis points up, say):",
+        "# [mocap]",
+        '# up = "y"                 # or three points measured in both frames: docs/formats.md',
     ]
-    for k, file in enumerate(found.files):
+    for k, run in enumerate(found.runs):
         lines += [
             "",
             "[[runs]]",
-            f'name = "{file.stem}"',
-            f'role = "{role(k, len(found.files))}"      # identify, or validate: never fitted',
-            f'trajectory = "runs/{file.name}"',
-            "# window_s = [2.0, 12.0]   # the free motion; absent: the program finds it",
-            "# cable_lengths_m = []     # as held; absent: from the poses",
+            f'name = "{run.name}"',
+            f'role = "{role(k, len(found.runs))}"      # identify, or validate: never fitted',
+            f'trajectory = "runs/{run.file.name}"',
         ]
-    return "\n".join([*lines, ""])
-
-
-def tag_target(size_m: float) -> str:
-    """target.toml of printed tags."""
-    lines = [
-        'format = "freeswing-target/1"',
-        "# Platform frame: wherever you like on the platform. Print with `freeswing board`, glue",
-        "# flat, and measure each tag's centre and turn (w, x, y, z) in that frame.",
-    ]
-    for k in range(TAGS):
-        lines += [
-            "",
-            "[[tags]]",
-            f'family = "{TAG_FAMILY}"',
-            f"id = {k}",
-            f"size_m = {size_m:g}          # side of the black border, as printed: measure it",
-            "q_platform_tag = [1.0, 0.0, 0.0, 0.0]",
-            "t_platform_tag_m = [nan, nan, nan]",
-        ]
-    return "\n".join([*lines, ""])
-
-
-def filmed_session(name: str, runs: Sequence[tuple[str, str]]) -> str:
-    """session.toml of cameras: recordings to be put where it says."""
-    lines = [
-        'format = "freeswing-session/1"',
-        f'name = "{name}"',
-        'robot = "robot.toml"',
-        'target = "target.toml"',
-        "",
-        "[calibration]                    # film the printed board with all cameras at once",
-        'recordings = "calibration"       # calibration/<camera>.mp4',
-        'board = { kind = "charuco", squares = [9, 6], square_m = 0.03, marker_m = 0.022, '
-        'dictionary = "DICT_5X5_100" }',
-        "# [[calibration.base_tags]]      # a surveyed tag on the frame ties cameras to it",
-    ]
-    for run, kind in runs:
-        lines += ["", "[[runs]]", f'name = "{run}"', f'role = "{kind}"', f'video = "runs/{run}"']
+        if run.window_s is None:
+            lines.append("# window_s = [2.0, 12.0]   # the free motion; absent: it is found")
+        else:
+            start, end = run.window_s
+            lines.append(f"window_s = [{start:.2f}, {end:.2f}]    # a free swing that was found")
+        lines.append("# cable_lengths_m = []     # as held; absent: from the poses")
     return "\n".join([*lines, ""])

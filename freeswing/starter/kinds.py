@@ -16,17 +16,19 @@ class Kind:
         cables: how many, where the kind settles it.
         free_coordinates: what stays free, as robot.toml has it.
         radius_m: of the pulleys; zero for eyelets and knots, None where it has to be measured.
+        any_count: whether there may be another number of cables.
     """
 
     says: str
     cables: int
     free_coordinates: str
     radius_m: float | None = 0.0
+    any_count: bool = False
 
 
 KINDS = {
-    "cable-robot": Kind("a platform on cables over pulleys", 4, '["x", "y"]', None),
-    "plate": Kind("a plate on four strings from fixed points", 4, '"auto"'),
+    "cable-robot": Kind("a platform on cables over pulleys", 4, '["x", "y"]', None, True),
+    "plate": Kind("a plate on strings from fixed points", 4, '"auto"', 0.0, True),
     "trifilar": Kind("a plate on three parallel strings", 3, '["x", "y", "chi"]'),
     "bifilar": Kind("a bar on two parallel strings, along x", 2, '["x", "y", "phi", "chi"]'),
     "hook": Kind("a body on one string or a crane's hook", 1, '["x", "y", "phi", "theta", "chi"]'),

@@ -1,4 +1,4 @@
-"""Markers of recordings that exist: their names, their places on the body, what to do with each."""
+"""Recordings that exist: their markers, places on the body, free motions, what to do with each."""
 
 from __future__ import annotations
 
@@ -9,13 +9,35 @@ from pathlib import Path
 import numpy as np
 
 from freeswing.cdpr.files.documents import DataError
-from freeswing.cdpr.files.trajectory_files import read_recording
-from freeswing.cdpr.measured.marker_recording import MarkerRecording
+from freeswing.cdpr.files.trajectory_files import (
+    holds_markers,
+    read_recording,
+    read_trajectory,
+)
+from freeswing.cdpr.markers.from_recording import trajectory_from_markers
+from freeswing.cdpr.measured.target import Marker, Target
+from freeswing.cdpr.measured.trajectory import Trajectory
 from freeswing.cdpr.robot import Array
+from freeswing.ident.signals.free_motions import free_motions
 
 FEWEST = 3
 VALIDATE_EVERY = 3  # every third recording is kept apart: a check on two runs at six recordings
 _ROUNDS = 5
+
+
+@dataclass(frozen=True, slots=True)
+class FoundRun:
+    """A swing of a recording.
+
+    Attributes:
+        name: of the run.
+        file: that holds it.
+        window_s: of the free motion; None: the recording holds one, which the program finds.
+    """
+
+    name: str
+    file: Path
+    window_s: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,30 +46,39 @@ class Recorded:
 
     Attributes:
         files: in the order of their names.
-        names: of the markers that all files have.
+        runs: the swings in them.
+        names: of the markers that all files have; empty where the files hold poses.
         positions_m: of each in the platform frame, (n, 3).
         rate_hz: samples a second.
         spread_m: how far the markers' distances are from rigid, rms.
+        low_m: least x, y, z at which the reference point was seen, (3,).
+        high_m: the greatest.
     """
 
     files: tuple[Path, ...]
+    runs: tuple[FoundRun, ...]
     names: tuple[str, ...]
     positions_m: Array
     rate_hz: float
     spread_m: float
+    low_m: Array
+    high_m: Array
 
 
 def look_over(files: Sequence[Path]) -> Recorded:
-    """Read recordings of one body.
+    """Read recordings of one body: all of markers, or all of poses.
 
-    The platform frame is put at the first marker, with the base's axes as the body hangs in the
-    middle of the first recording: so attachments can be measured from that marker with a tape.
+    With markers the platform frame is put at the first marker, with the base's axes as the body
+    hangs in the middle of the first recording: so attachments can be measured from that marker
+    with a tape. A recording with several free swings becomes several runs.
 
     Raises:
-        InputError: a file that is no recording of markers.
+        InputError: a file that is no recording of markers or poses.
         DataError: fewer than three markers that all files hold, or that are never seen together.
     """
     ordered = tuple(sorted(files, key=lambda path: path.name))
+    if not any(holds_markers(path) for path in ordered):
+        return _poses(ordered)
     recordings = [read_recording(path) for path in ordered]
     first = recordings[0]
     names = tuple(
@@ -63,7 +94,12 @@ def look_over(files: Sequence[Path]) -> Recorded:
     if not len(whole):
         raise DataError(f"{first.source}: its {len(names)} markers are never seen together")
     shape, spread = _shape(whole)
-    return Recorded(ordered, names, shape - shape[0], _rate_hz(first), spread)
+    places = shape - shape[0]
+    target = Target(markers=tuple(Marker(n, p) for n, p in zip(names, places, strict=True)))
+    motions = [trajectory_from_markers(one.select(names), None, target) for one in recordings]
+    extent = _extent([motion.values[:, :3] for motion in motions])
+    rate = _rate_hz(first.times_s)
+    return Recorded(ordered, _runs(ordered, motions), names, places, rate, spread, *extent)
 
 
 def role(index: int, count: int) -> str:
@@ -71,8 +107,34 @@ def role(index: int, count: int) -> str:
     return "validate" if count >= VALIDATE_EVERY and index % VALIDATE_EVERY == 2 else "identify"
 
 
-def _rate_hz(recording: MarkerRecording) -> float:
-    return round(1.0 / float(np.median(np.diff(recording.times_s))), 3)
+def _poses(files: tuple[Path, ...]) -> Recorded:
+    """Recordings whose program had already found the platform's pose."""
+    motions = [read_trajectory(path) for path in files]
+    places = [motion.values[:, :3] for motion in motions]
+    runs, rate = _runs(files, motions), _rate_hz(motions[0].times_s)
+    return Recorded(files, runs, (), np.zeros((0, 3)), rate, 0.0, *_extent(places))
+
+
+def _runs(files: Sequence[Path], motions: Sequence[Trajectory]) -> tuple[FoundRun, ...]:
+    """A run a file, or a run a swing where a file holds several."""
+    found: list[FoundRun] = []
+    for file, motion in zip(files, motions, strict=True):
+        windows = free_motions(motion)
+        if len(windows) < 2:
+            found.append(FoundRun(file.stem, file))
+            continue
+        found += [FoundRun(f"{file.stem}-{k:02d}", file, w) for k, w in enumerate(windows, start=1)]
+    return tuple(found)
+
+
+def _extent(places: Sequence[Array]) -> tuple[Array, Array]:
+    """Least and greatest coordinates over all recordings."""
+    joined = np.concatenate(places)
+    return np.nanmin(joined, axis=0), np.nanmax(joined, axis=0)
+
+
+def _rate_hz(times_s: Array) -> float:
+    return round(1.0 / float(np.median(np.diff(times_s))), 3)
 
 
 def _shape(positions_m: Array) -> tuple[Array, float]:

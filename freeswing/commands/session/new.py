@@ -2,32 +2,53 @@
 
 from __future__ import annotations
 
+import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from freeswing.commands.arguments import positive
 from freeswing.console import Console
 from freeswing.starter.kinds import KINDS
 
+if TYPE_CHECKING:
+    from freeswing.starter.questions import Answers
+
 FILMED_RUNS = 6
 FILES = ("robot.toml", "target.toml", "session.toml")
+PAPERS = ("a4", "letter", "a3")
+USUAL_KIND, USUAL_RATE_HZ, USUAL_TAG_M = "cable-robot", 30.0, 0.075
 
 
 def add_arguments(parser: ArgumentParser) -> None:
     """The folder, what hangs, and what measures it."""
     parser.add_argument("folder", metavar="DIR", help="a new folder, or one without these files")
     told = "; ".join(f"{name}: {kind.says}" for name, kind in KINDS.items())
-    parser.add_argument("--kind", choices=tuple(KINDS), default="cable-robot", help=told)
+    parser.add_argument("--kind", choices=tuple(KINDS), help=f"{told} (default {USUAL_KIND})")
     parser.add_argument("--cables", type=int, metavar="N", help="how many, 1 to 5; as the kind has")
     parser.add_argument("--mass-kg", type=positive, help="of the platform, where it was weighed")
     parser.add_argument(
         "--mocap",
         nargs="+",
         metavar="FILE",
-        help=".trc or .c3d recordings, one a swing: markers and rate are read, the files copied",
+        help="recordings of markers (.trc .c3d, text of Motive, Vicon, QTM) or poses (.csv): "
+        "markers, rate and free swings are read, the files copied",
     )
     parser.add_argument(
-        "--tag-m", type=positive, default=0.08, help="side of the printed tags (0.08), for cameras"
+        "--cameras",
+        nargs="+",
+        metavar="NAME",
+        help="cameras or phones; one is enough, two are far better (default left right)",
+    )
+    parser.add_argument("--rate-hz", type=positive, help=f"frames a second ({USUAL_RATE_HZ:g})")
+    parser.add_argument(
+        "--tag-m", type=positive, help=f"side of the platform's printed tags ({USUAL_TAG_M:g})"
+    )
+    parser.add_argument(
+        "--paper", choices=PAPERS, default=PAPERS[0], help="what tags and board are printed on"
+    )
+    parser.add_argument(
+        "--no-questions", action="store_true", help="take what flags do not say as usual"
     )
 
 
@@ -36,48 +57,133 @@ def run(options: Namespace, console: Console) -> None:
     from freeswing.cdpr.files.documents import InputError, replace_file
     from freeswing.starter.kinds import robot_toml
 
-    folder, kind = Path(options.folder), KINDS[options.kind]
-    cables = kind.cables if options.cables is None else options.cables
-    if not 1 <= cables <= 5:
-        raise InputError(f"--cables {cables}: 1 to 5 strings leave a free motion to record")
-    name = folder.resolve().name
+    folder = Path(options.folder)
     there = [str(folder / file) for file in FILES if (folder / file).exists()]
     if there:
         raise InputError(f"{', '.join(there)}: already there; name a new folder")
-    target, session, recordings = _measured(options, name, console)
-    for file, data in recordings.items():
-        replace_file(folder / "runs" / file, data)
-    texts = (robot_toml(name, kind, cables, options.mass_kg), target, session)
-    for file, text in zip(FILES, texts, strict=True):
-        replace_file(folder / file, text.encode("utf-8"))
-        console.say(str(folder / file))
-    console.say_json({"format": "freeswing-new/1", "folder": str(folder)})
-    prints = f"freeswing board {folder} draws tags and board to scale. " if not recordings else ""
-    console.say(
-        f"{prints}Replace every nan in robot.toml by what you measure, then: "
-        f"freeswing check {folder}"
+    answers = _answers(options)
+    kind = KINDS[answers.kind or USUAL_KIND]
+    cables = kind.cables if answers.cables is None else answers.cables
+    if not 1 <= cables <= 5:
+        raise InputError(f"--cables {cables}: 1 to 5 strings leave a free motion to record")
+    name = folder.resolve().name
+    beside = _recorded if answers.recordings else _filmed
+    written = {
+        "robot.toml": robot_toml(name, kind, cables, answers.mass_kg).encode("utf-8"),
+        **beside(name, answers, options.paper, console),
+    }
+    for file, data in written.items():
+        replace_file(folder / file, data)
+        if not file.startswith("runs/"):
+            console.say(str(folder / file))
+    console.say_json(
+        {
+            "format": "freeswing-new/1",
+            "folder": str(folder),
+            "files": sorted(written),
+            "missing": sum(data.count(b"nan") for f, data in written.items() if f in FILES),
+        }
     )
+    for line in _next(folder, written):
+        console.say(line)
 
 
-def _measured(options: Namespace, name: str, console: Console) -> tuple[str, str, dict[str, bytes]]:
+def _answers(options: Namespace) -> Answers:
+    """What flags say, and what a person at a terminal adds."""
+    from freeswing.cdpr.files.documents import InputError
+    from freeswing.starter.questions import Answers, ask, files_of
+
+    recordings = files_of(options.mocap or ())
+    for word in options.mocap or ():
+        if not files_of([word]):
+            raise InputError(f"--mocap {word}: no such file")
+    if recordings and options.cameras:
+        raise InputError("--mocap, --cameras: give one of them")
+    said = Answers(
+        kind=options.kind,
+        cables=options.cables,
+        mass_kg=options.mass_kg,
+        measured_by="mocap" if recordings else "cameras" if options.cameras else None,
+        recordings=recordings,
+        cameras=tuple(options.cameras or ()),
+        rate_hz=options.rate_hz,
+        tag_m=options.tag_m,
+    )
+    is_asked = sys.stdin.isatty() and sys.stderr.isatty() and not options.no_questions
+    quiet = options.json or options.quiet
+    return ask(said) if is_asked and not quiet else said
+
+
+def _filmed(name: str, answers: Answers, paper: str, console: Console) -> dict[str, bytes]:
+    """target.toml, session.toml and what to print, by their names."""
+    from freeswing.cdpr.files.documents import InputError
+    from freeswing.printing.pages import pages_pdf
+    from freeswing.starter import filmed
+    from freeswing.starter.markers import role
+
+    chosen = filmed.Filmed(
+        answers.cameras or ("left", "right"),
+        answers.rate_hz or USUAL_RATE_HZ,
+        answers.tag_m or USUAL_TAG_M,
+        paper,
+    )
+    largest = filmed.largest_tag_m(paper)
+    if chosen.tag_m > largest:
+        raise InputError(
+            f"--tag-m {chosen.tag_m:g}: four of them do not fit on {paper}; at most {largest:.3f}, "
+            "or --paper a3"
+        )
+    runs = [(f"swing-{k + 1:02d}", role(k, FILMED_RUNS)) for k in range(FILMED_RUNS)]
+    if len(chosen.cameras) == 1:
+        console.say(
+            "one camera: depth along its view is known several times worse than across; a second "
+            "phone from the side is worth more than any other change"
+        )
+    return {
+        "target.toml": filmed.tag_target(chosen).encode("utf-8"),
+        "session.toml": filmed.filmed_session(name, chosen, runs).encode("utf-8"),
+        "print.pdf": pages_pdf(filmed.pages(chosen), paper),
+    }
+
+
+def _recorded(name: str, answers: Answers, paper: str, console: Console) -> dict[str, bytes]:
     """target.toml, session.toml, and recordings to copy, by their names."""
     from freeswing.cdpr.files.documents import InputError
     from freeswing.starter import files
-
-    if not options.mocap:
-        from freeswing.starter.markers import role
-
-        runs = [(f"swing-{k + 1:02d}", role(k, FILMED_RUNS)) for k in range(FILMED_RUNS)]
-        return files.tag_target(options.tag_m), files.filmed_session(name, runs), {}
     from freeswing.starter.markers import look_over
 
-    found = look_over([Path(file) for file in options.mocap])
-    names = [file.stem for file in found.files]
-    if len(set(names)) < len(names):
+    stems = [file.stem for file in answers.recordings]
+    if len(set(stems)) < len(stems):
         raise InputError("--mocap: two recordings have the same name; rename one")
-    console.say(
-        f"{len(found.files)} recordings of {', '.join(found.names)} at {found.rate_hz:g} Hz; the "
-        f"markers keep their distances to {1e3 * found.spread_m:.2f} mm"
+    found = look_over(answers.recordings)
+    what = ", ".join(found.names) or "poses"
+    console.say(f"{len(found.files)} recordings of {what} at {found.rate_hz:g} Hz")
+    if found.names:
+        console.say(f"the markers keep their distances to {1e3 * found.spread_m:.2f} mm")
+    span = "; ".join(
+        f"{axis} {low:.2f} to {high:.2f} m"
+        for axis, low, high in zip("xyz", found.low_m, found.high_m, strict=True)
     )
-    copies = {file.name: file.read_bytes() for file in found.files}
-    return files.marker_target(found), files.marker_session(name, found), copies
+    console.say(f"the reference point is seen at {span}")
+    if len(found.runs) > len(found.files):
+        console.say(f"{len(found.runs)} free swings in them: each is a run of its own")
+    texts = {"session.toml": files.recorded_session(name, found).encode("utf-8")}
+    if found.names:
+        texts["target.toml"] = files.marker_target(found).encode("utf-8")
+    return texts | {f"runs/{file.name}": file.read_bytes() for file in found.files}
+
+
+def _next(folder: Path, written: dict[str, bytes]) -> list[str]:
+    """What is left to do, and the next command."""
+    steps = []
+    if "print.pdf" in written:
+        steps.append(
+            f"print {folder / 'print.pdf'} at 100 % and measure its ruler; glue the platform's "
+            "sheet flat, hang the base tags upright"
+        )
+    marked = [file for file in FILES if b"nan" in written.get(file, b"")]
+    steps.append(f"replace every nan in {' and '.join(marked)} by what you measure")
+    if "print.pdf" in written:
+        steps.append("put the films where session.toml says")
+    numbered = [f"{k}. {step}" for k, step in enumerate(steps, start=1)]
+    return [*numbered, f"{len(steps) + 1}. freeswing check {folder}"]

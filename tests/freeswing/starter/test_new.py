@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 import json
+import os
 import re
+import subprocess
+import sys
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
 from freeswing.cdpr.files.robot_file import read_robot
+from freeswing.cdpr.files.trajectory_files import read_recording, write_trc
+from freeswing.cdpr.measured.marker_recording import MarkerRecording
 from freeswing.cdpr.measured.target import read_target
 from freeswing.main import main
+from freeswing.session.session_file import read_session
 from freeswing.starter.kinds import KINDS
-from tests.places import SAMPLES
+from tests.places import ROOT, SAMPLES
 
 SAMPLE = SAMPLES / "mocap-trc"
 RECORDINGS = sorted((SAMPLE / "runs").glob("*.trc"))
@@ -87,6 +94,115 @@ def test_the_markers_keep_their_distances(tmp_path: Path) -> None:
         names = ("P", "left", "front", "right")
         sides.append([np.linalg.norm(place[a] - place[b]) for a in names for b in names])
     np.testing.assert_allclose(sides[1], sides[0], atol=1e-3)
+
+
+def one_long_recording(path: Path) -> tuple[float, float]:
+    """Two swings of the sample with a hand in between; gives its first and last moment."""
+    first, second = (read_recording(file) for file in RECORDINGS[-2:])
+    second = second.select(first.names)
+    step, hand_s = first.step_s, 3.0
+    share = np.linspace(0.0, 1.0, round(hand_s / step))[1:-1, None, None]
+    jerk = 0.02 * np.sin(2.0 * np.pi * 3.7 * share * hand_s) * np.sin(np.pi * share)
+    start = first.positions_m[np.isfinite(first.positions_m).all(axis=(1, 2))][-1]
+    end = second.positions_m[np.isfinite(second.positions_m).all(axis=(1, 2))][0]
+    carried = start + (end - start) * share**2 * (3.0 - 2.0 * share) + jerk
+    places = np.concatenate([first.positions_m, carried, second.positions_m])
+    times = step * np.arange(len(places))
+    write_trc(path, MarkerRecording(times, first.names, places))
+    return step * len(first.times_s), step * (len(first.times_s) + len(carried))
+
+
+def test_one_long_recording_becomes_a_run_a_swing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    grip, release = one_long_recording(tmp_path / "all.trc")
+    folder = tmp_path / "lab-day"
+    assert main(["new", str(folder), "--mocap", str(tmp_path / "all.trc")]) == 0
+    assert "2 free swings in them" in capsys.readouterr().out
+    runs = read_session(folder).runs
+    assert [run.name for run in runs] == ["all-01", "all-02"]
+    (_, first_end), (second_start, _) = (run.window_s or (0.0, 0.0) for run in runs)
+    assert first_end < grip + 0.3, "the hand is no part of the first swing"
+    assert second_start > release - 0.3, "nor of the second"
+    measure(folder)
+    assert main(["check", str(folder)]) == 0, capsys.readouterr().err
+
+
+def test_poses_need_no_target(tmp_path: Path) -> None:
+    folder = tmp_path / "bar"
+    files = [str(path) for path in sorted((SAMPLES / "two-cables" / "runs").glob("*.csv"))[:3]]
+    assert main(["new", str(folder), "--kind", "bifilar", "--mocap", *files]) == 0
+    assert not (folder / "target.toml").exists()
+    session = read_session(folder)
+    assert session.target is None
+    assert session.frame_rate_hz == 100.0
+
+
+@pytest.mark.parametrize("paper", ["a4", "letter", "a3"])
+def test_the_print_is_what_the_files_say(paper: str, tmp_path: Path) -> None:
+    """Tags 0 to 3 stand on the printed sheet where target.toml has them, in millimetres."""
+    pdfium = pytest.importorskip("pypdfium2")
+    folder = tmp_path / "lab-day"
+    assert main(["new", str(folder), "--paper", paper]) == 0
+    book = pdfium.PdfDocument(folder / "print.pdf")
+    points_mm = 72.0 / 25.4
+    pixels_mm = 4.0
+    picture = np.asarray(book[0].render(scale=pixels_mm / points_mm, grayscale=True).to_pil())
+    corners, ids, _ = cv2.aruco.ArucoDetector(
+        cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11)
+    ).detectMarkers(picture)
+    assert ids is not None
+    seen = {
+        int(k): c[0].mean(axis=0) / pixels_mm for k, c in zip(ids.ravel(), corners, strict=True)
+    }
+    middle = np.mean(list(seen.values()), axis=0)
+    target = read_target(folder / "target.toml")
+    for tag in target.tags:
+        x, y = 1e3 * tag.centre_m[:2]
+        np.testing.assert_allclose(seen[tag.id] - middle, [x, -y], atol=0.3)
+    dark = np.flatnonzero((picture < 128)[-round(18 * pixels_mm) : -round(11 * pixels_mm)].any(0))
+    assert (dark[-1] - dark[0]) / pixels_mm == pytest.approx(100.0, abs=0.6), "the test ruler"
+    assert len(book) == 4
+
+
+def test_a_terminal_is_asked(tmp_path: Path) -> None:
+    """A person types at a terminal; Enter takes what is usual."""
+    pty = pytest.importorskip("pty")
+    folder = tmp_path / "hall"
+    main_end, terminal = pty.openpty()
+    started = subprocess.Popen(
+        [sys.executable, "-m", "freeswing", "new", str(folder)],
+        cwd=ROOT,
+        stdin=terminal,
+        stdout=terminal,
+        stderr=terminal,
+    )
+    # plate, three strings, wrong and right mass, cameras, their names, rate.
+    os.write(main_end, b"2\n3\nheavy\n2,5\n1\nl, r\n50\n")
+    assert started.wait(timeout=60) == 0, os.read(main_end, 10_000)
+    os.close(terminal)
+    os.close(main_end)
+    robot = (folder / "robot.toml").read_text(encoding="utf-8")
+    assert robot.count("[[cables]]") == 3
+    assert "mass_kg = 2.5" in robot
+    session = (folder / "session.toml").read_text(encoding="utf-8")
+    assert "l.mp4, r.mp4" in session
+    assert "frame_rate_hz = 50" in session
+
+
+def test_what_was_measured_of_a_base_tag_gives_its_corners(tmp_path: Path) -> None:
+    folder = tmp_path / "lab-day"
+    assert main(["new", str(folder)]) == 0
+    text = (folder / "session.toml").read_text(encoding="utf-8")
+    text = text.replace("[nan, nan, nan]", "[1.2, 0.0, 0.1]")
+    (folder / "session.toml").write_text(text, encoding="utf-8")
+    calibration = read_session(folder).calibration
+    assert calibration is not None
+    first, second = (tag.corners_base_m for tag in calibration.base_tags)
+    half = 0.08  # of 160 mm on A4
+    expected = [[-half, 0, half], [half, 0, half], [half, 0, -half], [-half, 0, -half]]
+    np.testing.assert_allclose(first, expected, atol=1e-12)
+    np.testing.assert_allclose(second - first, [[1.2, 0.0, 0.1]] * 4, atol=1e-12)
 
 
 def test_nothing_is_written_over(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
