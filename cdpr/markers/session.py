@@ -13,6 +13,7 @@ from freeswing.cdpr.markers.layout import Alignment, SessionLayout, align, sessi
 from freeswing.cdpr.markers.rigidity import Rigidity, marker_weights, rigidity
 from freeswing.cdpr.markers.slow import slow_share
 from freeswing.cdpr.markers.spacing import (
+    Jump,
     Mended,
     mended,
     pairs_of,
@@ -20,6 +21,7 @@ from freeswing.cdpr.markers.spacing import (
     typical_distances,
     unit_between,
 )
+from freeswing.cdpr.markers.stand_outs import stand_outs
 from freeswing.cdpr.measured.marker_recording import MarkerRecording
 from freeswing.cdpr.measured.rigid_fit import fit_rigid, pose_covariances
 from freeswing.cdpr.measured.slow_errors import SlowErrors
@@ -45,12 +47,14 @@ class Examined:
         faults: what was put right or left out; frames count within the window.
         order: columns that were taken for the target's markers where all labels are exchanged.
         rigidity: what the markers are worth within the window.
+        stand_outs: kept markers that contradict the others for some samples, which have no pose.
     """
 
     recording: MarkerRecording
     faults: Mended
     order: tuple[int, ...] | None
     rigidity: Rigidity
+    stand_outs: tuple[Jump, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,9 +102,15 @@ def examine(
             f"{recording.source}: no sample shows three markers that are not on a line (at most "
             f"{most} at once); name the markers as in the target file, or add markers"
         )
-    found = rigidity(nominal, faults.positions_m[inside])
-    clean = replace(chosen, positions_m=faults.positions_m)
-    return Examined(clean, faults.within(inside), order, found)
+    positions = np.array(faults.positions_m)
+    found = rigidity(nominal, positions[inside])
+    within = np.flatnonzero(inside)
+    doubtful = tuple(replace(one, frames=within[one.frames]) for one in stand_outs(found))
+    if doubtful:
+        positions[np.concatenate([one.frames for one in doubtful])] = np.nan
+        found = rigidity(nominal, positions[inside])
+    clean = replace(chosen, positions_m=positions)
+    return Examined(clean, faults.within(inside), order, found, doubtful)
 
 
 def common_layout(target: Target, runs: Sequence[Examined]) -> SessionLayout:

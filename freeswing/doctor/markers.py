@@ -85,6 +85,12 @@ def _faults(subject: str, run: RunMarkers) -> Iterator[Finding]:
         )
         level = "warning" if jump.most_m > LARGE_JUMP_M else "note"
         yield Finding(level, subject, text, "it is left out of these samples")
+    for one in examined.stand_outs:
+        text = (
+            f"marker {names[one.marker]} contradicts the others by up to {1e3 * one.most_m:.1f} mm "
+            f"in {len(one.frames)} samples from {times[one.frames.min()]:.2f} s"
+        )
+        yield Finding("note", subject, text, "these samples have no pose")
 
 
 def _rigidity(subject: str, run: RunMarkers, usual_m: float) -> Iterator[Finding]:
