@@ -3,20 +3,51 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Self, TextIO
 
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
 
+# First words of lines that say how bad something is.
+STYLES = {"error": "bold red", "warning": "yellow", "note": "dim"}
+
+
+def has_desktop() -> bool:
+    """Whether a browser can be shown here."""
+    shown = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    return sys.platform in ("win32", "darwin") or bool(shown)
+
+
+def has_colours(stream: TextIO) -> bool:
+    """Whether a stream is a terminal whose person has not asked for plain text."""
+    plain = os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb"
+    return stream.isatty() and not plain
+
+
+def _write(stream: TextIO, text: str, style: str = "") -> None:
+    """One line; the style colours its first word, on a terminal alone."""
+    head, space, rest = text.partition(" ")
+    if not style or not has_colours(stream):
+        stream.write(text + "\n")
+        return
+    from rich.console import Console as RichConsole
+    from rich.text import Text
+
+    line = Text.assemble((head, style), space + rest)
+    RichConsole(file=stream).print(line, soft_wrap=True, highlight=False)
+
+
 class Console:
     """The two streams of a command.
 
-    Progress is drawn only where stderr is a terminal. With `as_json` the result file is the only
-    thing on stdout; with `quiet` nothing but complaints is printed.
+    Progress and colours are drawn only on a terminal; a pipe or file gets plain text. With
+    `as_json` the result file is the only thing on stdout; with `quiet` nothing but complaints is
+    printed.
     """
 
     def __init__(self, *, as_json: bool = False, quiet: bool = False) -> None:
@@ -36,13 +67,13 @@ class Console:
         """One line of the summary."""
         if self._summary:
             self._stop_bar()
-            sys.stdout.write(text + "\n")
+            _write(sys.stdout, text, STYLES.get(text.partition(" ")[0], ""))
             sys.stdout.flush()
 
     def complain(self, text: str) -> None:
         """A failure or a warning, on stderr."""
         self._stop_bar()
-        sys.stderr.write(f"freeswing: {text}\n")
+        _write(sys.stderr, f"freeswing: {text}", "bold red")
 
     def show_file(self, path: Path) -> None:
         """With `--json`: the result file, whole, on stdout."""

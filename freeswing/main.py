@@ -11,6 +11,7 @@ from types import ModuleType
 
 from freeswing import __version__
 from freeswing.console import Console
+from freeswing.errors import DONE, INTERRUPTED, describe, exit_status, short_name
 
 # Each command with the room of `freeswing/commands` that its file stands in, as help lists them.
 COMMANDS = {
@@ -24,6 +25,7 @@ COMMANDS = {
     "report": "session",
     "compare": "session",
     "run": "session",
+    "watch": "session",
     "convert": "files",
     "export": "files",
     "simulate": "robot",
@@ -36,8 +38,9 @@ COMMANDS = {
     "design": "control",
     "servo": "control",
     "tensions": "control",
+    "doctor": "program",
+    "completion": "program",
 }
-DONE, NO_RESULT, WRONG_INPUT, INTERRUPTED = 0, 1, 2, 130
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -46,7 +49,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Args:
         arguments: the words after `freeswing`; those of the process when None.
     """
-    options = build_parser().parse_args(arguments)
+    parser = build_parser()
+    options = parser.parse_args(arguments)
+    options.parser = parser  # for `completion`, which prints what it knows
     for threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         # Processes share the cores; small matrices only lose by threads of their own.
         os.environ.setdefault(threads, "1")
@@ -62,34 +67,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         except Exception as failure:
             if options.verbose:
                 raise
-            console.complain(describe(failure))
+            console.complain(f"[{short_name(failure)}] {describe(failure)}")
             return exit_status(failure)
     return DONE
-
-
-def exit_status(failure: BaseException) -> int:
-    """2 for a file or a flag that is wrong, 1 for data that cannot give a result."""
-    from freeswing.cdpr.files.problems import InputError
-
-    unusable_file = isinstance(failure, OSError) and failure.filename is not None
-    return WRONG_INPUT if isinstance(failure, InputError) or unusable_file else NO_RESULT
-
-
-def describe(failure: BaseException) -> str:
-    """One plain sentence for a failure; what is not ours to explain says how to learn more."""
-    from freeswing.cdpr.files.problems import DataError, InputError
-
-    if isinstance(failure, InputError | DataError):
-        return str(failure)
-    if isinstance(failure, OSError) and failure.strerror:
-        where = f"{failure.filename}: " if failure.filename else ""
-        return f"{where}{failure.strerror}"
-    if isinstance(failure, MemoryError):
-        return "the data do not fit into memory: shorten the windows or take fewer runs"
-    if isinstance(failure, ValueError) and type(failure).__module__ != "numpy.linalg":
-        return f"{failure}"
-    kind = type(failure).__name__
-    return f"{kind}: {failure} (not foreseen; --verbose shows where it happened)"
 
 
 def build_parser() -> argparse.ArgumentParser:
@@ -99,7 +79,8 @@ def build_parser() -> argparse.ArgumentParser:
         description="Recorded free swings of a cable-suspended platform in; its inertial "
         "parameters, how far to trust them, and what the model still lacks, out.",
         epilog="Exit status: 0 done, 1 the data cannot give a result, "
-        "2 wrong usage or an unreadable file.",
+        "2 wrong usage or an unreadable file, 130 interrupted. A failure's short name, as in "
+        "[keys], is explained in docs/errors.md.",
     )
     parser.add_argument("--version", action="version", version=f"freeswing {__version__}")
     choices = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)

@@ -46,6 +46,7 @@ class Material:
         folder: the session as a command line names it.
         absent: why a result is not shown, by its kind.
         warnings: what to know of the results as a whole.
+        refresh_s: how often the page reads itself anew, while a session is watched.
     """
 
     title: str
@@ -59,6 +60,7 @@ class Material:
     folder: str = "SESSION"
     absent: Mapping[str, str] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
+    refresh_s: float | None = None
 
     @property
     def estimates(self) -> dict[str, Estimate]:

@@ -80,7 +80,11 @@ def render_page(material: Material) -> str:
     style = (files("freeswing.report") / "templates" / "page.css").read_text(encoding="utf-8")
     page = environment.get_template("page.html")
     return page.render(
-        title=material.title, sections=sections, style=Markup(style), warnings=material.warnings
+        title=material.title,
+        sections=sections,
+        style=Markup(style),
+        warnings=material.warnings,
+        refresh_s=material.refresh_s,
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -40,7 +41,9 @@ def run(options: Namespace, console: Console) -> None:
 
 
 def write_report(
-    session: Session, failures: Mapping[str, str] | None = None
+    session: Session,
+    failures: Mapping[str, str] | None = None,
+    refresh_s: float | None = None,
 ) -> tuple[Path, Material]:
     """Render the page; gives its path and what it was made of.
 
@@ -48,6 +51,7 @@ def write_report(
         session: whose results are shown. Those that are out of date are named; where they do not
             belong to what stands beside them they are left out.
         failures: why stages came to no result just now, by the stage's name.
+        refresh_s: the page reads itself anew so often; None: it stays as it is.
     """
     from freeswing.report.material import read_material
     from freeswing.report.page import write_page
@@ -69,6 +73,7 @@ def write_report(
         absent=absent,
         warnings=tuple(one.sentence() for one in stale if not one.mixed),
     )
+    material = replace(material, refresh_s=refresh_s)
     page = session.results / "report.html"
     write_page(page, material)
     return page, material
@@ -82,14 +87,11 @@ NO_VALIDATION = (
 
 def open_page(page: Path, console: Console) -> None:
     """Show a page where there is a desktop."""
-    import os
-    import sys
     import webbrowser
 
-    has_desktop = sys.platform in ("win32", "darwin") or bool(
-        os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
-    )
-    if not has_desktop or not webbrowser.open(page.resolve().as_uri()):
+    from freeswing.console import has_desktop
+
+    if not has_desktop() or not webbrowser.open(page.resolve().as_uri()):
         console.say("no desktop here: open the page yourself")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from freeswing.commands.arguments import add_session, add_workers, crew_of, open_session
@@ -10,6 +11,7 @@ from freeswing.console import Console
 
 if TYPE_CHECKING:
     from freeswing.session.session_file import Session
+    from freeswing.session.stages import Stage
     from freeswing.workers.crew import Crew
 
 
@@ -37,8 +39,21 @@ def run(options: Namespace, console: Console) -> None:
     console.show_file(session.results / "identification.json")
 
 
-def run_session(session: Session, console: Console, crew: Crew) -> None:
+def run_session(
+    session: Session,
+    console: Console,
+    crew: Crew,
+    stages: Sequence[Stage] | None = None,
+    refresh_s: float | None = None,
+) -> None:
     """All steps of a session, then the report, whose path is said last.
+
+    Args:
+        session: whose steps are taken.
+        console: where it is said.
+        crew: who works.
+        stages: those that are taken where they are due; None: all.
+        refresh_s: the page reads itself anew so often; None: it stays as it is.
 
     Raises:
         DataError: where a step came to no result; the report is written all the same and says so.
@@ -48,7 +63,7 @@ def run_session(session: Session, console: Console, crew: Crew) -> None:
     from freeswing.session.stages import DIAGNOSE, STAGES
 
     failures: dict[str, DataError] = {}
-    for stage in STAGES:
+    for stage in STAGES if stages is None else stages:
         if not stage.due(session):
             if stage is DIAGNOSE:
                 console.say(f"diagnose: left out. {NO_VALIDATION}")
@@ -63,9 +78,11 @@ def run_session(session: Session, console: Console, crew: Crew) -> None:
             failures[stage.name] = failure
             if stage.name in NEEDED:
                 break
-    page, material = write_report(session, {name: str(one) for name, one in failures.items()})
+    told = {name: str(one) for name, one in failures.items()}
+    page, material = write_report(session, told, refresh_s)
     for warning in material.warnings:
         console.complain(warning)
     console.say(str(page))
     if failures:
-        raise DataError("\n  ".join(f"{name}: {why}" for name, why in failures.items()))
+        told = "\n  ".join(f"{name}: {why}" for name, why in failures.items())
+        raise DataError(told) from next(iter(failures.values()))

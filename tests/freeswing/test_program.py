@@ -1,0 +1,112 @@
+"""doctor, completion, colours, and a machine's words from every command."""
+
+from __future__ import annotations
+
+import inspect
+import io
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+from freeswing.console import _write, has_colours
+from freeswing.doctor import machine
+from freeswing.main import COMMANDS, main
+from tests.places import ROOT
+
+
+def test_the_machine_that_runs_the_tests_is_fit(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["doctor", "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["format"] == "freeswing-doctor/1"
+    told = {one["subject"]: one for one in document["findings"]}
+    assert {"python", "numpy", "codecs", "cores", "memory", "kernels"} <= set(told)
+    assert [one for one in document["findings"] if one["level"] == "error"] == []
+    assert "h264" in json.dumps(document)
+
+
+def test_what_is_missing_is_an_error_with_its_remedy(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(machine, "NEEDED", {"numpy-of-nowhere": "numpy_of_nowhere"})
+    monkeypatch.setattr(machine, "READ", ("h264", "film_of_nowhere"))
+    assert main(["doctor"]) == 1
+    said = capsys.readouterr()
+    assert "pip install numpy-of-nowhere" in said.out
+    assert "cannot read film_of_nowhere" in said.out
+    assert "not usable here: numpy-of-nowhere" in said.err
+
+
+def test_a_cluster_that_is_not_there_is_said(capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("distributed")
+    assert main(["doctor", "--cluster", "nowhere"]) == 1
+    assert re.search(r"error +cluster: .*nowhere", capsys.readouterr().out)
+
+
+BASH = shutil.which("bash")
+
+
+@pytest.mark.skipif(BASH is None, reason="bash is not installed")
+@pytest.mark.parametrize(
+    ("typed", "offered"),
+    [
+        (["dia"], "diagnose"),
+        (["identify", "--weigh"], "--weighting"),
+        (["new", "x", "--kind", "tri"], "trifilar"),
+    ],
+)
+def test_bash_completes(typed: list[str], offered: str, tmp_path: Path) -> None:
+    script = tmp_path / "complete.bash"
+    done = subprocess.run(
+        [sys.executable, "-m", "freeswing", "completion", "bash"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    script.write_text(done.stdout, encoding="utf-8")
+    words = " ".join(["freeswing", *typed])
+    code = (
+        f"source {script}; COMP_WORDS=({words}); COMP_CWORD={len(typed)}; "
+        '$(complete -p freeswing | sed "s/.*-F \\([^ ]*\\) .*/\\1/"); echo "${COMPREPLY[@]}"'
+    )
+    shown = subprocess.run(
+        [str(BASH), "--norc", "-c", code], capture_output=True, text=True, check=True
+    )
+    assert offered in shown.stdout.split(), (shown.stdout, shown.stderr)
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def test_colours_are_for_terminals_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    monkeypatch.setenv("TERM", "xterm")
+    pipe, terminal = io.StringIO(), Terminal()
+    for stream in (pipe, terminal):
+        _write(stream, "error   run a: [late] by 3 ms", "bold red")
+    assert pipe.getvalue() == "error   run a: [late] by 3 ms\n"
+    assert "\x1b[1;31merror" in terminal.getvalue()
+    assert "[late] by 3 ms" in terminal.getvalue()
+    monkeypatch.setenv("NO_COLOR", "1")
+    assert not has_colours(terminal)
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_speaks_json(name: str) -> None:
+    source = inspect.getsource(import_module(f"freeswing.commands.{COMMANDS[name]}.{name}"))
+    assert "say_json(" in source or "show_file(" in source, name
+
+
+def test_the_pages_name_what_a_shell_needs() -> None:
+    text = (ROOT / "docs" / "commands.md").read_text(encoding="utf-8")
+    assert 'eval "$(freeswing completion bash)"' in text
+    assert os.linesep in text
