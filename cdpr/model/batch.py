@@ -1,4 +1,8 @@
-"""CasADi functions evaluated over leading batch axes, straight from and into numpy memory."""
+"""CasADi functions evaluated over leading batch axes, straight from and into numpy memory.
+
+Several points go through the function's tape, all at once (`cdpr.model.tape`); a single one, and a
+function that has no tape, through CasADi's interpreter, to the same bits.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +13,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from freeswing.cdpr.model.tape import Tape, tape_of
 from freeswing.cdpr.robot import Array
 
 LARGEST_CHUNK = 1024
@@ -46,12 +51,31 @@ def evaluate(function: Any, *arguments: Any) -> tuple[Array, ...]:
         np.ascontiguousarray(np.broadcast_to(array, batch + tail)).reshape(prod(batch), *tail)
         for array, tail in zip(arrays, tails, strict=True)
     ]
-    return _evaluate_flat(function, flat, batch)
-
-
-def _evaluate_flat(function: Any, flat: list[Array], batch: tuple[int, ...]) -> tuple[Array, ...]:
-    total = prod(batch)
     sizes = [function.size_out(i) for i in range(function.n_out())]
+    tape = tape_of(function) if prod(batch) > 1 else None
+    results = _interpreted(function, flat, sizes) if tape is None else _taped(tape, flat, sizes)
+    return tuple(
+        _shaped(result, name, batch)
+        for result, name in zip(results, function.name_out(), strict=True)
+    )
+
+
+Sizes = list[tuple[int, int]]
+
+
+def _taped(tape: Tape, flat: list[Array], sizes: Sizes) -> list[Array]:
+    """Results of a tape, (n, cols, rows) each."""
+    total = len(flat[0])
+    together = tape.run(np.concatenate([array.reshape(total, -1) for array in flat], axis=1))
+    return [
+        np.ascontiguousarray(part).reshape(total, cols, rows)
+        for part, (rows, cols) in zip(_parts(together, sizes), sizes, strict=True)
+    ]
+
+
+def _interpreted(function: Any, flat: list[Array], sizes: Sizes) -> list[Array]:
+    """Results of CasADi's interpreter, (n, cols, rows) each."""
+    total = len(flat[0])
     results = [np.empty((total, cols, rows)) for rows, cols in sizes]
     done = 0
     while done < total:
@@ -66,10 +90,7 @@ def _evaluate_flat(function: Any, flat: list[Array], batch: tuple[int, ...]) -> 
                 buffer.set_res(i, result[done : done + count].reshape(-1).data)
         run()
         done += count
-    return tuple(
-        _shaped(result, name, batch)
-        for result, name in zip(results, function.name_out(), strict=True)
-    )
+    return results
 
 
 def _shaped(result: Array, name: str, batch: tuple[int, ...]) -> Array:
@@ -96,20 +117,37 @@ class Bound:
     """
 
     def __init__(self, function: Any, count: int) -> None:
+        sizes_in = [(function.size1_in(i), 1) for i in range(function.n_in())]
+        sizes_out = [function.size_out(i) for i in range(function.n_out())]
+        tape = tape_of(function) if count > 1 else None
+        if tape is not None:
+            points, results = np.zeros((count, tape.inputs)), np.zeros((count, tape.outputs))
+            self.inputs = _parts(points, sizes_in)
+            self.outputs = _parts(results, sizes_out)
+            self.run = tape.bound(points, results)
+            return
         mapped = function if count == 1 else function.map(count)
         self._buffer, self.run = mapped.buffer()
-        shapes_in = [function.size1_in(i) for i in range(function.n_in())]
-        shapes_out = [function.size_out(i) for i in range(function.n_out())]
-        self.inputs = [np.zeros((count, rows)) for rows in shapes_in]
+        self.inputs = [np.zeros((count, rows)) for rows, _ in sizes_in]
         self.outputs = [
             np.zeros((count, rows) if cols == 1 else (count, cols, rows))
-            for rows, cols in shapes_out
+            for rows, cols in sizes_out
         ]
         for i, array in enumerate(self.inputs):
             if array.size:
                 self._buffer.set_arg(i, array.reshape(-1).data)
         for i, array in enumerate(self.outputs):
             self._buffer.set_res(i, array.reshape(-1).data)
+
+
+def _parts(together: Array, sizes: Sizes) -> list[Array]:
+    """Views of (n, all) as columns (n, rows), or (n, cols, rows) of a matrix, one after another."""
+    ends = np.cumsum([rows * cols for rows, cols in sizes])
+    parts = np.split(together, ends[:-1], axis=1)
+    return [
+        part if cols == 1 else part.reshape(len(part), cols, rows)
+        for part, (rows, cols) in zip(parts, sizes, strict=True)
+    ]
 
 
 @lru_cache(maxsize=64)
