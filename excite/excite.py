@@ -19,6 +19,7 @@ from freeswing.cdpr.model.equations import build_model
 from freeswing.cdpr.model.free_motion import choose_free_coordinates
 from freeswing.cdpr.model.statics import random_poses
 from freeswing.cdpr.robot import Array, Robot
+from freeswing.cdpr.system.confine import results_folder
 from freeswing.excite.choose_swings import (
     Choice,
     choose,
@@ -68,10 +69,10 @@ def excite(
     """
     path, options = Path(path), options or ExcitationOptions()
     say = progress or (lambda _label, _fraction: None)
+    results = results_folder(path.parent, results)
     bench = make_bench(read_robot(path), options)
     plan = plan_swings(bench, options, say)
     document = plan_document(bench, options, plan)
-    results = path.parent / "results" if results is None else Path(results)
     write_json(results / "excitation.json", document)
     replace_file(results / "excitation.csv", plan_table(bench, plan).encode())
     replace_file(results / "excitation.svg", swings_svg(bench, plan.swings).encode())

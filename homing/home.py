@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from freeswing.cdpr.files.documents import DataError, write_json
 from freeswing.cdpr.robot import Robot
+from freeswing.cdpr.system.confine import results_folder
 from freeswing.homing.best_fit import best_fit, model_for
 from freeswing.homing.fit_start_pose import StartFit, StartProblem
 from freeswing.homing.guess_from_tensions import (
@@ -56,12 +57,12 @@ def home(
     say = progress or (lambda _label, _fraction: None)
     say("reading", 0.0)
     homing = read_homing(path)
+    folder = results_folder(path.parent, results)
     say("start pose", 0.2)
     begun = time.perf_counter()
     fit = find_start(homing)
     document = homing_document(homing.robot, fit, time.perf_counter() - begun)
-    results = path.parent / "results" if results is None else Path(results)
-    write_json(results / "homing.json", document)
+    write_json(folder / "homing.json", document)
     say("start pose", 1.0)
     return document
 

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from freeswing.cdpr.files.documents import DataError, write_json
 from freeswing.cdpr.files.robot_file import read_robot
 from freeswing.cdpr.robot import Cable, Robot
+from freeswing.cdpr.system.confine import results_folder
 from freeswing.homing.acquisition import default_tensions
 from freeswing.homing.arrow_least_squares import covariance
 from freeswing.homing.fit_start_pose import StartProblem
@@ -98,7 +99,7 @@ def advise(
             for new, old in zip(better.cables, robot.cables, strict=True)
         ],
     }
-    write_json((results or robot_path.parent / "results") / "homing-advice.json", document)
+    write_json(results_folder(robot_path.parent, results) / "homing-advice.json", document)
     return document
 
 

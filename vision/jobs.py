@@ -9,6 +9,8 @@ from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExe
 from dataclasses import dataclass
 from typing import Any
 
+from freeswing.cdpr.system.lifeline import tie_to
+
 Progress = Callable[[str, float], None]
 
 _POLL_S = 0.5
@@ -43,7 +45,8 @@ def run_jobs(
     if count <= 1:
         return _one_by_one(jobs, progress)
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(count, mp_context=context) as pool:
+    tied = {"initializer": tie_to, "initargs": (os.getpid(),)}
+    with ProcessPoolExecutor(count, mp_context=context, **tied) as pool:
         try:
             return _all_of(pool, jobs, progress)
         except BaseException:

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import math
-import os
 import re
-import secrets
 import tomllib
 from collections.abc import Iterable, Mapping
-from pathlib import Path, PureWindowsPath
+from pathlib import Path
 
 import numpy as np
 
 from freeswing.cdpr.files.problems import DataError, InputError, Problems
 from freeswing.cdpr.files.table_reader import Reader
 from freeswing.cdpr.files.toml_text import toml_text
+from freeswing.cdpr.system.confine import inside
+from freeswing.cdpr.system.drafts import draft_of
 
 __all__ = [
     "DataError",
@@ -115,40 +114,11 @@ def replace_file(path: Path | str, data: bytes | Iterable[bytes]) -> None:
         InputError: when the file cannot be written.
     """
     path = Path(path)
-    draft = path.with_name(f".{secrets.token_hex(8)}.part")
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with draft.open("xb") as file:
+        with draft_of(path) as file:
             file.writelines([data] if isinstance(data, bytes) else data)
-            file.flush()
-            os.fsync(file.fileno())
-        draft.replace(path)
     except OSError as error:
         raise InputError(f"{path}: cannot be written ({error.strerror})") from error
-    finally:
-        with contextlib.suppress(OSError):
-            draft.unlink(missing_ok=True)
-
-
-def inside(folder: Path | str, relative: str, key: str = "path") -> Path:
-    """The path `relative` in `folder`, which may not lead out of it (links followed).
-
-    Raises:
-        InputError: for an absolute path, one that leaves the folder, or no path at all.
-    """
-    folder = Path(folder)
-    if not relative.strip() or "\0" in relative or len(relative) > 1000:
-        raise InputError(f"{key}: {relative[:60]!r} is not a path")
-    if Path(relative).is_absolute() or PureWindowsPath(relative).anchor:
-        raise InputError(f"{key}: {relative!r} must be relative to {folder}")
-    path = folder / relative
-    try:
-        is_inside = path.resolve().is_relative_to(folder.resolve())
-    except (OSError, RuntimeError) as error:
-        raise InputError(f"{key}: {relative!r} cannot be followed ({error})") from error
-    if not is_inside:
-        raise InputError(f"{key}: {relative!r} leads out of {folder}; move the file into it")
-    return path
 
 
 def _parse(path: Path, text: str, repeated: Problems) -> dict[str, object]:

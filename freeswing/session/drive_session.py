@@ -12,6 +12,7 @@ from freeswing.cdpr.driven.model import DrivenModel, build_driven
 from freeswing.cdpr.files.documents import InputError, Problems, Reader, inside, load_toml
 from freeswing.cdpr.files.drive_csv import read_drive_run, read_static
 from freeswing.cdpr.files.robot_file import read_robot
+from freeswing.cdpr.system.confine import results_folder
 from freeswing.ident.drive.identify import DriveSession
 from freeswing.ident.drive.kinematics import StaticPoses
 from freeswing.ident.drive.run_problem import DriveRun, Noise
@@ -114,8 +115,8 @@ def read_drive_session(path: Path | str, results: Path | str | None = None) -> D
         noise,
         zero,
     )
-    folder = folder / "results" if results is None else Path(results)
-    return DriveFile(path, name, folder, tuple(inputs), session)
+    written = results_folder(folder, results)
+    return DriveFile(path, name, written, tuple(inputs), session)
 
 
 def _noise(reader: Reader) -> Noise:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from freeswing.cdpr.files.documents import InputError, Problems, Reader, inside, load_toml
 from freeswing.cdpr.robot import frozen_array
+from freeswing.cdpr.system.confine import results_folder
 from freeswing.ident.bench.channels import Channel
 from freeswing.ident.bench.runs import KnownBody, Load, Placed
 from freeswing.session.base_tag import BaseTag, read_base_tag
@@ -35,7 +36,6 @@ BOARD_KEYS = {
 }
 OPTIONAL_BOARD_KEYS = {"charuco": ("legacy",), "chessboard": (), "aprilgrid": ("family",)}
 MOST_RUNS = 10_000
-WRITTEN_FOLDERS = ("tracks", "tracks/.sightings", "print")  # in the results
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,7 +160,7 @@ def read_session(path: Path | str, results: Path | str | None = None) -> Session
     name = reader.string("name")
     robot = paths.required(reader, "robot")
     target = paths.optional(reader, "target")
-    cameras = paths.optional(reader, "cameras") or path.parent / "cameras.toml"
+    cameras = paths.optional(reader, "cameras") or inside(path.parent, "cameras.toml", "cameras")
     rate = reader.optional_number("frame_rate_hz", above=0.0, maximum=1e6)
     section = reader.child("calibration", required=False)
     calibration = None if section is None else _read_calibration(section, paths)
@@ -174,8 +174,7 @@ def read_session(path: Path | str, results: Path | str | None = None) -> Session
     check_loads(reader, loads, [(run.name, run.loads) for run in runs])
     reader.finish()
     problems.raise_if_any(path)
-    folder = path.parent / "results" if results is None else Path(results)
-    _refuse_ways_out(path.parent if results is None else folder, folder)
+    folder = results_folder(path.parent, results)
     beside = folder / "cameras.toml"
     if results is not None and (beside.is_file() or not cameras.is_file()):
         cameras = beside
@@ -193,17 +192,6 @@ def read_session(path: Path | str, results: Path | str | None = None) -> Session
         loads,
         frame,
     )
-
-
-def _refuse_ways_out(home: Path, results: Path) -> None:
-    """Links that would lead what is written out of the session, or out of `--results`."""
-    places = (results, *(results / part for part in WRITTEN_FOLDERS))
-    for place in places:
-        if place.exists() and not place.resolve().is_relative_to(home.resolve()):
-            raise InputError(
-                f"{place}: a link that leads out of {home}, where nothing is written; "
-                "name another place with --results DIR"
-            )
 
 
 class _Paths:

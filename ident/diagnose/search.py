@@ -18,6 +18,7 @@ from multiprocessing import get_context
 
 from freeswing.cdpr.effects import effect_named
 from freeswing.cdpr.robot import Array, Robot
+from freeswing.cdpr.system.lifeline import tie_to
 from freeswing.ident.diagnose.decision import (
     LEAST_EXCESS_LATER,
     Candidate,
@@ -42,7 +43,6 @@ from freeswing.ident.diagnose.removal import is_no_worse, superfluous
 from freeswing.ident.diagnose.screen import BASE, Screen, screen
 from freeswing.ident.diagnose.spectrum import Residual, too_small
 from freeswing.ident.diagnose.variants import effect_of, inside, variants
-from freeswing.ident.lifeline import tie_to
 from freeswing.ident.likelihood.likelihood import LikelihoodFit
 
 Progress = Callable[[str, float], None]

@@ -13,12 +13,12 @@ from av.container import OutputContainer
 from numpy.typing import NDArray
 
 from freeswing.cdpr.files.documents import replace_file
+from freeswing.cdpr.system.drafts import draft_of
 
 Array = NDArray[np.float64]
 Image = NDArray[np.uint8]
 
-VIDEO_SUFFIXES = (".mkv", ".avi", ".mp4", ".mov")
-IMAGE_SUFFIXES = (".png", ".bmp", ".tif", ".tiff", ".pgm", ".jpg", ".jpeg")
+MUXERS = {".mkv": "matroska", ".avi": "avi", ".mp4": "mp4", ".mov": "mov"}
 _CLOCK = Fraction(1, 1_000_000)
 
 
@@ -31,13 +31,14 @@ def write_video(
     microseconds, counted from the first.
     """
     path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(f".{path.name}.partial{path.suffix}")
     pictures = iter(frames)
     first = next(pictures, None)
     if first is None:
         raise ValueError(f"{path}: a recording needs at least one frame, got none")
-    with av.open(str(partial), "w") as container:
+    with (
+        draft_of(path) as draft,
+        av.open(draft.name, "w", format=MUXERS[path.suffix.lower()]) as container,
+    ):
         stream = _add_stream(container, codec, first.shape, stamps_s)
         for frame, stamp in zip(chain([first], pictures), stamps_s, strict=True):
             picture = av.VideoFrame.from_ndarray(frame, format="gray")
@@ -45,7 +46,6 @@ def write_video(
             picture.time_base = _CLOCK
             container.mux(stream.encode(picture))
         container.mux(stream.encode())
-    partial.replace(path)
 
 
 def _add_stream(

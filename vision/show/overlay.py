@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from freeswing.calib.board.recordings import Image, read_frames
 from freeswing.cdpr.measured.trajectory import Trajectory
 from freeswing.cdpr.rotation import matrix_from_angles
+from freeswing.cdpr.system.drafts import draft_of
 from freeswing.vision.look.follow import STATUS_NAMES
 from freeswing.vision.look.pieces import Piece
 from freeswing.vision.look.single_pose import lagrange
@@ -35,16 +36,13 @@ _FRACTION_BITS = 4
 
 def write_overlay(path: Path, run: TrackedRun, seen: TrackedCamera) -> None:
     """Writes one camera's recording of a run with the drawings, H.264 in `path`."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(f".{path.name}.partial{path.suffix}")
     width, height = seen.camera.size_px
     zoom = max(1, round(WIDTH_PX / width))
-    with av.open(str(partial), "w") as container:
+    with draft_of(path) as draft, av.open(draft.name, "w", format="mp4") as container:
         stream = _stream(container, (width * zoom, height * zoom), _rate(seen))
         for picture in overlaid(run, seen, zoom):
             container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="bgr24")))
         container.mux(stream.encode())
-    partial.replace(path)
 
 
 def overlaid(run: TrackedRun, seen: TrackedCamera, zoom: int = 1) -> Iterator[Image]:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from freeswing.cdpr.files.documents import InputError
 from freeswing.cdpr.rotation import invert, quaternion_from_matrix
+from freeswing.cdpr.system.drafts import draft_of
 from freeswing.vision.tracked_runs import TrackedCamera, TrackedRun
 
 Array = NDArray[np.float64]
@@ -46,18 +47,16 @@ def write_view(path: Path, runs: Sequence[TrackedRun]) -> None:
         InputError: where rerun is not installed.
     """
     rr = require_viewer()
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(f".{path.name}.part")
-    stream = rr.RecordingStream("freeswing")
-    stream.save(str(partial))
-    for run in runs:
-        _log_still(rr, stream, run)
-        _log_platform(rr, stream, run)
-        for seen in run.cameras:
-            _log_camera(rr, stream, run, seen)
-    stream.flush()
-    stream.disconnect()
-    partial.replace(path)
+    with draft_of(path) as draft:
+        stream = rr.RecordingStream("freeswing")
+        stream.save(draft.name)
+        for run in runs:
+            _log_still(rr, stream, run)
+            _log_platform(rr, stream, run)
+            for seen in run.cameras:
+                _log_camera(rr, stream, run, seen)
+        stream.flush()
+        stream.disconnect()
 
 
 def _log_still(rr: Any, stream: Any, run: TrackedRun) -> None:

@@ -49,6 +49,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(options: Namespace, console: Console) -> None:
     """Design, examine, write controller.json and what goes with it."""
     from freeswing.cdpr.files.documents import DataError, InputError, write_json
+    from freeswing.cdpr.system.confine import results_folder
     from freeswing.servo.design.family import METHODS as FAMILY
     from freeswing.servo.design.hinf import AssumptionError
     from freeswing.servo.design.offer import Order, offer
@@ -59,7 +60,7 @@ def run(options: Namespace, console: Console) -> None:
     goals = Goals(USUAL, None) if options.weights is None else read_weights(options.weights)
     if options.order is not None and options.order < 1:
         raise InputError(f"--order {options.order}: at least 1 state")
-    folder = path.parent / "results" if options.results is None else Path(options.results)
+    folder = results_folder(path.parent, options.results)
     wanted = FAMILY if options.method == "all" else (options.method,)
     order = Order(goals, tuple(options.at), options.order)
     documents, first = {}, None

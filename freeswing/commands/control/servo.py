@@ -53,6 +53,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(options: Namespace, console: Console) -> None:
     """Check the task, run every trial, write the table, the samples and the figures."""
     from freeswing.cdpr.files.documents import InputError, write_json
+    from freeswing.cdpr.system.confine import results_folder
     from freeswing.servo.driven_file import read_driven
     from freeswing.servo.files.controller_file import read_controller
     from freeswing.servo.files.task_file import read_task
@@ -60,8 +61,7 @@ def run(options: Namespace, console: Console) -> None:
     from freeswing.servo.loop.trials import carry_out
 
     path, model = read_driven(options.robot)
-    usual = path.parent / "results"
-    folder = usual if options.results is None else Path(options.results)
+    folder = results_folder(path.parent, options.results)
     task = read_task(options.task)
     if (why := leaves_workspace(model, task)) is not None:
         raise InputError(f"{options.task}: {why}")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from freeswing.commands.arguments import add_results
@@ -47,6 +46,7 @@ def run(options: Namespace, console: Console) -> None:
     import numpy as np
 
     from freeswing.cdpr.files.documents import InputError
+    from freeswing.cdpr.system.confine import results_folder
     from freeswing.servo.driven_file import read_driven
     from freeswing.servo.files.wrench_file import read_wrenches, write_shares
     from freeswing.servo.tensions.methods import distribute_all
@@ -77,7 +77,7 @@ def run(options: Namespace, console: Console) -> None:
     columns["stopped_by"] = [
         "" if stop is None else f"{names[stop[0]]} {stop[1]}" for stop in shares.stops
     ]
-    folder = path.parent / "results" if options.results is None else Path(options.results)
+    folder = results_folder(path.parent, options.results)
     result = folder / "tensions.csv"
     write_shares(result, names, columns)
     _say(console, shares, columns["stopped_by"])

@@ -48,6 +48,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(options: Namespace, console: Console) -> None:
     """Plan, and say what the plan is worth."""
+    from freeswing.cdpr.system.confine import results_folder
     from freeswing.excite.excite import ExcitationOptions, SwingLimits, excite
     from freeswing.results.planning import Excitation
 
@@ -66,7 +67,7 @@ def run(options: Namespace, console: Console) -> None:
         mass_kg=options.mass_kg,
         seed=options.seed,
     )
-    folder = path.parent / "results" if options.results is None else Path(options.results)
+    folder = results_folder(path.parent, options.results)
     document = Excitation.from_json(excite(path, asked, console.progress, folder))
     console.say(f"conditioning cost C {document.cost_C:.2f} (below 10 is good)")
     random = document.random_plans

@@ -48,11 +48,12 @@ def run(options: Namespace, console: Console) -> None:
 
 
 def _home(path: Path, options: Namespace, console: Console) -> None:
+    from freeswing.cdpr.system.confine import results_folder
     from freeswing.homing.home import home
     from freeswing.results.planning import Homing
 
     beside = path if path.is_dir() else path.parent
-    folder = beside / "results" if options.results is None else Path(options.results)
+    folder = results_folder(beside, options.results)
     document = Homing.from_json(home(path, console.progress, folder))
     pose, std = document.start_pose, document.start_pose_std
     for key, unit, scale in (("position_m", "mm", 1e3), ("angles_rad", "mrad", 1e3)):
@@ -72,10 +73,11 @@ def _home(path: Path, options: Namespace, console: Console) -> None:
 
 
 def _advise(path: Path, options: Namespace, console: Console) -> None:
+    from freeswing.cdpr.system.confine import results_folder
     from freeswing.homing.swivel_advice import advise
     from freeswing.results.planning import HomingAdvice
 
-    folder = path.parent / "results" if options.results is None else Path(options.results)
+    folder = results_folder(path.parent, options.results)
     document = HomingAdvice.from_json(advise(path, console.progress, folder))
     for name, quality in (("declared", document.declared), ("advised", document.advised)):
         console.say(

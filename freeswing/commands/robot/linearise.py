@@ -34,6 +34,7 @@ def run(options: Namespace, console: Console) -> None:
     from freeswing.cdpr.driven.model import build_driven
     from freeswing.cdpr.files.documents import InputError, replace_file, write_json
     from freeswing.cdpr.files.robot_file import read_robot
+    from freeswing.cdpr.system.confine import results_folder
     from freeswing.printing.curves import log_log_svg
     from freeswing.results.linear import linear_document, linear_panels
 
@@ -49,7 +50,7 @@ def run(options: Namespace, console: Console) -> None:
         )
     linear = linear_model(build_driven(robot), at)
     found, rates = modes(linear), np.geomspace(*RATES, N_RATES)
-    folder = path.parent / "results" if options.results is None else Path(options.results)
+    folder = results_folder(path.parent, options.results)
     response = linear.response(rates)
     write_json(folder / "linear.json", linear_document(robot.name, linear, found, rates, response))
     replace_file(folder / "linear.svg", log_log_svg(linear_panels(rates, response)))

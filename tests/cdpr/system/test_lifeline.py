@@ -10,7 +10,7 @@ WITH_A_WORKER = """
 import os, time
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
-from freeswing.ident.lifeline import tie_to
+from freeswing.cdpr.system.lifeline import tie_to
 pool = ProcessPoolExecutor(1, get_context("fork"), initializer=tie_to, initargs=(os.getpid(),))
 print(pool.submit(os.getpid).result(), flush=True)
 time.sleep(60)
