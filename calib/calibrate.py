@@ -41,6 +41,7 @@ from freeswing.cdpr.robot import STANDARD_GRAVITY_M_S2
 Progress = Callable[[str, float], None]
 
 DEFAULT_MODEL = "OPENCV"
+KEPT_BOARDS = ".boards"  # below the results
 _STILLS = 9
 
 
@@ -90,7 +91,7 @@ def calibrate_session(
             is the base and the result warns of it.
         frame_rate_hz: nominal rate, where no stamps were recorded.
         cameras_path: cameras.toml to write, None for none.
-        results_folder: takes calibration.json, None for none.
+        results_folder: takes calibration.json and the boards found so far, None for none.
         model: lens model of every camera.
         survey_std_m: standard deviation of a surveyed coordinate; measured from the fit when None.
         plumb_line: points clicked along hanging strings, see `calib.verdict.plumb_line_file`, or
@@ -115,6 +116,7 @@ def calibrate_session(
         frame_rate_hz,
         _STILLS if base_tags else 0,
         lambda label, share: told(label, 0.7 * share),
+        None if results_folder is None else Path(results_folder) / KEPT_BOARDS,
     )
     told("adjusting", 0.7)
     board, said = settled_board(board, np.concatenate([s.pixels for s in sightings]))

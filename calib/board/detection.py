@@ -73,6 +73,24 @@ class BoardDetector:
         """Width of the tags' black border in cells, as last found."""
         return self._tags[0][0] if self._tags else 1
 
+    @property
+    def state(self) -> NDArray[np.int64]:
+        """What it has learnt of the board: in the negative (-1 unknown), then borders in use."""
+        negative = -1 if self.is_negative is None else int(self.is_negative)
+        return np.array([negative, *(border for border, _ in self._tags)], dtype=np.int64)
+
+    def knows(self, state: NDArray[np.int64]) -> bool:
+        """Whether that is a state of a detector of this board, with no more borders than now."""
+        borders = [border for border, _ in self._tags]
+        own = state[1:].tolist() if state.ndim == 1 and len(state) else [0]
+        known = set(own) <= set(borders) and len(own) == len(set(own))
+        return known and bool(own) == bool(borders) and int(state[0]) in (-1, 0, 1)
+
+    def restore(self, state: NDArray[np.int64]) -> None:
+        """Take up a state that it `knows`."""
+        self.is_negative = None if state[0] < 0 else bool(state[0])
+        self._tags = [entry for entry in self._tags if entry[0] in state[1:]]
+
     def nothing(self) -> BoardCorners:
         """No corner at all."""
         size = 1 if self.board.kind == "chessboard" else 4

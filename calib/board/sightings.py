@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from freeswing.calib.board.board_check import is_mirrored
 from freeswing.calib.board.board_motion import Timeline, linked, timeline
 from freeswing.calib.board.boards import Board
 from freeswing.calib.board.detection import BoardDetector
+from freeswing.calib.board.kept_boards import KeptBoards
 from freeswing.calib.board.recordings import Recording, read_frames
 from freeswing.calib.camera.lens_models import Array
 from freeswing.calib.footage.frame_times import frame_times
@@ -64,17 +66,19 @@ def see_boards(
     frame_rate_hz: float | None,
     n_still: int = 0,
     progress: Progress | None = None,
+    kept: Path | None = None,
 ) -> tuple[Sightings, ...]:
     """Detect the board in every recording, cameras side by side.
 
     Recordings of more than `MOST_FRAMES` frames are searched in bursts of `BURST` frames spread
-    evenly, so that image velocities stay available.
+    evenly, so that image velocities stay available. What was found stays in the folder `kept` and
+    is not looked for again.
     """
     recordings = tuple(recordings)
     done = [0]
 
     def run(recording: Recording) -> Sightings:
-        result = _see_board(recording, board, frame_rate_hz, n_still)
+        result = _see_board(recording, board, frame_rate_hz, n_still, kept)
         done[0] += 1
         if progress is not None:
             progress(f"board in {recording.name}", done[0] / len(recordings))
@@ -85,12 +89,17 @@ def see_boards(
 
 
 def _see_board(
-    recording: Recording, board: Board, frame_rate_hz: float | None, n_still: int
+    recording: Recording,
+    board: Board,
+    frame_rate_hz: float | None,
+    n_still: int,
+    kept: Path | None,
 ) -> Sightings:
     count = len(recording.images) or _count_frames(recording)
     wanted = _wanted(count)
     still_at = set(np.linspace(0, count - 1, n_still).round().astype(int)) if n_still else set()
     detector = BoardDetector(board)
+    boards = KeptBoards(detector, kept, recording, len(wanted))
     without: list[np.ndarray] = []  # some images without a board
     numbers, labels, found, stills, size = [], [], [], [], (0, 0)
     for position, (number, label, image) in enumerate(read_frames(recording)):
@@ -99,7 +108,7 @@ def _see_board(
             stills.append(image)
         if position not in wanted:
             continue
-        corners = detector.detect(image)
+        corners = boards.look(image)
         if corners is not None:
             numbers.append(number)
             labels.append(label)

@@ -8,19 +8,17 @@ taken for it; it appears whole or not at all.
 from __future__ import annotations
 
 import hashlib
-import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-from zipfile import ZIP_STORED, BadZipFile, ZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.calib.board.recordings import Recording
 from freeswing.calib.camera.camera import Camera
-from freeswing.cdpr.files.documents import replace_file
+from freeswing.cdpr.system.arrays import save_arrays, whole_arrays
 from freeswing.vision.look.follow import Follower, FrameView
 from freeswing.vision.look.watched_target import Watch
 
@@ -112,12 +110,9 @@ def piece_path(folder: Path, camera: str, inputs: str, index: int) -> Path:
 
 def save_piece(path: Path, piece: Piece, follower: Follower) -> None:
     """Writes a piece and the tracker's state after it."""
-    buffer = io.BytesIO()
-    names = Piece.__slots__
     past = follower.past
-    np.savez(
-        buffer,
-        **{name: getattr(piece, name) for name in names},
+    members = {name: getattr(piece, name) for name in Piece.__slots__}
+    members |= dict(
         past_times=np.array([t for t, _ in past]),
         past_rotations=np.array([r for _, (r, _) in past]).reshape(-1, 3, 3),
         past_positions=np.array([p for _, (_, p) in past]).reshape(-1, 3),
@@ -127,22 +122,15 @@ def save_piece(path: Path, piece: Piece, follower: Follower) -> None:
         before=np.array(list(follower.before.values())).reshape(-1, 4),
         counters=np.array([follower.misses, follower.count], dtype=np.int64),
     )
-    replace_file(path, buffer.getvalue())
+    save_arrays(path, members)
 
 
 def is_whole(path: Path) -> bool:
     """Whether a piece is there and what `save_piece` writes; one that is not is made again."""
+    data = whole_arrays(path, MOST_PIECE_BYTES)
     try:
-        with ZipFile(path) as archive:
-            infos = archive.infolist()
-            plain = all(info.compress_type == ZIP_STORED for info in infos)
-            if not plain or sum(info.file_size for info in infos) > MOST_PIECE_BYTES:
-                return False
-            if archive.testzip() is not None:
-                return False
-        with np.load(path, allow_pickle=False) as data:
-            return _is_consistent(data)
-    except (BadZipFile, OSError, KeyError, ValueError, EOFError, NotImplementedError):
+        return data is not None and _is_consistent(data)
+    except (KeyError, TypeError):  # a member is missing, or no array of numbers in a row
         return False
 
 
