@@ -11,7 +11,13 @@ from numpy.typing import NDArray
 from freeswing.cdpr.tolerances import Tolerances
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
     from freeswing.cdpr.driven.drive import Drive
+    from freeswing.cdpr.measured.trajectory import Trajectory
+    from freeswing.cdpr.model.statics import Equilibrium, Modes
+    from freeswing.cdpr.simulation.by_lengths import Effects
 
 POSE_COORDINATES = ("x", "y", "z", "phi", "theta", "chi")
 INERTIA_NAMES = (
@@ -153,6 +159,38 @@ class Robot:
     def __post_init__(self) -> None:
         gravity = frozen_array(self.gravity_m_s2, (3,), "gravity_m_s2")
         object.__setattr__(self, "gravity_m_s2", gravity)
+
+    @classmethod
+    def from_toml(cls, path: Path | str) -> Robot:
+        """The robot of a robot.toml.
+
+        Raises:
+            InputError: naming every problem of the file.
+        """
+        from freeswing.cdpr.files.robot_file import read_robot
+
+        return read_robot(path)
+
+    def equilibrium(
+        self, lengths_m: Sequence[float], effects: Effects | None = None
+    ) -> tuple[Equilibrium, Modes]:
+        """Where it hangs with cables of these lengths, and how it swings there.
+
+        See `cdpr.simulation.by_lengths.hanging`, also for what it raises.
+        """
+        from freeswing.cdpr.simulation.by_lengths import hanging
+
+        return hanging(self, lengths_m, effects)
+
+    def simulate(self, lengths_m: Sequence[float], **how: Any) -> Trajectory:
+        """A swing at these lengths; `how` and what it raises: `cdpr.simulation.by_lengths.swing`.
+
+        For instance `amplitude_m=0.05, duration_s=20.0,
+        effects={"translational_drag": {"rate_1_s": 0.05}}`.
+        """
+        from freeswing.cdpr.simulation.by_lengths import swing
+
+        return swing(self, lengths_m, **how)
 
     @property
     def n_cables(self) -> int:

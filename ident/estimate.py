@@ -62,6 +62,14 @@ class Estimate:
         return np.sqrt(np.diag(self.covariance))
 
     @property
+    def correlation(self) -> Array | None:
+        """Correlations of the nine values, (9, 9); None where a deviation is zero or unknown."""
+        std = self.std
+        if not (np.isfinite(std) & (std > 0.0)).all():
+            return None
+        return self.covariance / np.outer(std, std)
+
+    @property
     def consistency(self) -> Consistency:
         """Whether a body can have this inertia."""
         return consistency(self.values, self.covariance, self.held_cost)
@@ -84,6 +92,7 @@ class Estimate:
             "dropped_runs": [{"run": run.run, "why": run.why} for run in self.dropped],
             "notes": list(self.notes),
             "consistency": self.consistency.document(),
+            **({} if self.correlation is None else {"correlation": self.correlation.tolist()}),
             **({"reduced": self.reduced} if self.reduced is not None else {}),
             **self.extra,
         }

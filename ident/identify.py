@@ -14,6 +14,7 @@ from freeswing.ident.estimate import Estimate
 from freeswing.ident.fidim.fidim_stage import Weighting, fidim_estimates
 from freeswing.ident.judge.comparison import ParameterComparison, compare
 from freeswing.ident.judge.free_swing_law import LawlessError, fidim_complaint
+from freeswing.ident.judge.prediction import Prediction, fitted_motions
 from freeswing.ident.judge.validate import ValidatedRun, validate_run
 from freeswing.ident.likelihood.cable_ends import GeometryPriors, corrected
 from freeswing.ident.likelihood.calibration_modes import freed
@@ -71,6 +72,8 @@ class Identification:
         amplification: how many times more the pose moves than they do, at worst.
         notes: sentences about the session as a whole.
         prepared: the runs as they were used, for further analysis.
+        fitted: runs that the best estimate was fitted to, beside the motions found for them;
+            maximum likelihood alone.
     """
 
     estimates: dict[str, Estimate]
@@ -81,6 +84,7 @@ class Identification:
     amplification: float
     notes: tuple[str, ...]
     prepared: PreparedRuns
+    fitted: tuple[Prediction, ...] = ()
 
     def document(self) -> dict[str, Any]:
         """results/identification.json."""
@@ -167,6 +171,7 @@ def identify(
         amplification=prepared.amplification,
         notes=tuple(session_notes(model, prepared, failures)),
         prepared=prepared,
+        fitted=fitted[best].motions if best in fitted else (),
     )
 
 
@@ -177,10 +182,12 @@ class Fitted:
     Attributes:
         estimate: as it is reported.
         robot: with its cable ends where the fit found them.
+        motions: its runs beside what it found for them.
     """
 
     estimate: Estimate
     robot: Robot
+    motions: tuple[Prediction, ...]
 
 
 def _likelihood_estimates(
@@ -217,7 +224,7 @@ def _likelihood_estimates(
             lawless = isinstance(error, LawlessError)
             continue
         starts = [entry.values, *starts]
-        found[name] = Fitted(entry, corrected(robot, fit.model, fit.values))
+        found[name] = Fitted(entry, corrected(robot, fit.model, fit.values), fitted_motions(fit))
     return found, failures, lawless
 
 

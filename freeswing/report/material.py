@@ -14,7 +14,7 @@ from freeswing.results.codec import Document
 from freeswing.results.diagnosis import Diagnosis
 from freeswing.results.files import read_document
 from freeswing.results.identification import Estimate, Identification
-from freeswing.results.motion import Motion
+from freeswing.results.motion import Motion, RunMotion
 from freeswing.results.tracking import Tracking
 
 # Where each result stands, the first that is there taken.
@@ -24,6 +24,7 @@ FILES: dict[str, tuple[type[Document], tuple[str, ...]]] = {
     "identification": (Identification, ("identification.json",)),
     "diagnosis": (Diagnosis, ("diagnosis.json",)),
     "motion": (Motion, ("diagnosis_motion.json", "motion.json")),
+    "fitted": (Motion, ("motion.json",)),
     "check": (Check, ("check.json",)),
 }
 RESULTS = ("calibration", "tracking", "identification", "diagnosis", "motion")
@@ -41,6 +42,7 @@ class Material:
         diagnosis: `results/diagnosis.json`.
         motion: measured and predicted samples of the validation runs, by diagnosis
             (`results/diagnosis_motion.json`) or else by identification (`results/motion.json`).
+        fitted: `results/motion.json`, for the runs that were fitted.
         check: `results/check.json`.
         robot: as declared, for the drawing.
         folder: the session as a command line names it.
@@ -55,6 +57,7 @@ class Material:
     identification: Identification | None = None
     diagnosis: Diagnosis | None = None
     motion: Motion | None = None
+    fitted: Motion | None = None
     check: Check | None = None
     robot: Robot | None = None
     folder: str = "SESSION"
@@ -66,6 +69,11 @@ class Material:
     def estimates(self) -> dict[str, Estimate]:
         """The estimates that are there, best first."""
         return {} if self.identification is None else self.identification.ranked
+
+    @property
+    def fitted_runs(self) -> tuple[RunMotion, ...]:
+        """What the best estimate was fitted to, beside the motions found for it."""
+        return () if self.fitted is None else self.fitted.fitted
 
     @property
     def documents(self) -> dict[str, Document]:

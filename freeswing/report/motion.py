@@ -19,7 +19,7 @@ from freeswing.report.figures import (
     thin,
 )
 from freeswing.report.words import plain
-from freeswing.results.motion import RunMotion
+from freeswing.results.motion import Motion, RunMotion
 
 _UNITS = {"x": ("mm", 1e3), "y": ("mm", 1e3), "z": ("mm", 1e3)}
 _ANGLE = ("mrad", 1e3)
@@ -41,7 +41,7 @@ def motion_figures(run: RunMotion) -> list[Markup]:
         label = f"{plain(name)} ({unit})"
         draws = [
             _motion(times, seen, series, label),
-            _residual(times, seen, series, f"residual of {label}"),
+            _residual(times, seen, series, f"residual, {label}"),
             _spectrum(times, seen, series, f"its amplitude ({unit})"),
         ]
         told = " and ".join(
@@ -51,6 +51,57 @@ def motion_figures(run: RunMotion) -> list[Markup]:
         caption = f"Run {run.run}, {plain(name)}: measured (dark) and predicted {told}."
         found.append(figures(draws, HEIGHT_IN, caption))
     return found
+
+
+def residual_figures(run: RunMotion) -> Markup:
+    """What a fitted run leaves, each coordinate small, with its spectrum beside it."""
+    draws = []
+    times, measured = np.array(run.times_s, dtype=np.float64), _samples(run.measured)
+    found = _samples(run.before or ())
+    for column, name in enumerate(run.coordinates):
+        unit, scale = _UNITS.get(name, _ANGLE)
+        series = {"after": scale * found[:, column]}
+        seen = scale * measured[:, column]
+        draws.append(_residual(times, seen, series, f"residual, {plain(name)} ({unit})"))
+        draws.append(_spectrum(times, seen, series, f"its amplitude ({unit})"))
+    caption = f"Run {run.run}: measured less fitted, and its spectrum, coordinate by coordinate."
+    return figures(draws, HEIGHT_IN, caption)
+
+
+def residual_rms(run: RunMotion) -> tuple[float | None, float | None]:
+    """Root mean square of what a run's motion leaves: of positions in m, of angles in rad."""
+    left = _samples(run.measured) - _samples(run.before or run.measured)
+    lengths = [k for k, name in enumerate(run.coordinates) if name in _UNITS]
+    angles = [k for k in range(len(run.coordinates)) if k not in lengths]
+    metres, radians = (
+        float(np.sqrt(np.nanmean(left[:, columns] ** 2))) if columns else None
+        for columns in (lengths, angles)
+    )
+    return metres, radians
+
+
+def residual_sheet(motion: Motion, spectra: bool) -> Figure:
+    """Residuals of all runs, or their spectra, a row a run, for notebooks."""
+    runs = [*motion.fitted, *motion.runs]
+    across = max(len(run.coordinates) for run in runs)
+    sheet = Figure(figsize=(2.6 * across, 1.6 * len(runs)), layout="constrained")
+    cells = sheet.subplots(len(runs), across, squeeze=False)
+    for row, run in zip(cells, runs, strict=True):
+        times, measured = np.array(run.times_s, dtype=np.float64), _samples(run.measured)
+        rows = {"before": run.before, "after": run.after}
+        series = {key: _samples(one) for key, one in rows.items() if one}
+        for column, (axes, name) in enumerate(zip(row, run.coordinates, strict=False)):
+            unit, scale = _UNITS.get(name, _ANGLE)
+            for key, predicted in series.items():
+                left = scale * (measured[:, column] - predicted[:, column])
+                colour, dash = _LINES[key]
+                if spectra:
+                    axes.loglog(*amplitude_spectrum(times, left), color=colour, ls=dash, lw=0.8)
+                else:
+                    axes.plot(times, left, color=colour, ls=dash, lw=0.8)
+            axes.set_title(f"{run.run}: {plain(name)} ({unit})", fontsize=8, loc="left")
+            axes.set_xlabel("frequency (Hz)" if spectra else "time (s)", fontsize=8)
+    return sheet
 
 
 def _motion(
@@ -63,7 +114,7 @@ def _motion(
             colour, dash = _LINES[key]
             axes.plot(thin(times), thin(predicted), color=colour, ls=dash, lw=0.9)
         axes.set_xlabel("time (s)")
-        axes.set_ylabel(label)
+        axes.set_ylabel(label, fontsize=8)
 
     return draw
 
@@ -77,7 +128,7 @@ def _residual(
             colour, dash = _LINES[key]
             axes.plot(thin(times), thin(measured - predicted), color=colour, ls=dash, lw=0.9)
         axes.set_xlabel("time (s)")
-        axes.set_ylabel(label)
+        axes.set_ylabel(label, fontsize=8)
 
     return draw
 
@@ -93,7 +144,7 @@ def _spectrum(
             axes.loglog(frequencies, amplitudes, color=colour, ls=dash, lw=0.9)
         plain_log_axes(axes)
         axes.set_xlabel("frequency (Hz)")
-        axes.set_ylabel(label)
+        axes.set_ylabel(label, fontsize=8)
 
     return draw
 

@@ -24,7 +24,8 @@ from freeswing.report.panels.sure import HowSure
 from freeswing.report.panels.swings import Swings
 from freeswing.report.tables import csv_tables
 
-# The results that a section is made of, to say why it lacks something.
+# The results that a section is made of, to say why it lacks something. Others (a bench's, markers')
+# are left out, with their link, where a session has nothing for them.
 MADE_OF = {
     "answer": ("identification",),
     "sure": ("identification",),
@@ -77,6 +78,7 @@ def render_page(material: Material) -> str:
         lstrip_blocks=True,
     )
     sections = [_section(environment, panel, material) for panel in PANELS]
+    sections = [one for one in sections if one["body"] is not None or one["name"] in MADE_OF]
     style = (files("freeswing.report") / "templates" / "page.css").read_text(encoding="utf-8")
     page = environment.get_template("page.html")
     return page.render(

@@ -51,6 +51,7 @@ class Estimate(Entry):
         dropped_runs: runs left out.
         notes: sentences that belong beside the numbers.
         consistency: whether a body can have it.
+        correlation: of the nine parameters, in their order, (9, 9).
         reduced: FIDIM's essential parameters alone.
         noise_m: white noise of positions (maximum likelihood).
         noise_rad: white noise of angles (maximum likelihood).
@@ -68,6 +69,7 @@ class Estimate(Entry):
     dropped_runs: tuple[DroppedRun, ...] = ()
     notes: tuple[str, ...] = ()
     consistency: Consistency | None = absent(default=None)
+    correlation: tuple[Numbers, ...] = absent(default=())
     reduced: Reduced | None = absent(default=None)
     noise_m: float | None = absent(default=None)
     noise_rad: float | None = absent(default=None)

@@ -1,4 +1,4 @@
-"""results/motion.json and diagnosis_motion.json: measured beside predicted, held-out runs."""
+"""results/motion.json and diagnosis_motion.json: measured beside predicted motions."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ class RunMotion(Entry):
 
     Attributes:
         run: its name.
-        role: validate.
+        role: validate, or identify of those that were fitted.
         times_s: moments.
         coordinates: what was measured.
         measured: samples.
@@ -32,8 +32,14 @@ class RunMotion(Entry):
 
 @entry
 class Motion(Document):
-    """The first held-out runs."""
+    """The first held-out runs, and in motion.json the first that were fitted.
+
+    Attributes:
+        runs: held out.
+        fitted: what the best estimate was fitted to; `before` is the motion found for them.
+    """
 
     kind: ClassVar[str] = "motion"
 
     runs: tuple[RunMotion, ...] = ()
+    fitted: tuple[RunMotion, ...] = absent(default=())

@@ -14,9 +14,13 @@ MOST_RUNS = 8
 
 
 def predicted_motions(found: Identification) -> Motion:
-    """`motion.json`: the first held-out runs."""
+    """`motion.json`: the first held-out runs, and the first that were fitted."""
     entries = [_entry(run.prediction) for run in found.validation if run.prediction is not None]
-    return Motion(runs=tuple(RunMotion.from_json(one) for one in entries[:MOST_RUNS]))
+    fitted = [{**_entry(one), "role": "identify"} for one in found.fitted]
+    runs, own = (
+        tuple(RunMotion.from_json(one) for one in some[:MOST_RUNS]) for some in (entries, fitted)
+    )
+    return Motion(runs=runs, fitted=own)
 
 
 def ladder_motions(ladder: Sequence[Rung]) -> Motion:

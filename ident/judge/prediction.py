@@ -91,6 +91,17 @@ def predict(
     )
 
 
+def fitted_motions(found: LikelihoodFit) -> tuple[Prediction, ...]:
+    """The runs of a fit beside the motions that it found for them, thinned to `PREDICTED_HZ`."""
+    told = []
+    for motion, samples in zip(found.motions, found.samples, strict=True):
+        thinned = _thinned(samples)
+        seen = predicted(motion, thinned.times_s)[:, samples.columns]
+        parts = thinned.times_s, samples.coordinates, thinned.values, seen, motion.values
+        told.append(Prediction(samples.name, *parts))
+    return tuple(told)
+
+
 def _followed(model: Model, samples: Samples, state: State) -> LikelihoodFit:
     """The fit of the start over the whole run at once, or grown into it where that is astray.
 

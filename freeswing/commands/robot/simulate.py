@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,9 +12,9 @@ from freeswing.commands.robot.simulate_drive import add_drive_arguments, run_dri
 from freeswing.console import Console
 
 if TYPE_CHECKING:
-    from numpy import ndarray
+    from numpy.random import Generator
 
-    from freeswing.cdpr.model.equations import Model
+    from freeswing.cdpr.measured.trajectory import Trajectory
     from freeswing.cdpr.robot import Robot
 
 
@@ -50,7 +51,6 @@ def run(options: Namespace, console: Console) -> None:
 
     from freeswing.cdpr.files.documents import InputError
     from freeswing.cdpr.files.trajectory_files import write_csv, write_tum
-    from freeswing.cdpr.measured.trajectory import Trajectory
 
     if options.rate_hz is None:
         options.rate_hz = 1000.0 if options.drive else 100.0
@@ -66,46 +66,40 @@ def run(options: Namespace, console: Console) -> None:
     if not (0.0 < options.duration_s <= 3600.0 and 0.0 < options.rate_hz <= 1e5):
         raise InputError("--duration-s must lie in (0, 3600], --rate-hz in (0, 100000]")
     generator = np.random.default_rng(options.seed)
-    times = np.arange(round(options.duration_s * options.rate_hz) + 1) / options.rate_hz
-    poses = _poses(options, times, generator)
+    motion = _motion(options, generator)
     std = np.repeat([options.noise_m, options.noise_rad], 3)
-    poses = poses + generator.normal(0.0, 1.0, poses.shape) * std
-    writers[result.suffix.lower()](
-        result, Trajectory(times, ("x", "y", "z", "phi", "theta", "chi"), poses)
-    )
+    noise = generator.normal(0.0, 1.0, motion.values.shape) * std
+    writers[result.suffix.lower()](result, replace(motion, values=motion.values + noise))
     console.say(str(result))
     console.say_json({"format": "freeswing-simulation/1", "result": str(result)})
 
 
-def _poses(options: Namespace, times: ndarray, generator) -> ndarray:
-    import numpy as np
-
+def _motion(options: Namespace, generator: Generator) -> Trajectory:
     from freeswing.cdpr.files.documents import InputError
     from freeswing.cdpr.files.robot_file import read_robot
-    from freeswing.cdpr.model.equations import build_model
-    from freeswing.cdpr.model.free_motion import admissible_rates
-    from freeswing.cdpr.simulation.free_swing import simulate
-    from freeswing.cdpr.simulation.release import release, rest_at_lengths
+    from freeswing.cdpr.simulation.by_lengths import swing
 
     robot = read_robot(options.robot)
     if robot.inertia is None:
         raise InputError(f"{options.robot}: [platform] needs com_m and specific_inertia_m2")
-    lengths = np.array(options.lengths_m)
+    lengths = options.lengths_m
     if len(lengths) != robot.n_cables:
         raise InputError(f"--lengths-m: {len(lengths)} lengths, {robot.n_cables} cables")
-    if not 0.0 < options.amplitude_m <= 0.5 * lengths.min():
-        raise InputError(f"--amplitude-m must lie in (0, {0.5 * lengths.min():g}], half a cable")
-    model = _model(robot, options, build_model)
-    values = _values(model, options)
-    rest = rest_at_lengths(model, lengths, robot.inertia, values, generator)
-    zeta = release(model, rest, robot.inertia, values, options.amplitude_m, generator)
-    span = (0.0, float(times[-1]))
-    rates = admissible_rates(model, zeta, np.zeros(6), robot.inertia, values)
-    motion = simulate(model, zeta, rates, span, robot.inertia, values)
-    return motion.at(times)[0]
+    if not 0.0 < options.amplitude_m <= 0.5 * min(lengths):
+        raise InputError(f"--amplitude-m must lie in (0, {0.5 * min(lengths):g}], half a cable")
+    return swing(
+        robot,
+        lengths,
+        amplitude_m=options.amplitude_m,
+        duration_s=options.duration_s,
+        rate_hz=options.rate_hz,
+        effects=_effects(robot, options),
+        seed=generator,
+    )
 
 
-def _model(robot: Robot, options: Namespace, build_model) -> Model:
+def _effects(robot: Robot, options: Namespace) -> dict[str, dict[str, float]]:
+    """The effects that flags name, each with those of the settings that are its own."""
     from freeswing.cdpr.effects import catalogue
     from freeswing.cdpr.files.documents import InputError
 
@@ -113,20 +107,16 @@ def _model(robot: Robot, options: Namespace, build_model) -> Model:
     for name in options.effect:
         if name not in known:
             raise InputError(f"--effect {name}: not one of {', '.join(sorted(known))}")
-    return build_model(robot, tuple(options.effect))
-
-
-def _values(model: Model, options: Namespace) -> ndarray:
-    from freeswing.cdpr.files.documents import InputError
-
-    values = model.start_values.copy()
-    names = [parameter.name for parameter in model.parameters]
-    for name, value in options.set:
+    own = {name: [one.name for one in known[name].parameters(robot)] for name in options.effect}
+    names = [name for some in own.values() for name in some]
+    for name, _ in options.set:
         if name not in names:
-            known = ", ".join(names) or "none without --effect"
-            raise InputError(f"--set {name}: not one of {known}")
-        values[names.index(name)] = value
-    return values
+            there = ", ".join(names) or "none without --effect"
+            raise InputError(f"--set {name}: not one of {there}")
+    return {
+        effect: {name: value for name, value in options.set if name in some}
+        for effect, some in own.items()
+    }
 
 
 def _numbers(text: str) -> list[float]:

@@ -21,6 +21,9 @@ def add_arguments(parser: ArgumentParser) -> None:
         help="a session, its results folder, identification.json or diagnosis.json; "
         "RESULT:ml_free and the like name one estimate",
     )
+    parser.add_argument(
+        "--picture", metavar="FILE", help="draw all intervals side by side (.svg, .png, .pdf)"
+    )
 
 
 def run(options: Namespace, console: Console) -> None:
@@ -33,6 +36,11 @@ def run(options: Namespace, console: Console) -> None:
     found = compare([read_side(name) for name in options.results])
     for line in lines(found):
         console.say(line)
+    if options.picture:
+        from freeswing.report.comparison import write_picture
+
+        write_picture(Path(options.picture), found)
+        console.say(options.picture)
     console.say_json(found.to_json())
 
 

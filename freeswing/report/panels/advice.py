@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from freeswing import __version__
 from freeswing.report.material import Material
 from freeswing.report.words import HALF_WIDTH_95, plain, unit_of
 
@@ -23,8 +24,8 @@ class Advice:
 
 
 CITE = (
-    "To cite: freeswing, and for the method Idà, Briot, Carricato, Mechanism and Machine Theory "
-    "167 (2022) 104504; see CITATION.cff."
+    f"To cite: freeswing {__version__}, and for the method Idà, Briot, Carricato, Mechanism and "
+    "Machine Theory 167 (2022) 104504; see CITATION.cff."
 )
 
 

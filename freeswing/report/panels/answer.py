@@ -9,6 +9,7 @@ import numpy as np
 
 from freeswing.report.body import body_about_com, hanging, principal_rows, tensor_rows
 from freeswing.report.material import Material
+from freeswing.report.space import in_space
 from freeswing.report.words import ESTIMATES, parameter_row, plain
 from freeswing.results.common import Parameter
 from freeswing.results.diagnosis import Diagnosis
@@ -31,6 +32,7 @@ class Answer:
         if identification is not None and identification.entries_m:
             entries = np.array(identification.entries_m, dtype=np.float64)
         swings = () if identification is None else identification.swings
+        motions = [*material.fitted_runs, *(material.motion.runs if material.motion else ())]
         return {
             "source": source,
             "verdict": verdict(material.diagnosis),
@@ -39,6 +41,7 @@ class Answer:
             "tensor": [] if body is None else tensor_rows(body, mass_kg),
             "principal": [] if body is None else principal_rows(body, mass_kg),
             "drawing": "" if body is None else hanging(body, material.robot, swings, entries),
+            "space": in_space(material.robot, swings, motions),
         }
 
 
@@ -96,12 +99,13 @@ def verdict(diagnosis: Diagnosis | None) -> list[str]:
     if diagnosis is None:
         return ["Missing effects have not been looked for yet: run freeswing diagnose."]
     accepted = [plain(entry.effect) for entry in diagnosis.accepted]
-    confounded = [plain(one.effect) for one in diagnosis.candidates if one.verdict == "confounded"]
+    confounded = [one for one in diagnosis.candidates if one.verdict == "confounded"]
     sentences = []
     if accepted:
         sentences.append(f"The model lacked: {', '.join(accepted)}.")
-    if confounded:
-        sentences.append(f"These data cannot tell apart: {', '.join(confounded)}.")
+    for one in confounded:
+        rivals = ", ".join(plain(name) for name in one.confounded_with) or "others"
+        sentences.append(f"These data cannot tell {plain(one.effect)} from {rivals}.")
     unexplained = diagnosis.unexplained
     if unexplained is not None and unexplained.present:
         sentences.append(f"Something remains unexplained: {unexplained.signature}")

@@ -170,6 +170,7 @@ def _rig(
         axes.set_zlabel("z (m)")
         axes.locator_params(axis="z", nbins=4)
         axes.set_aspect("equal")
+        axes.set_box_aspect(None, zoom=0.85)
         if entries or places:
             axes.legend(fontsize=8)
 

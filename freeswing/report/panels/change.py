@@ -8,10 +8,11 @@ from matplotlib.figure import Figure
 
 from freeswing.report.figures import AFTER, BEFORE, FAINT, Draw, figures
 from freeswing.report.material import Material
-from freeswing.report.motion import motion_figures
+from freeswing.report.motion import motion_figures, residual_figures, residual_rms
 from freeswing.report.words import millimetres, number
 from freeswing.results.diagnosis import HeldOut, HeldOutRun
 from freeswing.results.identification import ValidatedRun
+from freeswing.results.motion import RunMotion
 
 MOST_RUNS = 2
 BELOW_FLOOR = (
@@ -45,6 +46,10 @@ class Change:
             "motions": [(one.run, motion_figures(one)) for one in motions[:MOST_RUNS]],
             "shown": min(len(motions), MOST_RUNS),
             "total": len(motions),
+            "fitted": [
+                (one.run, residual_figures(one)) for one in material.fitted_runs[:MOST_RUNS]
+            ],
+            "fitted_rows": [_fitted_row(one) for one in material.fitted_runs],
         }
 
 
@@ -88,6 +93,15 @@ def _row(before: HeldOutRun | ValidatedRun, after: HeldOutRun | None) -> dict[st
     if after is not None:
         row["σ⊥ after (m/s²)"] = number(after.sigma_perp)
     return row
+
+
+def _fitted_row(run: RunMotion) -> dict[str, str]:
+    metres, radians = residual_rms(run)
+    return {
+        "run": run.run,
+        "rms of positions": millimetres(metres),
+        "rms of angles (mrad)": number(None if radians is None else 1e3 * radians),
+    }
 
 
 def _error(run: HeldOutRun | ValidatedRun) -> str:

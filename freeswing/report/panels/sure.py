@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
 from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
 
+from freeswing.cdpr.robot import INERTIA_NAMES, Array
 from freeswing.report.figures import INK, MARKS, SERIES, Draw, figures, key
 from freeswing.report.material import Material
 from freeswing.report.words import ESTIMATES, HALF_WIDTH_95, number, plain, unit_of
@@ -40,6 +43,7 @@ class HowSure:
             "tables": tables,
             "summary": [_summary(name, entry) for name, entry in estimates.items()],
             "exact": exact(material),
+            "correlation": _correlation(next(iter(estimates.values()))),
             "notes": [
                 f"{ESTIMATES[name]}: {note}"
                 for name in list(estimates)[:1]
@@ -114,6 +118,44 @@ def _by_name(
     for entry in after:
         found.setdefault(entry.name, []).append((-1, entry))
     return found
+
+
+def _correlation(best: Estimate) -> Markup:
+    """The best estimate's correlations as a picture with numbers; empty where none are kept."""
+    if not best.correlation:
+        return Markup()
+    rows = np.array(best.correlation, dtype=np.float64)
+    caption = (
+        "Correlations of the nine parameters: two that err together have a number near 1 (blue) or "
+        "-1 (orange, hatched); what is known of one is then worth something for the other."
+    )
+    return figures([lambda sheet: draw_correlation(sheet.subplots(), rows)], 4.4, caption, 4.6)
+
+
+def draw_correlation(axes: Axes, rows: Array) -> None:
+    """A square a pair, its size and its number the correlation."""
+    names = [plain(unit_of(name)[0]) for name in INERTIA_NAMES]
+    for (i, k), value in np.ndenumerate(rows):
+        side = 0.94 * np.sqrt(abs(value))
+        colour, hatch = (SERIES[0], "") if value >= 0.0 else (SERIES[1], "////")
+        corner = (k - side / 2.0, i - side / 2.0)
+        drawn = {"facecolor": "none" if hatch else colour, "alpha": 0.45, "edgecolor": colour}
+        axes.add_patch(Rectangle(corner, side, side, hatch=hatch, lw=0.5, **drawn))
+        if i != k:
+            axes.text(k, i, f"{value:.2f}", ha="center", va="center", fontsize=6.5)
+    axes.set_xlim(-0.6, len(names) - 0.4)
+    axes.set_ylim(len(names) - 0.4, -0.6)
+    axes.set_xticks(range(len(names)), names, rotation=60, ha="right")
+    axes.set_yticks(range(len(names)), names)
+    axes.set_aspect("equal")
+    axes.grid(visible=False)
+
+
+def correlation_sheet(rows: Sequence[Sequence[float | None]]) -> Figure:
+    """The same as a figure of its own, for notebooks."""
+    sheet = Figure(figsize=(5.2, 5.0), layout="constrained")
+    draw_correlation(sheet.subplots(), np.array(rows, dtype=np.float64))
+    return sheet
 
 
 def _interval(name: str, points: list[tuple[int, Parameter]]) -> Draw:

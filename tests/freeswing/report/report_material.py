@@ -51,6 +51,12 @@ def whole_material(title: str = "lab-day-1") -> Material:
         motion=Motion.from_json(
             {"format": "freeswing-motion/1", "runs": [_motion(k, rng) for k in range(5)]}
         ),
+        fitted=Motion.from_json(
+            {
+                "format": "freeswing-motion/1",
+                "fitted": [_fitted(k, rng) for k in range(3)],
+            }
+        ),
         check=Check(
             findings=(Found(level="warning", subject="run swing-03", text="12 % missing"),)
         ),
@@ -92,7 +98,31 @@ def _estimate(spread: float, rng: np.random.Generator) -> dict[str, Any]:
         "sigma_W": 0.1,
         "cost_C": 8.4,
         "samples": 15000,
+        "correlation": _correlation(rng),
         "dropped_runs": [{"run": "swing-03", "why": f"12 % of the samples are missing {HOSTILE}"}],
+    }
+
+
+def _correlation(rng: np.random.Generator) -> list[list[float]]:
+    rows = rng.normal(size=(40, 9)) @ rng.normal(size=(9, 9))
+    return np.corrcoef(rows, rowvar=False).tolist()
+
+
+def _fitted(k: int, rng: np.random.Generator) -> dict[str, Any]:
+    """Full poses, one sample missing."""
+    times = np.arange(0.0, 6.0, 0.02)
+    shape = np.array([0.1, 0.05, 0.01, 0.05, 0.04, 0.02])
+    rates = np.array([4.0, 3.3, 8.0, 4.0, 3.3, 5.0])
+    exact = np.array([1.2, -0.2, -0.9, 0, 0, 0]) + shape * np.sin(np.outer(times, rates) + k)
+    measured = (exact + 1e-4 * rng.normal(size=exact.shape)).tolist()
+    measured[50] = [None] * 6
+    return {
+        "run": f"swing-{k:02d}",
+        "role": "identify",
+        "times_s": times.tolist(),
+        "coordinates": ["x", "y", "z", "phi", "theta", "chi"],
+        "measured": measured,
+        "before": exact.tolist(),
     }
 
 

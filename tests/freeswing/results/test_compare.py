@@ -51,6 +51,25 @@ def test_sessions_are_compared(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert document["rows"][0]["values"] == [0.002, 0.003]
 
 
+@pytest.mark.parametrize("suffix", ["svg", "png", "pdf"])
+def test_one_picture_shows_all(tmp_path: Path, suffix: str) -> None:
+    sides = [left(tmp_path / name, value) for name, value in (("a", 0.002), ("b", 0.003))]
+    picture = tmp_path / f"both.{suffix}"
+    assert main(["compare", *sides, "--picture", str(picture), "--quiet"]) == 0
+    assert picture.stat().st_size > 3000, picture.stat().st_size
+    assert main(["compare", *sides, "--picture", str(tmp_path / "both.doc")]) == 2
+
+
+def test_the_picture_names_sides_and_what_differs(tmp_path: Path) -> None:
+    sides = [left(tmp_path / name, value) for name, value in (("a", 0.002), ("b", 0.003))]
+    picture = tmp_path / "both.svg"
+    assert main(["compare", *sides, "--picture", str(picture), "--quiet"]) == 0
+    text = picture.read_text(encoding="utf-8")
+    assert "com x (mm)" in text
+    assert "z = 70.7" in text
+    assert f"{sides[1]} (ml_full)" in text
+
+
 def test_what_cannot_be_compared_is_named(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
