@@ -11,6 +11,7 @@ from scipy.stats import chi2
 from freeswing.cdpr.effects import effect_named
 from freeswing.cdpr.robot import Array
 from freeswing.ident.diagnose.leave_one_out import Score
+from freeswing.ident.diagnose.lengths.wrong_places import WrongPlace
 from freeswing.ident.diagnose.refit import Refit, colour_of, plausible
 from freeswing.ident.diagnose.spectrum import independent_numbers
 from freeswing.ident.diagnose.variants import effect_of, inside
@@ -77,6 +78,25 @@ class Decision:
     winner: Refit | None = None
     key: str = ""
     group: tuple[str, ...] = ()
+
+
+def by_lengths(place: WrongPlace, share: float) -> tuple[Candidate, ...]:
+    """What cable lengths decide: the likeliest block accepted, those that replace it beside it.
+
+    Args:
+        place: a block or a group of blocks that is off.
+        share: of the lengths' variance along the runs that all geometry explains.
+    """
+    names = tuple(dict.fromkeys(effect_of(key) for key in place.keys))
+    told = []
+    for name in names:
+        chance = max(way.probability for way in place.ways if effect_of(way.key) == name)
+        verdict = "confounded" if told else "accepted"
+        others = tuple(other for other in names if other != name)
+        chance = place.probability if len(names) == 1 else chance
+        word = Candidate(name, verdict, place.delta_bic, share, others, str(place), chance)
+        told.append(word)
+    return tuple(told)
 
 
 def promising(

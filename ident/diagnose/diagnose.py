@@ -160,6 +160,7 @@ def diagnose(
     search = Search(noise_scales, considered, workers, executor, _part(progress, 0.2, 0.85))
     last = search.run(base)
     notes = [*session_notes(model, prepared, {}), *dropped]
+    notes += search.kinematics.notes() if search.kinematics else []
     last, accepted, rest = _believed(search, last, fitted, full, notes)
     ladder = _ladder(search, accepted, checked, free, _part(progress, 0.85, 0.95))
     final = _with_own_noise(last.fit, fitted)
@@ -331,7 +332,10 @@ def _accepted(
 ) -> list[dict[str, Any]]:
     entries = []
     stds = np.sqrt(np.diag(covariance))
+    beside = {n for key, group in groups.items() for n in group if n != key} - set(groups)
     for name in claims(final.model.effects):
+        if name in beside:  # in the model because nobody can tell it from the one named
+            continue
         where = final.model.place_of(name)
         rows = [
             {

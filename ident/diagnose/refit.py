@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -81,18 +82,19 @@ def refit(
     Raises:
         ValueError: when the start cannot be simulated.
     """
-    model, free, state = _joined(current, candidate, values, noise_scales * np.sqrt(colour))
+    model, free, state = _joined(current.model, current.free, current.state, candidate, values)
+    state = replace(state, scales=noise_scales * np.sqrt(colour))
     return rescored(_fitted(model, current, state, free), noise_scales, colour)
 
 
 def _joined(
-    found: LikelihoodFit, key: str, values: Array, scales: Array
+    before: Model, estimated: np.ndarray, start: State, key: str, values: Array
 ) -> tuple[Model, np.ndarray, State]:
     """The model with a candidate, which unknowns are estimated, and a state to go on from.
 
     `values` are those of the candidate's whole effect; what the model has of it already stays.
     """
-    model, free, start = found.model, found.free.copy(), found.state
+    model, free = before, estimated.copy()
     all_values, own_values = start.values, start.own_values
     name = effect_of(key)
     if name in model.effects:
@@ -102,34 +104,43 @@ def _joined(
         free = np.concatenate([free, inside(model.robot, key)])
         all_values = np.concatenate([all_values, values])
         own_values = _with_new(own_values, len(model.own_values))
-    return (
-        model,
-        free,
-        State(start.inertia, all_values, start.starts, scales, own_values=own_values),
-    )
+    state = State(start.inertia, all_values, start.starts, start.scales, own_values=own_values)
+    return model, free, state
 
 
 def displaced(
-    current: Refit, key: str, centre: Array, covariance: Array, noise_scales: Array
+    current: Refit,
+    keys: Sequence[str],
+    centre: Array,
+    covariance: Array,
+    noise_scales: Array,
 ) -> Refit:
     """A fit with a geometry in it that is known as a Gaussian.
 
     Args:
         current: the fit without it.
-        key: of the geometry effect.
-        centre: its values, (k,).
+        keys: of the geometry effects.
+        centre: their values, key after key, (k,).
         covariance: of these, (k, k): that of a prior about them.
         noise_scales: of metres and radians, (2,).
     """
-    found, name = current.fit, effect_of(key)
-    nothing = np.array([p.start for p in effect_named(name).parameters(found.model.robot)])
+    found = current.fit
     scales = noise_scales * np.sqrt(colour_of(found, noise_scales))
-    model, free, state = _joined(found, key, nothing, scales)
+    model, free, state = found.model, found.free, found.state
+    for key in keys:
+        nothing = [p.start for p in effect_named(effect_of(key)).parameters(model.robot)]
+        model, free, state = _joined(model, free, state, key, np.array(nothing))
     values = state.values.copy()
-    chosen = np.arange(len(values))[model.place_of(name)][inside(model.robot, key)]
+    chosen = np.concatenate(
+        [
+            np.arange(len(values))[model.place_of(effect_of(key))][inside(model.robot, key)]
+            for key in keys
+        ]
+    )
     values[chosen] = centre
     known = with_known(model, chosen, centre, covariance)
-    return polished(_fitted(known, found, replace(state, values=values), free), noise_scales)
+    start = replace(state, values=values, scales=scales)
+    return polished(_fitted(known, found, start, free), noise_scales)
 
 
 def polished(found: LikelihoodFit, noise_scales: Array) -> Refit:

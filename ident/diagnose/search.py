@@ -21,8 +21,8 @@ from freeswing.cdpr.robot import Array, Robot
 from freeswing.cdpr.system.lifeline import tie_to
 from freeswing.ident.diagnose.decision import (
     LEAST_EXCESS_LATER,
-    Candidate,
     Decision,
+    by_lengths,
     decided,
     excess_of,
     promising,
@@ -117,11 +117,10 @@ class Search:
         self.kinematics = kinematics(current.fit, keys, self.noise_scales)
         for one in self.kinematics.wrong if self.kinematics else ():
             self._tell(f"kinematics: {effect_of(one.key)}", 0.0)
-            after = displaced(current, one.key, one.values, one.covariance, self.noise_scales)
+            after = displaced(current, one.keys, one.values, one.covariance, self.noise_scales)
             share = 1.0 - (one.after_m / one.before_m) ** 2
-            name, chance = effect_of(one.key), one.probability
-            word = Candidate(name, "accepted", one.delta_bic, share, (), str(one), chance)
-            decision = Decision((word,), after, one.key, (effect_of(one.key),))
+            words = by_lengths(one, share)
+            decision = Decision(words, after, one.key, tuple(word.effect for word in words))
             self.rounds.append(Round(current, decision, by_lengths=True))
             current = after
         return current

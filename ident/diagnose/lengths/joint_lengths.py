@@ -1,15 +1,13 @@
-"""One joint model of all that changes cable lengths, its posterior over what is grossly wrong.
+"""One joint model of all that changes cable lengths.
 
 Anchors, attachments, radii, axes, what is measured, creep and stretch stand side by side. Each
-block of them is either as declared, within its tolerance, or grossly off; every set of up to
-`MOST_WRONG` gross blocks is weighed by its evidence, which is closed form in a linear problem.
+block of them is either as declared, within its tolerance, or grossly off.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import combinations
 
 import numpy as np
 
@@ -17,10 +15,8 @@ from freeswing.cdpr.robot import Array
 from freeswing.ident.diagnose.lengths.length_noise import repetition, slow_size
 from freeswing.ident.diagnose.lengths.length_rows import LengthRows
 
-MOST_WRONG = 3
-# One block in thirty is off in a robot that somebody has measured: a dozen blocks, a third of all
-# robots with something wrong.
-CHANCE_OF_WRONG = 1.0 / 30.0
+# A run whose lengths keep this many times as much as the usual run's weighs less.
+WORSE = 1.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +84,9 @@ class Solved:
 def normal_equations(rows: Sequence[LengthRows], widest: Array) -> Normal:
     """Normal equations with slow errors as large, and as repetitive, as each run asks for.
 
-    A run with a spoiled marker has larger ones than the others, and weighs less.
+    A run with a spoiled marker has larger ones than the others, and weighs less: where the least
+    size is that of all runs, those that leave more of their lengths than the usual one have larger
+    errors in proportion. Of fifteen recorded runs three would otherwise settle the answer.
 
     Args:
         rows: of all runs.
@@ -106,10 +104,24 @@ def normal_equations(rows: Sequence[LengthRows], widest: Array) -> Normal:
         left = [_left(one, part, solution.values) for one, part in zip(rows, found, strict=True)]
         own = [_own_size(*run) for run in zip(rows, left, freedom, strict=True)]
         sizes = np.maximum(least, own)
+    sizes = _in_proportion(rows, sizes, widest)
     found = [_reduced(*pair) for pair in zip(rows, sizes, strict=True)]
     matrices = np.array([part.matrix for part in found])
     rights, squares = np.array([p.right for p in found]), np.array([p.square for p in found])
     return Normal(matrices, rights, squares, tuple(rows), sizes)
+
+
+def _in_proportion(rows: Sequence[LengthRows], usual: Array, widest: Array) -> Array:
+    """Sizes raised where a run leaves more of its lengths than the median run, (r,)."""
+    sizes = usual
+    for _ in range(3):
+        found = [_reduced(*pair) for pair in zip(rows, sizes, strict=True)]
+        solution = solved(_summed(found), widest)
+        left = [_left(one, part, solution.values) for one, part in zip(rows, found, strict=True)]
+        squares = [np.mean(_whitened(*r) ** 2) for r in zip(rows, usual, left, strict=True)]
+        worse = np.sqrt(squares / np.maximum(np.median(squares), 1e-300))
+        sizes = usual * np.where(worse > WORSE, worse, 1.0)
+    return sizes
 
 
 def solved(summed: tuple[Array, Array, float], spread: Array) -> Solved:
@@ -132,22 +144,6 @@ def total(normal: Normal, without: int | None = None) -> tuple[Array, Array, flo
         normal.rights[kept].sum(axis=0),
         float(normal.squares[kept].sum()),
     )
-
-
-def set_probabilities(normal: Normal, blocks: Blocks) -> dict[tuple[str, ...], float]:
-    """Posterior probability of each set of blocks that is wrong."""
-    summed = total(normal)
-    seen = np.diag(summed[0]) > 0.0
-    keys = tuple(key for key, where in blocks.columns.items() if seen[where].all())
-    logs: dict[tuple[str, ...], float] = {}
-    odds = np.log(CHANCE_OF_WRONG / (1.0 - CHANCE_OF_WRONG))
-    for count in range(min(MOST_WRONG, len(keys)) + 1):
-        for wrong in combinations(keys, count):
-            logs[wrong] = solved(summed, blocks.spread(wrong)).log_evidence + count * odds
-    highest = max(logs.values())
-    weights = {wrong: float(np.exp(log - highest)) for wrong, log in logs.items()}
-    whole = sum(weights.values())
-    return {wrong: weight / whole for wrong, weight in weights.items()}
 
 
 def log_odds(normal: Normal, blocks: Blocks, wrong: Sequence[str], key: str) -> float:

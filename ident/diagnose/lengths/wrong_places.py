@@ -12,19 +12,25 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from freeswing.cdpr.effects import Parameter, catalogue, effect_named
+from freeswing.cdpr.effects import catalogue, effect_named
 from freeswing.cdpr.model.batch import evaluate
 from freeswing.cdpr.model.equations import Model, build_model
 from freeswing.cdpr.robot import Array, Robot
 from freeswing.cdpr.simulation.free_swing import Motion
+from freeswing.ident.diagnose.lengths.inclusion import (
+    Chances,
+    alone,
+    groups,
+    mixed,
+    probability,
+    set_probabilities,
+)
 from freeswing.ident.diagnose.lengths.joint_lengths import (
     Blocks,
     Normal,
     Solved,
-    honest_covariance,
     log_odds,
     normal_equations,
-    set_probabilities,
     solved,
     total,
 )
@@ -33,42 +39,80 @@ from freeswing.ident.diagnose.variants import effect_of, inside
 from freeswing.ident.likelihood.likelihood import LikelihoodFit
 from freeswing.ident.likelihood.likelihood_run import Samples
 
-# The threshold for accepting: wrong with probability above this.
-ACCEPTED = 0.95
 LINEARISATIONS = 3
+# Runs whose slow errors are this many times as large as the usual run's are named.
+LESS_TRUST = 2.0
+
+
+class Way(NamedTuple):
+    """One block of a group, as if it were the only one of them that is off.
+
+    Attributes:
+        key: an effect, or one cable's part of it.
+        probability: that it is off.
+        values: of its parameters, (k,).
+        std: of these, all else that may be off allowed for, (k,).
+        unit: of these, m or rad or others.
+    """
+
+    key: str
+    probability: float
+    values: Array
+    std: Array
+    unit: str
+
+    def document(self) -> dict[str, Any]:
+        """Of `lengths` in results/diagnosis.json."""
+        told = {"values": self.values.tolist(), "std": self.std.tolist()}
+        return {"part": self.key, "probability": self.probability, **told}
+
+    def __str__(self) -> str:
+        """Its values, for a reader."""
+        factor, unit = (1e3, f"m{self.unit}") if self.unit in ("m", "rad") else (1.0, self.unit)
+        pairs = zip(factor * self.values, factor * self.std, strict=True)
+        return f"{self.key} by " + ", ".join(f"{v:.1f} +- {s:.1f}" for v, s in pairs) + f" {unit}"
 
 
 @dataclass(frozen=True, slots=True)
 class WrongPlace:
-    """A block of the geometry that is grossly off.
+    """A block of the geometry that is grossly off, or several of which at least one is.
 
     Attributes:
-        key: an effect, or one cable's part of it.
-        parameters: those of the block.
-        values: of these, (k,).
-        covariance: of these, all else that may be off allowed for, (k, k).
-        probability: that the block is off.
-        delta_bic: twice the log odds against it, its unknowns counted, negative for it.
+        keys: effects, or one cable's part of them, the likeliest first.
+        values: of all their parameters, key after key, (k,).
+        covariance: of these, over all that may be off beside, (k, k).
+        ways: one for each key.
+        probability: that at least one of the blocks is off.
+        delta_bic: twice the log odds against the first, its unknowns counted, negative for it.
         before_m: what lengths vary along the runs by the declared geometry, root mean square.
         after_m: and by the joint model.
     """
 
-    key: str
-    parameters: tuple[Parameter, ...]
+    keys: tuple[str, ...]
     values: Array
     covariance: Array
+    ways: tuple[Way, ...]
     probability: float
     delta_bic: float
     before_m: float
     after_m: float
 
+    @property
+    def key(self) -> str:
+        """The likeliest."""
+        return self.keys[0]
+
     def __str__(self) -> str:
         """What was seen, for a reader."""
-        return (
+        told = (
             f"wrong with probability {self.probability:.3f}, whatever forces act: by all geometry "
             f"together the poses' cable lengths vary by {1e3 * self.after_m:.2g} instead of "
             f"{1e3 * self.before_m:.2g} mm along the runs"
         )
+        if len(self.keys) == 1:
+            return told
+        ways = " or ".join(f"{way} ({100 * way.probability:.0f} %)" for way in self.ways)
+        return f"{told}; these recordings cannot tell {ways}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,32 +122,41 @@ class Kinematics:
     Attributes:
         wrong: blocks that are off, the surest first.
         probabilities: of each block to be off.
-        sizes: of each run's slow errors over their usual size.
+        sizes: of each run's slow errors over their usual size, by its name.
         besides: values of effects that make lengths vary, with standard deviations, by effect:
             fitted jointly, and left to the dynamics to accept.
     """
 
     wrong: tuple[WrongPlace, ...]
     probabilities: dict[str, float]
-    sizes: tuple[float, ...]
+    sizes: dict[str, float]
     besides: dict[str, tuple[Array, Array]]
+
+    def notes(self) -> list[str]:
+        """Runs that deserve less trust, a sentence each."""
+        usual = float(np.median(list(self.sizes.values())))
+        return [
+            f"run {run}: its cable lengths vary {size / usual:.1f} times as much as the usual "
+            "run's whatever the geometry: its poses are worse than they say, it weighs less here"
+            for run, size in self.sizes.items()
+            if size > LESS_TRUST * usual
+        ]
 
     def document(self) -> dict[str, Any]:
         """`lengths` of results/diagnosis.json."""
         return {
             "wrong": [
                 {
-                    "part": one.key,
+                    **one.ways[0].document(),
                     "probability": one.probability,
-                    "values": one.values.tolist(),
-                    "std": np.sqrt(np.diag(one.covariance)).tolist(),
+                    "rivals": [way.document() for way in one.ways[1:]],
                     "before_m": one.before_m,
                     "after_m": one.after_m,
                 }
                 for one in self.wrong
             ],
             "probabilities": self.probabilities,
-            "slow_errors": list(self.sizes),
+            "slow_errors": self.sizes,
             "besides": {
                 name: {"values": values.tolist(), "std": stds.tolist()}
                 for name, (values, stds) in self.besides.items()
@@ -162,27 +215,51 @@ def kinematics(fit: LikelihoodFit, keys: Sequence[str], noise_scales: Array) -> 
         last = _linearised(fit, model, patterns, blocks, noise_scales, values)
         if last.wrong == before:
             break
-    normal, chances, wrong, found = last
-    single = {key: sum(p for one, p in chances.items() if key in one) for key in blocks.columns}
-    covariance = honest_covariance(normal, blocks.spread(wrong), found)
-    variation = normal.variation_m(0.0 * found.values), normal.variation_m(found.values)
-    places = []
-    for key in sorted(set(wrong) & set(keys), key=lambda one: -single[one]):
-        if single[key] > ACCEPTED:
-            where = blocks.columns[key]
-            block = covariance[np.ix_(where, where)]
-            named = tuple(model.parameters[k] for k in where)
-            found_there = found.values[where]
-            against = -2.0 * float(log_odds(normal, blocks, wrong, key))
-            places.append(
-                WrongPlace(key, named, found_there, block, single[key], against, *variation)
-            )
-    rest = {name: _told(blocks.columns[name], found, covariance) for name in patterns[0]}
-    return Kinematics(tuple(places), single, tuple(normal.sizes.tolist()), rest)
+    normal, chances = last.normal, last.chances
+    everything = mixed(normal, blocks, chances, ())
+    variation = normal.variation_m(0.0 * everything.values), normal.variation_m(everything.values)
+    places = tuple(
+        _place(model, last, blocks, group, variation)
+        for group in groups(chances, _shown(chances, keys))
+    )
+    singles = {key: probability(chances, [key]) for key in blocks.columns}
+    sizes = {row.run: float(size) for row, size in zip(normal.rows, normal.sizes, strict=True)}
+    rest = {name: _told(blocks.columns[name], everything) for name in patterns[0]}
+    return Kinematics(places, singles, sizes, rest)
 
 
-def _told(columns: np.ndarray, found: Solved, covariance: Array) -> tuple[Array, Array]:
-    return found.values[columns], np.sqrt(np.diag(covariance)[columns])
+def _shown(chances: Chances, keys: Sequence[str]) -> list[str]:
+    """Keys that some run shows."""
+    weighed = {key for wrong in chances for key in wrong}
+    return [key for key in keys if key in weighed]
+
+
+def _place(
+    model: Model,
+    last: _Linearised,
+    blocks: Blocks,
+    group: tuple[str, ...],
+    variation: tuple[float, float],
+) -> WrongPlace:
+    normal, chances = last.normal, last.chances
+    found = mixed(normal, blocks, chances, group)
+    ways = []
+    for key in group:
+        own = mixed(normal, blocks, alone(chances, key, group), [key])
+        values, stds = _told(blocks.columns[key], own)
+        unit = model.names[blocks.columns[key][0]].rpartition("_")[2]
+        ways.append(Way(key, probability(chances, [key]), values, stds, unit))
+    where = np.concatenate([blocks.columns[key] for key in group])
+    beside = [key for key in last.wrong if key not in group]
+    against = -2.0 * float(log_odds(normal, blocks, [*beside, group[0]], group[0]))
+    covariance = found.covariance[np.ix_(where, where)]
+    chance = probability(chances, group)
+    values = found.values[where]
+    return WrongPlace(group, values, covariance, tuple(ways), chance, against, *variation)
+
+
+def _told(columns: np.ndarray, found: Solved) -> tuple[Array, Array]:
+    return found.values[columns], np.sqrt(np.diag(found.covariance)[columns])
 
 
 def _finest(keys: Sequence[str]) -> list[str]:

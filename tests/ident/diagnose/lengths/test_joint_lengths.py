@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from freeswing.ident.diagnose.lengths.inclusion import set_probabilities
 from freeswing.ident.diagnose.lengths.joint_lengths import (
     Blocks,
     honest_covariance,
     log_odds,
     normal_equations,
-    set_probabilities,
     solved,
     total,
 )
