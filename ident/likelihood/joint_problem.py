@@ -72,6 +72,8 @@ class Step:
         singular_values: of that triangle, descending.
         rank: how many of them count.
         decrease: of the cost in the shared unknowns that an undamped linear step would bring.
+        runs: rows of each run over [shared unknowns; residual].
+        priors: rows of what is known beforehand.
     """
 
     shared: Array
@@ -81,6 +83,8 @@ class Step:
     singular_values: Array
     rank: int
     decrease: float
+    runs: tuple[Array, ...]
+    priors: Array
 
 
 class Problem:
@@ -175,7 +179,8 @@ class Problem:
             np.column_stack([run.rows[:-1, :-1] @ one, run.rows[:-1, -1]])
             for run, one in zip(reduced, maps, strict=True)
         ]
-        rows = np.vstack([*parts, self.prior_rows(state)])
+        priors = self.prior_rows(state)
+        rows = np.vstack([*parts, priors])
         free = self.free
         scaled = rows[:, :-1][:, free] * self.unit[free]
         shared = np.zeros(len(free))
@@ -194,7 +199,8 @@ class Problem:
         changes = [run.own_change(one @ shared) for run, one in zip(reduced, maps, strict=True)]
         states, own = (tuple(part) for part in zip(*changes, strict=True))
         decrease = float(right @ right)
-        return Step(shared, states, own, triangle, singular, int(kept.sum()), decrease)
+        rank = int(kept.sum())
+        return Step(shared, states, own, triangle, singular, rank, decrease, tuple(parts), priors)
 
     def shared_map(self, run: int, state: State) -> Array:
         """What a run sees, inertia with its payload and values, by the unknowns, (9 + k, p)."""

@@ -16,6 +16,7 @@ import numpy as np
 from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.robot import Array
 from freeswing.cdpr.simulation.free_swing import Motion
+from freeswing.ident.likelihood.between_runs import jackknife_std
 from freeswing.ident.likelihood.joint_problem import TOLERANCE_M, Problem, State, Step
 from freeswing.ident.likelihood.likelihood_run import Samples, predicted, residuals
 
@@ -59,6 +60,8 @@ class LikelihoodFit:
         rank: how many of them count.
         steps: Gauss-Newton steps taken.
         reason: why the iteration stopped, a sentence.
+        between: standard deviations of the shared unknowns by leaving out one run at a time,
+            (9 + k + u,), zero where not estimated or where there are fewer than three runs.
     """
 
     model: Model
@@ -78,6 +81,7 @@ class LikelihoodFit:
     rank: int
     steps: int
     reason: str
+    between: Array
 
     @property
     def std(self) -> Array:
@@ -232,6 +236,7 @@ def _packed(problem: Problem, state: State, step: Step, taken: int, reason: str)
         rank=step.rank,
         steps=taken,
         reason=reason,
+        between=jackknife_std(step.runs, step.priors, problem.free, problem.unit),
     )
 
 

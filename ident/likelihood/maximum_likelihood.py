@@ -17,6 +17,7 @@ from freeswing.ident.judge.free_swing_law import (
     lawless_sentence,
     unexplained_motion,
 )
+from freeswing.ident.likelihood.between_runs import widened
 from freeswing.ident.likelihood.cable_ends import geometry_document, weighed_against_priors
 from freeswing.ident.likelihood.calibration_modes import with_calibration
 from freeswing.ident.likelihood.guess_run_start import first_state
@@ -230,7 +231,8 @@ def started(
 def _entry(
     found: LikelihoodFit, dropped: tuple[DroppedRun, ...], held_cost: float | None
 ) -> Estimate:
-    covariance = found.covariance[:9, :9]
+    own = found.covariance[:9, :9]
+    covariance = widened(own, found.between[:9], len(found.samples))
     if not np.isfinite(covariance).all():
         raise ValueError(
             f"the samples do not determine the inertia: rank {found.rank} of "
@@ -243,6 +245,12 @@ def _entry(
         notes.append(
             f"the residuals are not white (power below 5 Hz is {found.correlation:.3g} times that "
             "of white noise): the model misses something; standard deviations are enlarged for it"
+        )
+    wider = np.sqrt(np.diag(covariance) / np.diag(own)).max()
+    if wider > 1.0:
+        notes.append(
+            f"runs say apart up to {wider:.1f} times what their residuals let expect: standard "
+            "deviations are those of leaving out one run at a time"
         )
     mass = None
     if len(found.loads):
