@@ -10,16 +10,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.signal import savgol_filter
 
 from freeswing.cdpr.model.batch import evaluate, with_jacobian
 from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.robot import Array
 from freeswing.cdpr.rotation import angle_rate_matrix, matrix_from_angles
-from freeswing.cdpr.simulation.free_swing import Motion
 from freeswing.ident.likelihood.likelihood_run import Samples
 
 # Slow errors follow the swing (up to some 2 Hz): means over a tenth of a second lose none of them.
 BLOCK_S = 0.1
+RATES_OVER_S = 0.15
 # The shape of slow errors: half-hidden markers and tags move poses by a tenth of a millimetre, the
 # pulley's run-out and the seat in its groove a length by a few. Their size is estimated, and at
 # least so much: below it the small print of every error decides what is wrong. On real recordings
@@ -54,9 +55,22 @@ class LengthRows:
     least_size: float
 
 
+def measured_rates(times_s: Array, values: Array) -> Array:
+    """Time derivatives of samples (n, c) at their times (n,), by cubics over `RATES_OVER_S`.
+
+    A simulated motion would not do: where the model lacks much it is out of phase after a while.
+    """
+    step = float(np.median(np.diff(times_s)))
+    grid = np.arange(times_s[0], times_s[-1] + 0.5 * step, step)
+    even = np.array([np.interp(grid, times_s, column) for column in values.T])
+    width = min(2 * round(0.5 * RATES_OVER_S / step) + 1, len(grid) - 1 + len(grid) % 2)
+    rates = savgol_filter(even, max(width, 5), 3, deriv=1, delta=step, axis=1)
+    return np.array([np.interp(times_s, grid, row) for row in rates]).T
+
+
 def length_rows(
     model: Model,
-    motion: Motion,
+    inertia: Array,
     samples: Samples,
     noise_scales: Array,
     values: Array,
@@ -67,7 +81,7 @@ def length_rows(
     Args:
         model: with all effects that displace or measure; its values come first among the shared
             unknowns, then those of the patterns.
-        motion: of the run, for rates and tensions.
+        inertia: of the platform, (9,).
         samples: its poses.
         noise_scales: of metres and radians, (2,).
         values: at which to linearise, (k,); those of measurement effects at zero.
@@ -77,9 +91,9 @@ def length_rows(
     n = model.robot.n_cables
     lengths, slopes = evaluate(with_jacobian(model.lengths, (0, 1)), zetas, values)
     by_pose, by_values = slopes[:, :, :6], slopes[:, :, 6:]
-    rates = motion.at(times)[1]
+    rates = measured_rates(times, zetas)
     shown = evaluate(
-        with_jacobian(model.measured, (4,)), times, zetas, rates, motion.inertia, model.start_values
+        with_jacobian(model.measured, (4,)), times, zetas, rates, inertia, model.start_values
     )[1]
     geometry = by_values - by_pose @ shown
     turn = np.linalg.inv(angle_rate_matrix(zetas[:, 3:]))

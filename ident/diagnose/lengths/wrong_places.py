@@ -13,10 +13,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from freeswing.cdpr.effects import catalogue, effect_named
-from freeswing.cdpr.model.batch import evaluate
+from freeswing.cdpr.model.batch import evaluate, only
 from freeswing.cdpr.model.equations import Model, build_model
 from freeswing.cdpr.robot import Array, Robot
-from freeswing.cdpr.simulation.free_swing import Motion
 from freeswing.ident.diagnose.lengths.inclusion import (
     Chances,
     alone,
@@ -34,7 +33,7 @@ from freeswing.ident.diagnose.lengths.joint_lengths import (
     solved,
     total,
 )
-from freeswing.ident.diagnose.lengths.length_rows import length_rows
+from freeswing.ident.diagnose.lengths.length_rows import length_rows, measured_rates
 from freeswing.ident.diagnose.variants import effect_of, inside
 from freeswing.ident.likelihood.likelihood import LikelihoodFit
 from freeswing.ident.likelihood.likelihood_run import Samples
@@ -184,8 +183,8 @@ def _linearised(
     """Chances of every set of gross blocks, and the solution with the likeliest."""
     at = np.where(_displaces(model), values, 0.0)
     rows = [
-        length_rows(model, motion, samples, noise_scales, at, pattern)
-        for motion, samples, pattern in zip(fit.motions, fit.samples, patterns, strict=True)
+        length_rows(model, fit.inertia, samples, noise_scales, at, pattern)
+        for samples, pattern in zip(fit.samples, patterns, strict=True)
     ]
     normal = normal_equations(rows, blocks.gross)
     chances = set_probabilities(normal, blocks)
@@ -203,7 +202,7 @@ def kinematics(fit: LikelihoodFit, keys: Sequence[str], noise_scales: Array) -> 
     """
     if not all(run.is_pose for run in fit.samples):
         return None
-    patterns = [_patterns(*pair) for pair in zip(fit.motions, fit.samples, strict=True)]
+    patterns = [_patterns(fit, samples) for samples in fit.samples]
     keys = _finest([key for key in keys if effect_of(key) not in patterns[0]])
     model = build_model(fit.model.robot, tuple(dict.fromkeys(map(effect_of, keys))))
     blocks = _blocks(model, keys, patterns[0])
@@ -268,11 +267,15 @@ def _finest(keys: Sequence[str]) -> list[str]:
     return [key for key in keys if key not in parted]
 
 
-def _patterns(motion: Motion, samples: Samples) -> dict[str, Array]:
-    """How each effect that makes lengths vary would do it along a run, (n_t, n, k) by name."""
-    times, values = samples.times_s, motion.values
-    lengths = evaluate(motion.model.lengths, samples.values, values)[0]
-    tensions = motion.tensions(times)
+def _patterns(fit: LikelihoodFit, samples: Samples) -> dict[str, Array]:
+    """How each effect that makes lengths vary would do it along a run, (n_t, n, k) by name.
+
+    The state sets the tensions of a platform on cables: they come from the measured one.
+    """
+    times, zetas, model = samples.times_s, samples.values, build_model(fit.model.robot)
+    lengths = evaluate(model.lengths, zetas, model.start_values)[0]
+    state = times, zetas, measured_rates(times, zetas), fit.inertia, model.start_values
+    tensions = evaluate(only(model.acceleration, 1), *state)[0]
     found = {n: e.length_pattern(times, lengths, tensions) for n, e in catalogue().items()}
     return {name: pattern for name, pattern in found.items() if pattern is not None}
 

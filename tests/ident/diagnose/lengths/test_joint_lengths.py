@@ -13,7 +13,7 @@ from freeswing.ident.diagnose.lengths.joint_lengths import (
     total,
 )
 from freeswing.ident.diagnose.lengths.length_noise import repetition, slow_size
-from freeswing.ident.diagnose.lengths.length_rows import LengthRows
+from freeswing.ident.diagnose.lengths.length_rows import LengthRows, measured_rates
 
 NOISE_M = 5e-5
 BLOCKS = Blocks(
@@ -127,3 +127,24 @@ def test_too_few_samples_are_refused():
     ]
     with pytest.raises(ValueError, match="too few samples"):
         normal_equations(short, BLOCKS.gross)
+
+
+def test_below_the_least_size_runs_that_leave_more_than_usual_weigh_less_in_proportion():
+    rows = [
+        LengthRows(o.run, o.own, o.shared, o.right, o.white, o.slow, 10.0)
+        for o in session(np.zeros(5), 12)
+    ]
+    rows[2].right[...] *= 4.0
+    rows[5].right[...] *= 1.3
+    sizes = normal_equations(rows, BLOCKS.gross).sizes
+    assert sizes[2] == pytest.approx(40.0, rel=0.2), sizes
+    assert np.delete(sizes, 2) == pytest.approx(10.0), sizes
+
+
+def test_rates_are_those_of_the_samples_through_gaps_and_noise():
+    times = np.delete(np.arange(0.0, 4.0, 0.01), np.r_[100:112, 250])
+    noise = 1e-4 * np.random.default_rng(13).normal(size=(len(times), 2))
+    values = 0.1 * np.sin(np.outer(times, [4.0, 6.0])) + noise
+    rates = measured_rates(times, values)
+    true = 0.1 * np.cos(np.outer(times, [4.0, 6.0])) * [4.0, 6.0]
+    assert np.sqrt(np.mean((rates - true) ** 2)) < 4e-3  # of 0.35 m/s
