@@ -73,9 +73,7 @@ def motors_of(model: DrivenModel, theta: Array | None = None) -> Motors:
         ValueError: for a robot without [drive].
     """
     theta = model.declared if theta is None else theta
-    drive = model.robot.drive
-    if drive is None:
-        raise ValueError(f"robot {model.robot.name} has no [drive]")
+    drive = model.drive
     terms = model.premises.terms.motors
     columns = ca.horzcat(
         terms.drum_radius,
@@ -85,7 +83,9 @@ def motors_of(model: DrivenModel, theta: Array | None = None) -> Motors:
     )
     # As in the model, an effect's own parameters stand in theta too.
     numbers = np.array(ca.Function("motors", [model.premises.theta], [columns])(theta))
-    return Motors(*numbers.T, drive.current_limits_A, drive.tension_limits_N)
+    drum, torque, spring, coulomb = numbers.T
+    limits = drive.current_limits_A, drive.tension_limits_N
+    return Motors(drum, torque, spring, coulomb, *limits)
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterable, Iterator
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,7 +59,7 @@ def largest_shift_px(before: Image, image: Image) -> float:
     down, right = np.gradient(old)
     shape = (height // _TILE, _TILE, width // _TILE, _TILE)
 
-    def of_tiles(values: NDArray[np.float32]) -> Array:
+    def of_tiles(values: NDArray[Any]) -> Array:
         return np.asarray(values.reshape(shape).sum(axis=(1, 3)), dtype=np.float64)
 
     steep = of_tiles(down**2 + right**2)

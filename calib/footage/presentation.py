@@ -104,7 +104,7 @@ def evened(times_s: Array, tick_s: float) -> tuple[Array, float, bool, int]:
         tick_s: unit in which they were written.
     """
     beat = float(np.median(np.diff(times_s)))
-    count = np.zeros(len(times_s))
+    start, count = float(times_s[0]), np.zeros(len(times_s))
     for _ in range(3):
         steps = np.maximum(np.round(np.diff(times_s) / beat), 1.0)
         count = np.concatenate([[0.0], np.cumsum(steps)])

@@ -76,7 +76,7 @@ def elastic_rest(
         ValueError: when a cable is slack there or the search does not settle.
     """
     theta = model.declared if theta is None else theta
-    pose = static_pose(model, currents, theta).pose
+    pose, force = static_pose(model, currents, theta).pose, np.full(6, np.inf)
     for _ in range(50):
         force, out = _pull_at_rest(model, pose, currents, stiffness_EA_N, theta)
         if np.abs(force).max() < 1e-11:

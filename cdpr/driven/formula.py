@@ -99,7 +99,7 @@ def _check(node: ast.expr, text: str, names: set[str]) -> None:
 
 def _value(node: ast.expr, names: Mapping[str, Any], functions: Any) -> Any:
     match node:
-        case ast.Constant(value=number):
+        case ast.Constant(value=int() | float() as number):
             return float(number)
         case ast.Name(id=name):
             return names[name]

@@ -71,12 +71,14 @@ class LinearModel:
     def A(self) -> Array:
         """State matrix, (12, 12)."""
         low = -np.linalg.solve(self.mass, np.hstack([self.stiffness - self.turning, self.damping]))
-        return np.vstack([np.hstack([np.zeros((6, 6)), np.eye(6)]), low])
+        whole = np.vstack([np.hstack([np.zeros((6, 6)), np.eye(6)]), low])
+        return np.asarray(whole, dtype=np.float64)
 
     @property
     def B(self) -> Array:
         """Input matrix, (12, 6)."""
-        return np.vstack([np.zeros((6, 6)), np.linalg.solve(self.mass, self.velocity_map.T)])
+        low = np.linalg.solve(self.mass, self.velocity_map.T)
+        return np.asarray(np.vstack([np.zeros((6, 6)), low]), dtype=np.float64)
 
     @property
     def C(self) -> Array:
@@ -88,7 +90,7 @@ class LinearModel:
         """Feedthrough, zero, (6, 6)."""
         return np.zeros((6, 6))
 
-    def response(self, rates_rad_s: Array) -> Array:
+    def response(self, rates_rad_s: Array) -> NDArray[np.complex128]:
         """C (j w - A)^-1 B, (n, 6, 6) complex."""
         resolvent = 1j * np.asarray(rates_rad_s)[:, None, None] * np.eye(12) - self.A
         return self.C @ np.linalg.solve(

@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from freeswing.cdpr.driven.drive import LEAST_DRIVEN
+from freeswing.cdpr.driven.drive import LEAST_DRIVEN, Drive
 from freeswing.cdpr.driven.equations import quaternion_rate, rotation_of
 from freeswing.cdpr.driven.parameters import Numbers, declared_numbers
 from freeswing.cdpr.driven.scene import Premises, Scene, premises, scene
@@ -71,6 +71,17 @@ class DrivenModel:
     step: Function
     stages: Function
     energy: Function
+
+    @property
+    def drive(self) -> Drive:
+        """The robot's drive.
+
+        Raises:
+            ValueError: for a robot whose cables nothing drives.
+        """
+        if self.robot.drive is None:
+            raise ValueError(f"robot {self.robot.name} has no [drive]")
+        return self.robot.drive
 
     @property
     def n_cables(self) -> int:

@@ -85,7 +85,8 @@ def _of_start_currents(motion: DrivenMotion, steps: _Steps) -> Array:
     ends = evaluate(model.step, state, ones, zeros, periods, theta)[1]
     left = ends[place]
     before = np.vstack([ones[None], np.cumprod(left, axis=0)[:-1]])
-    return before[:, None, :] * np.moveaxis(looks, -1, 1)[place]
+    left_over = before[:, None, :] * np.moveaxis(looks, -1, 1)[place]
+    return np.asarray(left_over, dtype=np.float64)
 
 
 def _flows(states: Array, by_state: Array) -> Array:

@@ -83,7 +83,7 @@ def pose_map(poses: Array) -> Array:
     return result
 
 
-def moved(poses: Array, shifts: Array) -> Array:
+def moved(poses: Array, shifts: NDArray[np.floating]) -> Array:
     """Poses (..., 7) after small translations and turns in the platform frame (..., 6)."""
     poses, shifts = np.broadcast_arrays(poses, np.concatenate([shifts, shifts[..., :1]], axis=-1))
     angle = np.linalg.norm(shifts[..., 3:6], axis=-1, keepdims=True)

@@ -46,7 +46,7 @@ def static_pose(
         ValueError: when no stable rest is found, with where the search ended.
     """
     theta = model.declared if theta is None else theta
-    pose = np.array(start, dtype=np.float64)
+    pose, acceleration = np.array(start, dtype=np.float64), np.full(6, np.inf)
     for _ in range(MOST_ITERATIONS):
         acceleration, falling = stiffness(model, pose, currents, theta)
         least = float(np.linalg.eigvals(falling).real.min())
@@ -89,7 +89,7 @@ def holding_currents(
         ValueError: when a limit is passed, naming the motor, or the cables cannot give the wrench.
     """
     theta = model.declared if theta is None else theta
-    limits = model.premises.robot.drive.current_limits_A
+    limits = model.drive.current_limits_A
     near = limits.mean(axis=1) if near_A is None else np.asarray(near_A, dtype=np.float64)
     gains = evaluate(model.wrench_matrix, pose, theta)[0]
     if np.linalg.matrix_rank(gains) < 6:

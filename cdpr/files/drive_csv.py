@@ -46,8 +46,8 @@ def read_drive_run(path: Path | str, n: int) -> DriveRecord:
     check = _Table(path, table, lines)
     check.full(slice(0, 1 + 3 * n), run_columns(n))
     poses = check.poses(table[:, 1 + 3 * n : 8 + 3 * n])
-    blocks = [table[:, 1 + k * n : 1 + (k + 1) * n] for k in range(3)]
-    return DriveRecord(table[:, 0], *blocks, poses)
+    currents, references, angles = (table[:, 1 + k * n : 1 + (k + 1) * n] for k in range(3))
+    return DriveRecord(table[:, 0], currents, references, angles, poses)
 
 
 def read_static(path: Path | str, n: int) -> tuple[Array, Array, Array]:

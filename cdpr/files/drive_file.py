@@ -158,7 +158,8 @@ def read_motors(reader: Reader, cables: tuple[Reader, ...], named: Named) -> tup
             for key in (*MOTOR_NUMBERS, *LIMITS):
                 own_reader.raw(key, required=False)
             own_reader.finish()
-        where = {key: own_reader if key in own else reader for key in common}
+        stated = reader if own_reader is None else own_reader
+        where = {key: stated if key in own else reader for key in common}
         motors.append(_motor(where, {**common, **own}, frozenset(own), named))
     return tuple(motors)
 

@@ -92,7 +92,7 @@ def _read_tolerances(reader: Reader | None) -> Tolerances:
     return Tolerances() if reader.problems else Tolerances(**known)
 
 
-def _columns(points: list[Points]) -> Points:
+def _columns(points: list[Points]) -> tuple[tuple[Point, ...], tuple[Point, ...]]:
     """Formulas of all entries, and of all attachments."""
     return tuple(entry for entry, _ in points), tuple(attachment for _, attachment in points)
 
@@ -143,7 +143,8 @@ def _own_tolerances(known: Tolerances) -> dict[str, float]:
 
 
 CableValues = tuple[str, Array, float, Array, Array, Array, Array]
-Points = tuple[tuple[Formula, ...], tuple[Formula, ...]]
+Point = tuple[Formula, ...]
+Points = tuple[Point, Point]
 
 
 def _read_gravity(reader: Reader) -> Array:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
@@ -24,6 +25,9 @@ SIZES = np.exp(np.arange(-4.0, 3.0, 0.12))  # of the guessed tensor: a pen to a 
 RIDGE = 1e-4  # of a column's variance: equal modes share what they cannot tell apart
 TYPICAL_YAW_RAD = 0.09  # five degrees: a twist by hand
 LEVER_M = 1.0  # metres that turn a channel's gain for yaw into a first one for sway
+
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -236,7 +240,7 @@ def best_size(
     return float(fine[int(np.argmin([score(size) for size in fine]))])
 
 
-def thinned(views: Sequence[Sight], most: int) -> list[Sight]:
+def thinned(views: Sequence[T], most: int) -> list[T]:
     """At most so many of the views, spread over all: a scan needs no more."""
     step = max(1, len(views) // most)
     return list(views[::step][:most])

@@ -53,6 +53,7 @@ class Chart:
         """
         pose, speed = np.split(numbers, 2)
         state = np.concatenate([self.zeta + self.free @ pose, self.free @ speed])
+        gap = np.full(12, np.inf)
         for _ in range(_SWEEPS):
             gap, slope, _ = self._conditions(state, numbers, lengths_m, time_s, inertia, values)
             step = np.linalg.solve(slope, gap)

@@ -77,7 +77,7 @@ class BenchResult:
         covariance = slope @ found.covariance_of("platform") @ slope.T
         block = self.solved.first.block("platform")
         spread = np.zeros(10) if block.prior is None else np.array(block.prior.std)
-        spread = np.where(block.estimated, spread, 0.0)
+        spread = np.where(block.mask, spread, 0.0)
         before = np.sum((slope * spread) ** 2, axis=1)
         values, variances = specific(moments(body)), np.diag(covariance)
         rows = []

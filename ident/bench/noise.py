@@ -40,8 +40,8 @@ def rescaled(
         fastest_hz: highest frequency of their small oscillations.
         coloured: whether power near the swing counts, and not the size alone.
     """
-    shared = sum(int(block.estimated.sum()) for block in found.unknowns.shared)
-    own = sum(int(block.estimated.sum()) for block in found.unknowns.own)
+    shared = sum(int(block.mask.sum()) for block in found.unknowns.shared)
+    own = sum(int(block.mask.sum()) for block in found.unknowns.own)
     columns = sum(len(swing.columns) for swing in swings)
     used = (shared + own * len(swings)) / columns
     colours = _colours(swings, found, fastest_hz, used) if coloured else {}

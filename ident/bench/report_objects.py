@@ -47,7 +47,7 @@ def told_object(solved: Solved, block: str, given: Array, one_way: bool) -> list
     found, unknown = solved.solution, solved.first.block(block)
     value, covariance = found.value(block), found.covariance_of(block)
     prior = np.full(10, np.inf) if unknown.prior is None else np.array(unknown.prior.std)
-    prior = np.where(unknown.estimated, prior, 0.0)
+    prior = np.where(unknown.mask, prior, 0.0)
     variances = np.diag(covariance) + _of_second_order(value, covariance)
     rows = []
     for k, name in enumerate(BODY_NAMES):

@@ -94,7 +94,7 @@ def _rough(swings: tuple[BenchSwing, ...], unknowns: Unknowns) -> Unknowns:
                 name = f"channel.{column.channel.name}"
                 block = unknowns.block(name)
                 straight = np.arange(block.size) < len(column.channel.coordinates)
-                bent[name] = replace(block, estimated=block.estimated & straight)
+                bent[name] = replace(block, estimated=block.mask & straight)
     if not bent:
         return unknowns
     held = Unknowns(tuple(bent.get(block.name, block) for block in unknowns.blocks))
@@ -140,7 +140,7 @@ def _mass(
         return found, verdict
     value: Array = np.array(block.value)
     value[0] = declared
-    estimated = np.array(block.estimated)
+    estimated = np.array(block.mask)
     estimated[0] = False
     trusted = replace(block, value=value, estimated=estimated)
     held = Unknowns(

@@ -66,7 +66,7 @@ def _times(run: DriveRun) -> list[str]:
 def _currents(session: DriveSession, run: DriveRun) -> list[str]:
     """Measured currents against what the references make flow."""
     flows = flowing(session.model, session.model.declared, run)
-    limit = session.model.robot.drive.current_limits_A[:, 1].max()
+    limit = session.model.drive.current_limits_A[:, 1].max()
     for what, values in (("I", run.record.currents_A), ("Iref", run.record.references_A)):
         if np.abs(values).max() > MILLI * limit:
             return [

@@ -33,7 +33,7 @@ def poses_from_turns(
         ValueError: when the iteration does not settle: the angles fit no pose.
     """
     poses = np.array(np.broadcast_to(start, (len(turns), 7)))
-    slope = length_slope(model)
+    slope, shift = length_slope(model), np.full((len(turns), 6), np.inf)
     for _ in range(MOST_ITERATIONS):
         found, by_pose = evaluate(slope, poses, theta)
         gaps, jacobian = turns - found, by_pose @ pose_map(poses)

@@ -201,7 +201,7 @@ def predict(session: DriveSession, run: DriveRun, theta: Array, zero: Array) -> 
     gaps, angles = seen.angles * session.noise.angle_std_rad, run.record.angles_rad
     spread = np.sum((angles - angles.mean(axis=0)) ** 2, axis=0)
     share = np.sum(gaps**2, axis=0) / np.where(spread > 0.0, spread, np.nan)
-    limits = model.robot.drive.current_limits_A
+    limits = model.drive.current_limits_A
     asked = run.record.references_A
     return RunFit(
         run,
@@ -223,9 +223,7 @@ def _start(session: DriveSession, run: DriveRun, theta: Array, zero: Array) -> t
     pose = start_pose(model, theta, run, zero)
     seen = compared(short, simulated(model, theta, short, pose), zero, session.noise, NOTHING)
     n_start = N_POSE + model.n_cables
-    columns = np.vstack(
-        [part.reshape(-1, n_start) for part in (seen.angle_slopes, seen.pose_slopes)]
-    )
+    columns = np.vstack([part.reshape(-1, n_start) for part in seen.slopes])
     gaps = np.concatenate([seen.angles.reshape(-1), seen.poses.reshape(-1)])
     known = np.zeros(n_start)
     known[N_POSE:] = session.noise.current_std_A**-2.0

@@ -59,20 +59,25 @@ def inverse_dynamics(
     blocks = [_rows(model, theta, asked, run, zero) for run in runs]
     matrix = np.concatenate([block[0] for block in blocks])
     right = np.concatenate([block[1] for block in blocks])
-    weight = np.ones(6)
-    for _ in range(3):  # the second round weighs forces and moments by what they leave
-        a = (matrix * weight[:, None]).reshape(-1, matrix.shape[-1])
-        b = (right * weight).reshape(-1)
-        lengths = np.linalg.norm(a, axis=0)
-        lengths = np.where(lengths > 0.0, lengths, 1.0)
-        values = np.linalg.lstsq(a / lengths, b, rcond=None)[0] / lengths
+    a, b, lengths, values = _weighted(matrix, right, np.ones(6))
+    for _ in range(2):  # the second round weighs forces and moments by what they leave
         left = right - matrix @ values
         weight = 1.0 / np.sqrt(np.mean(left**2, axis=0) + 1e-30)
+        a, b, lengths, values = _weighted(matrix, right, weight)
     scaled = a / lengths
     inverse = np.linalg.pinv(scaled.T @ scaled) / np.outer(lengths, lengths)
     variance = np.mean((b - a @ values) ** 2)
     condition = float(np.linalg.cond(scaled))
     return Regression(values, np.sqrt(variance * np.diag(inverse)), condition)
+
+
+def _weighted(matrix: Array, right: Array, weight: Array) -> tuple[Array, Array, Array, Array]:
+    """Rows a (m, k) and right side b (m,) weighted, the columns' lengths (k,) and the solution."""
+    a = (matrix * weight[:, None]).reshape(-1, matrix.shape[-1])
+    b = (right * weight).reshape(-1)
+    lengths = np.linalg.norm(a, axis=0)
+    lengths = np.where(lengths > 0.0, lengths, 1.0)
+    return a, b, lengths, np.linalg.lstsq(a / lengths, b, rcond=None)[0] / lengths
 
 
 def _rows(

@@ -159,12 +159,13 @@ class Problem:
             cost, count = cost + known * (first @ first) / 2, count + len(first)
             gradient[at] += known * first
             matrix[at, at] += known
-        for p in range(self.n_static):
-            part, place = self._static(p, x, theta, zero, by_zero)
+        static = self.given.static
+        for p in range(0 if static is None else len(static.poses)):
+            part, place = self._static(static, p, x, theta, zero, by_zero)
             cost, count = cost + part.cost, count + part.n
             gradient[place] += part.gradient
             matrix[np.ix_(place, place)] += part.matrix
-        return Normal(cost, gradient, matrix, count)
+        return Normal(float(cost), gradient, matrix, count)
 
     def scores(self, x: Array, at: Normal) -> Array:
         """Covariance of the gradient: the runs' own, white for the static poses, (size, size)."""
@@ -182,18 +183,19 @@ class Problem:
     def _spread(self, seen: Seen, by_zero: Array) -> Seen:
         """Slopes by start and all shared unknowns: the zero's own are added."""
         more = by_zero / self.given.noise.angle_std_rad
-        shape = (*seen.angle_slopes.shape[:2], self.n_start + self.n_shared)
+        by_angle, by_pose = seen.slopes
+        shape = (*by_angle.shape[:2], self.n_start + self.n_shared)
         angles = np.zeros(shape)
-        angles[..., : self.n_start + self.k] = seen.angle_slopes
+        angles[..., : self.n_start + self.k] = by_angle
         angles[..., self.n_start :] += more
         poses = np.zeros((len(seen.poses), 6, shape[-1]))
-        poses[..., : self.n_start + self.k] = seen.pose_slopes
+        poses[..., : self.n_start + self.k] = by_pose
         return Seen(seen.motion, seen.angles, seen.poses, seen.rows, angles, poses)
 
     def _static(
-        self, p: int, x: Array, theta: Array, zero: Array, by_zero: Array
+        self, static: StaticPoses, p: int, x: Array, theta: Array, zero: Array, by_zero: Array
     ) -> tuple[Normal, NDArray[np.intp]]:
-        static, n = self.given.static, self.given.model.n_cables
+        n = self.given.model.n_cables
         own = self.n_shared + self.n_start * len(self.given.runs) + 6 * p + np.arange(6)
         pose = moved(static.poses[p], x[own])
         found = evaluate(length_slope(self.given.model, self.asked.members), pose, theta)
@@ -205,7 +207,7 @@ class Problem:
         rows[n:, self.n_shared :] = np.diag(1.0 / static.pose_std)
         gaps = weight * (zero - found[0] - static.angles_rad[p])
         right = np.concatenate([gaps, x[own] / static.pose_std])
-        part = Normal(right @ right / 2, rows.T @ right, rows.T @ rows, len(right))
+        part = Normal(float(right @ right) / 2, rows.T @ right, rows.T @ rows, len(right))
         return part, np.concatenate([np.arange(self.n_shared), own])
 
 
@@ -275,10 +277,9 @@ def _sandwich(inverse: Array, scores: Array, known: NDArray[np.bool_]) -> Array:
 
 
 def _normal(seen: Seen) -> Normal:
-    size = seen.angle_slopes.shape[-1]
-    columns = np.vstack([seen.angle_slopes.reshape(-1, size), seen.pose_slopes.reshape(-1, size)])
+    columns = np.vstack([part.reshape(-1, part.shape[-1]) for part in seen.slopes])
     right = np.concatenate([seen.angles.reshape(-1), seen.poses.reshape(-1)])
-    return Normal(right @ right / 2, columns.T @ right, columns.T @ columns, len(right))
+    return Normal(float(right @ right) / 2, columns.T @ right, columns.T @ columns, len(right))
 
 
 def _lagged(seen: Seen) -> float:

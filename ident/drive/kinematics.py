@@ -84,7 +84,7 @@ def as_published(
     def normal(x: Array) -> Normal:
         gaps, jacobian = residuals(x)
         flat, columns = gaps.reshape(-1), jacobian.reshape(-1, len(x))
-        return Normal(flat @ flat / 2, columns.T @ flat, columns.T @ columns, len(flat))
+        return Normal(float(flat @ flat) / 2, columns.T @ flat, columns.T @ columns, len(flat))
 
     ended = minimise(normal, np.concatenate(start))
     gaps, _ = residuals(ended.values)
@@ -158,7 +158,7 @@ def _assembled(gaps, shared, by_pose, x, n_shared, seen) -> Normal:
         cost += right @ right / 2
         gradient += rows.T @ right
         matrix += rows.T @ rows
-    return Normal(cost, gradient, matrix, gaps.size + 6 * n_poses)
+    return Normal(float(cost), gradient, matrix, gaps.size + 6 * n_poses)
 
 
 def _zero_of(model, theta, asked, zero_pose, x) -> Array:

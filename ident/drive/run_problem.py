@@ -76,6 +76,17 @@ class Seen:
     angle_slopes: Array | None
     pose_slopes: Array | None
 
+    @property
+    def slopes(self) -> tuple[Array, Array]:
+        """Of angles and of poses.
+
+        Raises:
+            ValueError: where none were asked for.
+        """
+        if self.angle_slopes is None or self.pose_slopes is None:
+            raise ValueError("the run was compared without slopes")
+        return self.angle_slopes, self.pose_slopes
+
 
 def simulated(
     model: DrivenModel,
@@ -170,8 +181,9 @@ def score_matrix(seen: Seen) -> Array:
 
     Newey and West's estimate with a triangular window of `SCORE_WINDOW_S`.
     """
-    scores = np.einsum("tnk,tn->tk", seen.angle_slopes, seen.angles)
-    np.add.at(scores, seen.rows, np.einsum("pik,pi->pk", seen.pose_slopes, seen.poses))
+    by_angle, by_pose = seen.slopes
+    scores = np.einsum("tnk,tn->tk", by_angle, seen.angles)
+    np.add.at(scores, seen.rows, np.einsum("pik,pi->pk", by_pose, seen.poses))
     period = seen.motion.times_s[1] - seen.motion.times_s[0]
     window = max(1, round(SCORE_WINDOW_S / period))
     size = 2 * len(scores)

@@ -31,11 +31,13 @@ class Swing(Protocol):
     def simulated(self, values: Mapping[str, Array]) -> Any:
         """What is costly at the values of the blocks, once; ValueError: no motion there."""
 
-    def residuals(self, values: Mapping[str, Array], made: Any) -> Array:
+    def residuals(self, values: Mapping[str, Array], made: Any, /) -> Array:
         """Whitened residuals (m,) at values, of which `made` was simulated."""
         ...
 
-    def linearised(self, values: Mapping[str, Array], made: Any) -> tuple[Array, dict[str, Array]]:
+    def linearised(
+        self, values: Mapping[str, Array], made: Any, /
+    ) -> tuple[Array, dict[str, Array]]:
         """The same with their slopes (m, size) by block; a block left out has none."""
         ...
 

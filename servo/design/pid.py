@@ -27,7 +27,7 @@ def task_pid(mass: Array, speeds_rad_s: Array, slowest_filter_rad_s: Array) -> S
     w = np.asarray(speeds_rad_s, dtype=np.float64)
     n = np.maximum(FILTER * w, slowest_filter_rad_s)
     zero = np.zeros((6, 6))
-    A = scipy.linalg.block_diag(zero, -np.diag(n))
+    A = np.asarray(scipy.linalg.block_diag(zero, -np.diag(n)), dtype=np.float64)
     B = np.vstack([np.eye(6), np.diag(n)])
     C = np.hstack([mass * w**3, -mass * (3.0 * w * n)])
     return StateSpace(A, B, C, mass * (3.0 * w**2 + 3.0 * w * n))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -65,7 +66,7 @@ def look_at(found: Controller, plant: Plant, order: Order) -> Found:
 
 def survey_document(
     model: DrivenModel, order: Order, progress: Callable[[str, float], None]
-) -> dict[str, object]:
+) -> dict[str, Any]:
     """The grid, the rays and the draws as robustness.json, with sentences."""
     found = offer(model, "hinf", order)
     delay = order.plant(model).delay_s
@@ -91,7 +92,7 @@ Look = Callable[..., Found]
 
 def _grid(
     model: DrivenModel, at: Look, progress: Callable[[str, float], None]
-) -> list[dict[str, object]]:
+) -> list[dict[str, Any]]:
     """Five places an axis in the middle 60 % of the frame."""
     reach = 0.6 * np.abs(model.robot.entries_m).max(axis=0)
     shares = np.linspace(-1.0, 1.0, 5)
@@ -106,7 +107,7 @@ def _grid(
 
 def _rays(
     model: DrivenModel, at: Look, progress: Callable[[str, float], None]
-) -> list[dict[str, object]]:
+) -> list[dict[str, Any]]:
     """Along each axis and angle from the centre: where the controller first fails, by bisection."""
     reach = np.r_[np.abs(model.robot.entries_m).max(axis=0), np.full(3, np.pi / 3)]
     rows = []
@@ -129,7 +130,7 @@ def _rays(
 
 def _draws(
     model: DrivenModel, order: Order, at: Look, progress: Callable[[str, float], None]
-) -> dict[str, object]:
+) -> dict[str, Any]:
     """The worst of `DRAWS` robots about the declared one, numbers independent of each other."""
     rng = np.random.default_rng(0)
     rows = []
@@ -154,7 +155,7 @@ def _draws(
     }
 
 
-def _row(seen: Found) -> dict[str, object]:
+def _row(seen: Found) -> dict[str, Any]:
     return {
         "stable": seen.stable,
         "margins": {"position": seen.position, "orientation": seen.orientation},
@@ -163,7 +164,7 @@ def _row(seen: Found) -> dict[str, object]:
 
 
 def _sentences(
-    grid: list[dict[str, object]], rays: list[dict[str, object]], draws: dict[str, object]
+    grid: list[dict[str, Any]], rays: list[dict[str, Any]], draws: dict[str, Any]
 ) -> list[str]:
     held = sum(bool(row["stable"]) for row in grid)
     said = [f"stable at {held} of {len(grid)} places in the middle 60 % of the frame"]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -94,9 +93,9 @@ def read_controller(path: Path | str) -> Stored:
         matrices = [np.array(table[key], dtype=np.float64) for key in "ABCD"]
         order = int(table["order"])
         shapes = ((order, order), (order, 6), (6, order), (6, 6))
-        shaped = [m.reshape(s) for m, s in zip(matrices, shapes, strict=True)]
+        A, B, C, D = (m.reshape(s) for m, s in zip(matrices, shapes, strict=True))
         wrench = np.array(table["operating_point"]["wrench"], dtype=np.float64).reshape(6)
-        system = StateSpace(*shaped, 1.0 / rate)
+        system = StateSpace(A, B, C, D, 1.0 / rate)
         method = str(table.get("method", "hinf"))
     except (KeyError, TypeError, ValueError, ZeroDivisionError) as error:
         raise InputError(
@@ -121,7 +120,7 @@ def mat_bytes(found: Controller) -> bytes:
     return buffer.getvalue()
 
 
-def _arrays(found: Controller) -> Mapping[str, Array]:
+def _arrays(found: Controller) -> dict[str, Any]:
     k, c = found.sampled, found.system
     return {
         "A": k.A, "B": k.B, "C": k.C, "D": k.D, "period_s": np.array(k.period_s),

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from freeswing.cdpr.files.documents import InputError, replace_file
 from freeswing.cdpr.files.number_table import check_width, comma_separated, read_lines, read_numbers
@@ -32,7 +33,7 @@ class WrenchTable:
 
     poses: Array
     wrenches: Array
-    lines: Array
+    lines: NDArray[np.intp]
 
     def __post_init__(self) -> None:
         freeze(self, "poses", "wrenches", "lines")
@@ -82,7 +83,7 @@ def _check_header(path: Path | str, names: tuple[str, ...]) -> None:
 
 
 def _check_rows(
-    path: Path | str, values: Array, lines: Array, reach_m: Array, most_moment: float
+    path: Path | str, values: Array, lines: NDArray[np.intp], reach_m: Array, most_moment: float
 ) -> None:
     outside = np.argwhere(np.abs(values[:, :3]) > reach_m)
     if len(outside):

@@ -201,7 +201,7 @@ class _Brain:
     def _pose_from_angles(self) -> Array:
         """Least squares of d theta = -J~ dX by the wrench matrix: W_I = -J~' k_em in base axes."""
         gear = self._here.wrench_matrix.T / self._motors.torque_N_m_A[:, None]
-        return np.linalg.pinv(gear)
+        return np.asarray(np.linalg.pinv(gear), dtype=np.float64)
 
     def _with_friction(self, answer: Currents, angles: Array) -> Currents:
         feed = self._loop.friction

@@ -23,7 +23,7 @@ def zero_order_hold(system: StateSpace, period_s: float) -> StateSpace:
     n, m = system.order, system.n_inputs
     whole = np.zeros((n + m, n + m))
     whole[:n, :n], whole[:n, n:] = system.A, system.B
-    step = scipy.linalg.expm(whole * period_s)
+    step = np.asarray(scipy.linalg.expm(whole * period_s), dtype=np.float64)
     return StateSpace(step[:n, :n], step[:n, n:], system.C, system.D, period_s)
 
 

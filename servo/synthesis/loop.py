@@ -72,7 +72,8 @@ def delay_margin(plant: StateSpace, controller: StateSpace) -> float:
     Where an eigenvalue of G K has size 1, at w, the delay (pi + its angle) / w puts it on -1.
     Infinite where none ever has.
     """
-    values = _tracked(np.linalg.eigvals(open_response(plant, controller, RATES_RAD_S)))
+    values = np.linalg.eigvals(open_response(plant, controller, RATES_RAD_S))
+    values = _tracked(np.asarray(values, dtype=np.complex128))
     size = np.log(np.abs(values))
     least = np.inf
     for k, i in zip(*np.nonzero(size[:-1] * size[1:] < 0.0), strict=True):
@@ -97,7 +98,8 @@ def _tracked(values: Complex) -> Complex:
 
 def _sensitivity(open_loop: Complex, rates: Array, delay_s: float) -> Complex:
     late = np.exp(-1j * rates * delay_s)[:, None, None]
-    return np.linalg.inv(np.eye(open_loop.shape[1]) + open_loop * late)
+    found = np.linalg.inv(np.eye(open_loop.shape[1]) + open_loop * late)
+    return np.asarray(found, dtype=np.complex128)
 
 
 def _half(S: Complex) -> Half:

@@ -7,9 +7,11 @@ section 17.1. A standard problem is a plant whose inputs are [w, u] and whose ou
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any, cast
 
 import numpy as np
 import scipy.linalg
+from numpy.typing import NDArray
 
 from freeswing.servo.synthesis.state_space import Array, StateSpace
 
@@ -210,19 +212,27 @@ def _stable_subspace(H: Array) -> Array | None:
     """A basis (2n, n) of what belongs to the n eigenvalues left of the axis, if so many are."""
     size = len(H) // 2
     try:
-        T, Z, n_stable = scipy.linalg.schur(H, output="real", sort="lhp")
+        T, Z, n_stable = _sorted_schur(H, "real")
     except np.linalg.LinAlgError:
         # Real pairs of nearly equal eigenvalues sometimes cannot be swapped; single complex ones
         # always can, at about three times the cost.
-        T, Z, n_stable = scipy.linalg.schur(H, output="complex", sort="lhp")
-    rates = np.diag(T) if np.iscomplexobj(T) else scipy.linalg.eigvals(T[:n_stable, :n_stable])
+        T, Z, n_stable = _sorted_schur(H, "complex")
+    own = T[:n_stable, :n_stable]
+    rates = np.diag(T) if np.iscomplexobj(T) else np.asarray(scipy.linalg.eigvals(own))
     # Closer to the axis than rounding can tell from on it.
     if n_stable != size or -rates[:size].real.max() <= 1e-13 * np.abs(T).max():
         return None
     if not np.iscomplexobj(Z):
         return Z[:, :size]
-    real, _, _ = scipy.linalg.qr(np.hstack([Z[:, :size].real, Z[:, :size].imag]), pivoting=True)
-    return real[:, :size]
+    parts = np.hstack([Z[:, :size].real, Z[:, :size].imag])
+    return np.asarray(scipy.linalg.qr(parts, pivoting=True)[0])[:, :size]
+
+
+def _sorted_schur(H: Array, output: str) -> tuple[NDArray[Any], NDArray[Any], int]:
+    """T and Z of H = Z T Z^H, eigenvalues left of the axis first, and how many those are."""
+    return cast(
+        "tuple[NDArray[Any], NDArray[Any], int]", scipy.linalg.schur(H, output=output, sort="lhp")
+    )
 
 
 def central_controller(n: Normalised, solution: Solution) -> StateSpace:

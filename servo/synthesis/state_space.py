@@ -55,7 +55,7 @@ class StateSpace:
 
     def poles(self) -> Complex:
         """Eigenvalues of A."""
-        return np.linalg.eigvals(self.A) if self.order else np.zeros(0, np.complex128)
+        return np.asarray(np.linalg.eigvals(self.A), dtype=np.complex128)
 
     def is_stable(self) -> bool:
         """Every pole strictly left of the axis, or inside the circle of a discrete system."""
@@ -67,7 +67,7 @@ class StateSpace:
     def at(self, rates_rad_s: Array) -> Complex:
         """Response at the given rates, (n_rates, n_outputs, n_inputs)."""
         s = 1j * np.atleast_1d(rates_rad_s)
-        point = s if self.period_s is None else np.exp(s * self.period_s)
+        point = np.asarray(s if self.period_s is None else np.exp(s * self.period_s))
         # One Hessenberg form serves all rates: n^2 instead of n^3 work at each.
         return _response(self.A, self.B, self.C, self.D, point)
 
@@ -87,7 +87,9 @@ def gain(matrix: Array) -> StateSpace:
 
 def append(*systems: StateSpace) -> StateSpace:
     """Side by side: block-diagonal, each with inputs and outputs of its own."""
-    blocks = [scipy.linalg.block_diag(*[getattr(s, name) for s in systems]) for name in "AD"]
+    A, D = (
+        np.asarray(scipy.linalg.block_diag(*[getattr(s, name) for s in systems])) for name in "AD"
+    )
     order, outputs, inputs = (
         sum(s.order for s in systems),
         sum(s.n_outputs for s in systems),
@@ -99,7 +101,7 @@ def append(*systems: StateSpace) -> StateSpace:
         B[i : i + s.order, j : j + s.n_inputs] = s.B
         C[k : k + s.n_outputs, i : i + s.order] = s.C
         i, j, k = i + s.order, j + s.n_inputs, k + s.n_outputs
-    return StateSpace(blocks[0].reshape(order, order), B, C, blocks[1], systems[0].period_s)
+    return StateSpace(A.reshape(order, order), B, C, D, systems[0].period_s)
 
 
 def series(first: StateSpace, second: StateSpace) -> StateSpace:

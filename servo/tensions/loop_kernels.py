@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numba
 import numpy as np
+from numpy.typing import NDArray
 
 from freeswing.servo.synthesis.state_space import Array
 from freeswing.servo.tensions.method_kernels import closed_form_point, paper_point
@@ -82,7 +83,7 @@ def distribute(
 @numba.njit(cache=True, nogil=True)
 def distribute_rows(
     A: Array, b: Array, offset: Array, lower: Array, upper: Array, wish: Array, method: int
-) -> tuple[Array, Array, Array, Array]:
+) -> tuple[Array, NDArray[np.int64], Array, NDArray[np.int64]]:
     """`distribute` for arrays with one row a wrench: x, status, scale, stops."""
     rows, n = A.shape[0], A.shape[2]
     x, scale = np.empty((rows, n)), np.empty(rows)

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import numba
 import numpy as np
+from numpy.typing import NDArray
 
 from freeswing.servo.synthesis.state_space import Array
 from freeswing.servo.tensions.polygon_kernels import Point
+
+Mask = NDArray[np.bool_]
 
 
 @numba.njit(cache=True, nogil=True)
@@ -42,7 +45,7 @@ def paper_point(N: Array, below: Array, above: Array, slack: float, repeated: bo
 
 @numba.njit(cache=True, nogil=True)
 def _try_all(
-    N: Array, below: Array, above: Array, slack: float, candidate: Array, grown: Array
+    N: Array, below: Array, above: Array, slack: float, candidate: Mask, grown: Mask
 ) -> tuple[bool, float, float]:
     n = N.shape[0]
     for a in range(2 * n):
@@ -124,7 +127,7 @@ def _on_two(N: Array, below: Array, above: Array, a: int, b: int) -> tuple[bool,
 
 @numba.njit(cache=True, nogil=True)
 def _mark_violated(
-    N: Array, below: Array, above: Array, u: float, v: float, slack: float, marks: Array
+    N: Array, below: Array, above: Array, u: float, v: float, slack: float, marks: Mask
 ) -> bool:
     """Mark every violated bound; whether there was any."""
     any_violated = False

@@ -57,7 +57,7 @@ def run_drive(options: Namespace, console: Console) -> None:
     generator = np.random.default_rng(options.seed)
     model, theta, values = driven_model(options)
     asked, rate_hz = _references(model, options, generator)
-    limits = model.robot.drive.current_limits_A
+    limits = model.drive.current_limits_A
     references = np.clip(asked, limits[:, 0], limits[:, 1])
     still = np.zeros(model.n_cables)
     if options.elastic_n is not None and not options.elastic_n > 0.0:
@@ -183,7 +183,7 @@ def _check_limits(model: DrivenModel, levels: tuple[float, ...]) -> None:
     """Currents beyond what the motors take would be cut off there."""
     from freeswing.cdpr.files.documents import InputError
 
-    limits = model.robot.drive.current_limits_A
+    limits = model.drive.current_limits_A
     if levels[0] < limits[:, 0].max() or levels[1] > limits[:, 1].min():
         raise InputError(
             f"--levels-a {levels[0]:g} {levels[1]:g}: outside current_limits_A "
