@@ -25,14 +25,15 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from freeswing.calib.calibrate import calibrate_session
 from freeswing.calib.camera.camera import Camera
-from freeswing.calib.camera.cameras_file import read_cameras
+from freeswing.calib.camera.cameras_file import read_cameras, write_cameras
+from freeswing.cdpr.files.documents import write_json
 from freeswing.cdpr.files.trajectory_files import read_trajectory
 from freeswing.cdpr.measured.target import Target
 from freeswing.cdpr.rotation import exp_rotation, log_rotation
 from freeswing.vision.render.patterns import charuco_patch, plain_patch
 from freeswing.vision.render.record import record
 from freeswing.vision.rig.rig_effects import moved_by
-from freeswing.vision.track_session import track_session
+from tests.vision.films import tracked
 from tests.vision.scenes import (
     SurveyedTag,
     arc_of_cameras,
@@ -148,13 +149,9 @@ def main() -> None:
     if not (folder / "cameras.toml").is_file():
         film_calibration(folder / "calibration", truth)
         start = time.perf_counter()
-        calibrate_session(
-            folder / "calibration",
-            BOARD,
-            base,
-            cameras_path=folder / "cameras.toml",
-            results_folder=folder,
-        )
+        found = calibrate_session(folder / "calibration", BOARD, base)
+        write_cameras(folder / "cameras.toml", found.cameras)
+        write_json(folder / "calibration.json", found.document)
         print(f"calibrated in {time.perf_counter() - start:.1f} s")
     rows = []
     for scenario in options.scenarios:
@@ -164,7 +161,7 @@ def main() -> None:
             (folder / scenario).mkdir(exist_ok=True)
             shutil.copy(folder / "calibration.json", folder / scenario)
         start = time.perf_counter()
-        document = track_session(
+        document = tracked(
             [run], cameras, Target(platform_tags()), results=folder / scenario, base_tags=base,
             workers=1,
         )  # fmt: skip

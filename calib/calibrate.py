@@ -1,4 +1,4 @@
-"""The whole calibration: recordings in, cameras.toml and results/calibration.json out."""
+"""The whole calibration: recordings in, cameras and the content of calibration.json out."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ from freeswing.calib.board.boards import Board, board_from
 from freeswing.calib.board.recordings import find_recordings
 from freeswing.calib.board.sightings import Sightings, gather, see_boards
 from freeswing.calib.camera.camera import Camera
-from freeswing.calib.camera.cameras_file import write_cameras
 from freeswing.calib.camera.intrinsics import CameraStart
 from freeswing.calib.camera.lens_choice import lens_warnings, weigh_lenses
 from freeswing.calib.camera.lens_models import Array
@@ -35,7 +34,7 @@ from freeswing.calib.verdict.plumb_line_file import read_plumb_line, vertical_en
 from freeswing.calib.verdict.survey_check import SurveyCheck, check_survey
 from freeswing.calib.verdict.trust import Verdict, judge
 from freeswing.calib.verdict.truth_checks import check_truth
-from freeswing.cdpr.files.documents import DataError, write_json
+from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.robot import STANDARD_GRAVITY_M_S2
 
 Progress = Callable[[str, float], None]
@@ -53,11 +52,13 @@ class CalibrationResult:
         cameras: the calibrated cameras.
         document: the content of results/calibration.json.
         rig: the adjustment behind it.
+        refused: why it must not be used; the document explains it.
     """
 
     cameras: tuple[Camera, ...]
     document: dict[str, Any]
     rig: Rig
+    refused: str | None = None
 
 
 def calibrate_session(
@@ -66,8 +67,7 @@ def calibrate_session(
     base_tags: Sequence[SurveyedTag] = (),
     *,
     frame_rate_hz: float | None = None,
-    cameras_path: Path | str | None = None,
-    results_folder: Path | str | None = None,
+    kept_boards: Path | str | None = None,
     model: str = DEFAULT_MODEL,
     survey_std_m: float | None = None,
     plumb_line: Path | str | None = None,
@@ -80,8 +80,7 @@ def calibrate_session(
 
         calibrate_session(
             calibration.recordings, calibration.board, calibration.base_tags,
-            frame_rate_hz=session.frame_rate_hz, cameras_path=session.cameras,
-            results_folder=session.results, progress=progress,
+            frame_rate_hz=session.frame_rate_hz, progress=progress,
         )
 
     Args:
@@ -90,8 +89,8 @@ def calibrate_session(
         base_tags: surveyed tags (family, id, corners_base_m); without them the frame of one camera
             is the base and the result warns of it.
         frame_rate_hz: nominal rate, where no stamps were recorded.
-        cameras_path: cameras.toml to write, None for none.
-        results_folder: takes calibration.json and the boards found so far, None for none.
+        kept_boards: folder that keeps the boards found so far, from where a call that was killed
+            goes on; None for none.
         model: lens model of every camera.
         survey_std_m: standard deviation of a surveyed coordinate; measured from the fit when None.
         plumb_line: points clicked along hanging strings, see `calib.verdict.plumb_line_file`, or
@@ -101,8 +100,8 @@ def calibrate_session(
 
     Raises:
         InputError: unreadable recordings or a board that makes no sense.
-        DataError: the recordings cannot give a calibration to be trusted; calibration.json is
-            still written where there is a result to explain, cameras.toml is left alone.
+        DataError: the recordings give no calibration at all; one that is not to be trusted is
+            returned as `refused`.
     """
     told = progress or _silent
     board = board if isinstance(board, Board) else board_from(board)
@@ -116,7 +115,7 @@ def calibrate_session(
         frame_rate_hz,
         _STILLS if base_tags else 0,
         lambda label, share: told(label, 0.7 * share),
-        None if results_folder is None else Path(results_folder) / KEPT_BOARDS,
+        None if kept_boards is None else Path(kept_boards),
     )
     told("adjusting", 0.7)
     board, said = settled_board(board, np.concatenate([s.pixels for s in sightings]))
@@ -149,14 +148,9 @@ def calibrate_session(
         document["vertical"] = vertical
     for entry, choice in zip(document["cameras"], lenses, strict=True):
         entry["lens_models_held_out_px"] = choice.held_out_px
-    if results_folder is not None:
-        write_json(Path(results_folder) / "calibration.json", document)
-    if not verdict.usable:
-        raise DataError("; ".join(["the calibration must not be used", *verdict.reasons]))
-    if cameras_path is not None:
-        write_cameras(cameras_path, rig.cameras)
     told("calibrated", 1.0)
-    return CalibrationResult(rig.cameras, document, rig)
+    why = "; ".join(["the calibration must not be used", *verdict.reasons])
+    return CalibrationResult(rig.cameras, document, rig, None if verdict.usable else why)
 
 
 def _vertical(rig: Rig, strings: tuple[StringView, ...], gravity_m_s2: Array) -> dict[str, Any]:

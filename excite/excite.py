@@ -13,13 +13,12 @@ from pathlib import Path
 
 import numpy as np
 
-from freeswing.cdpr.files.documents import DataError, replace_file, write_json
+from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.files.robot_file import read_robot
 from freeswing.cdpr.model.equations import build_model
 from freeswing.cdpr.model.free_motion import choose_free_coordinates
 from freeswing.cdpr.model.statics import random_poses
 from freeswing.cdpr.robot import Array, Robot
-from freeswing.cdpr.system.confine import results_folder
 from freeswing.excite.choose_swings import (
     Choice,
     choose,
@@ -48,40 +47,37 @@ def excite(
     path: Path | str,
     options: ExcitationOptions | None = None,
     progress: Progress | None = None,
-    results: Path | str | None = None,
-) -> dict:
-    """Plan the swings of a robot; write results/excitation.json, .csv and .svg beside its file.
-
-    With `options.winch`, excitation-release/<swing>.csv tells what each winch is to do.
+) -> tuple[dict, dict[str, str]]:
+    """Plan the swings of a robot.
 
     Args:
         path: robot.toml.
         options: what is asked.
         progress: told a label and a fraction from 0 to 1.
-        results: the folder to write to instead.
 
     Returns:
-        What was written: the document of FORMATS, "Start pose and excitation".
+        The content of excitation.json (FORMATS, "Start pose and excitation"), and further files
+        by their names in the same folder: excitation.csv and .svg, and with `options.winch`
+        excitation-release/<swing>.csv, what each winch is to do.
 
     Raises:
-        InputError: the robot file is wrong or a result cannot be written.
+        InputError: the robot file is wrong.
         DataError: the robot's values do not suffice, or it has no swing within the limits.
     """
-    path, options = Path(path), options or ExcitationOptions()
+    options = options or ExcitationOptions()
     say = progress or (lambda _label, _fraction: None)
-    results = results_folder(path.parent, results)
     bench = make_bench(read_robot(path), options)
     plan = plan_swings(bench, options, say)
     document = plan_document(bench, options, plan)
-    write_json(results / "excitation.json", document)
-    replace_file(results / "excitation.csv", plan_table(bench, plan).encode())
-    replace_file(results / "excitation.svg", swings_svg(bench, plan.swings).encode())
+    files = {
+        "excitation.csv": plan_table(bench, plan),
+        "excitation.svg": swings_svg(bench, plan.swings),
+    }
     for k, release in enumerate(plan.releases):
         if release is not None:
-            table = release_table(bench, release)
-            replace_file(results / "excitation-release" / f"{k + 1:02d}.csv", table.encode())
+            files[f"excitation-release/{k + 1:02d}.csv"] = release_table(bench, release)
     say("plan", 1.0)
-    return document
+    return document, files
 
 
 def make_bench(robot: Robot, options: ExcitationOptions) -> Bench:

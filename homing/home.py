@@ -14,9 +14,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from freeswing.cdpr.files.documents import DataError, write_json
+from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.robot import Robot
-from freeswing.cdpr.system.confine import results_folder
 from freeswing.homing.best_fit import best_fit, model_for
 from freeswing.homing.fit_start_pose import StartFit, StartProblem
 from freeswing.homing.guess_from_tensions import (
@@ -35,18 +34,15 @@ _DOUBTFUL_FIT = 4.0
 _WEIGHTS_OF_A_GUESS = 1.5
 
 
-def home(
-    path: Path | str, progress: Progress | None = None, results: Path | str | None = None
-) -> dict:
-    """Find the start pose that homing.toml's readings tell and write results/homing.json beside it.
+def home(path: Path | str, progress: Progress | None = None) -> dict:
+    """Find the start pose that homing.toml's readings tell.
 
     Args:
         path: homing.toml, or the folder that holds it.
         progress: told a label and a fraction from 0 to 1.
-        results: the folder to write to instead.
 
     Returns:
-        What was written: the document of FORMATS, "Start pose and excitation".
+        The content of homing.json: the document of FORMATS, "Start pose and excitation".
 
     Raises:
         InputError: a file is wrong.
@@ -57,12 +53,10 @@ def home(
     say = progress or (lambda _label, _fraction: None)
     say("reading", 0.0)
     homing = read_homing(path)
-    folder = results_folder(path.parent, results)
     say("start pose", 0.2)
     begun = time.perf_counter()
     fit = find_start(homing)
     document = homing_document(homing.robot, fit, time.perf_counter() - begun)
-    write_json(folder / "homing.json", document)
     say("start pose", 1.0)
     return document
 

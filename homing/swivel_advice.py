@@ -16,10 +16,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from freeswing.cdpr.files.documents import DataError, write_json
+from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.files.robot_file import read_robot
 from freeswing.cdpr.robot import Cable, Robot
-from freeswing.cdpr.system.confine import results_folder
 from freeswing.homing.acquisition import default_tensions
 from freeswing.homing.arrow_least_squares import covariance
 from freeswing.homing.fit_start_pose import StartProblem
@@ -57,15 +56,12 @@ class HomingQuality:
     conditioning: float
 
 
-def advise(
-    robot_path: Path | str, progress: Progress | None = None, results: Path | None = None
-) -> dict:
-    """Advise on the swivel axes and write results/homing-advice.json beside the robot file.
+def advise(robot_path: Path | str, progress: Progress | None = None) -> dict:
+    """Advise on the swivel axes: the content of homing-advice.json.
 
     Args:
         robot_path: robot.toml with the platform's mass and centre of mass.
         progress: told a label and a fraction from 0 to 1.
-        results: where to write homing-advice.json instead.
 
     Raises:
         InputError: the robot file is wrong.
@@ -79,7 +75,7 @@ def advise(
     if declared is None:
         raise DataError(f"{robot_path}: the pulleys as declared cannot be homed at all")
     better, quality = better_axes(robot, noise, say)
-    document = {
+    return {
         "format": "freeswing-homing-advice/1",
         "assumed_std": {
             "sigma_rad": noise.sigma_rad,
@@ -99,8 +95,6 @@ def advise(
             for new, old in zip(better.cables, robot.cables, strict=True)
         ],
     }
-    write_json(results_folder(robot_path.parent, results) / "homing-advice.json", document)
-    return document
 
 
 def better_axes(

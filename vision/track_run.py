@@ -1,4 +1,4 @@
-"""One run, from its cameras' sightings to its trajectory file."""
+"""One run, from its cameras' sightings to its trajectory."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.calib.camera.camera import Camera
-from freeswing.cdpr.files.trajectory_files import write_csv
 from freeswing.cdpr.measured.trajectory import Trajectory
 from freeswing.vision.fuse.calibration_share import CalibrationNoise, RunShare, run_share
 from freeswing.vision.fuse.fuse_cameras import Fit, free_of
@@ -41,9 +40,10 @@ class CameraCount:
 
 @dataclass(frozen=True, slots=True)
 class RunTrack:
-    """What became of a run; the trajectory itself is in its file."""
+    """What became of a run; no trajectory where no pose is known."""
 
     name: str
+    trajectory: Trajectory | None
     samples: int
     known: int
     rate_hz: float
@@ -62,11 +62,10 @@ def track_run(
     name: str,
     sources: Sequence[tuple[Camera, Sequence[Path]]],
     watch: Watch,
-    csv: Path,
     settings: Settings,
     noise: CalibrationNoise | None = None,
 ) -> RunTrack:
-    """Fuses a run's sightings, corrects the rig, and writes the trajectory when there is one.
+    """Fuses a run's sightings and corrects the rig.
 
     The trajectory's covariances are those of its scatter. What the calibration's own uncertainty
     adds is common to the whole run and stated apart, where `noise` tells it.
@@ -79,12 +78,11 @@ def track_run(
     share = None
     if noise is not None:
         share = run_share(poses, corrected.after, corrected.views, watch, noise)
-    if known:
-        write_csv(csv, trajectory_of(poses, watch))
     deviations = np.sqrt(np.diagonal(poses.covariances, axis1=1, axis2=2))
     steps = np.diff(poses.times_s)
     return RunTrack(
         name,
+        trajectory_of(poses, watch) if known else None,
         len(poses.times_s),
         known,
         float(1.0 / np.median(steps)) if len(steps) else float("nan"),

@@ -1,22 +1,22 @@
-"""Recorded runs to trajectories: every camera followed, all fused, results written.
+"""Recorded runs to trajectories: every camera followed, all fused.
 
 The call that the command line makes:
 
-    document = track_session(session.video_runs, read_cameras(session.cameras),
-                             read_target(session.target), base_tags=..., results=session.results,
-                             frame_rate_hz=session.frame_rate_hz, workers=0,
-                             progress=console.progress)
+    tracked = track_session(session.video_runs, read_cameras(session.cameras),
+                            read_target(session.target), base_tags=..., results=session.results,
+                            frame_rate_hz=session.frame_rate_hz, workers=0,
+                            progress=console.progress)
 
 `results/calibration.json`, where there is one, tells how far the calibration may shift the poses.
-The call writes `results/tracks/<run>.csv` and `results/tracking.json`, and keeps each camera's
-sightings under `results/tracks/.sightings`, from where a run that was killed goes on.
+The call writes no result; it keeps each camera's sightings under `results/tracks/.sightings`, from
+where one that was killed goes on.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Executor
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -25,8 +25,9 @@ from freeswing.calib.camera.camera import Camera
 from freeswing.calib.footage.condition import condition_of, torn_text
 from freeswing.calib.footage.frame_times import frame_times, needed
 from freeswing.calib.tags.base_tags import SurveyedTag
-from freeswing.cdpr.files.documents import DataError, InputError, write_json
+from freeswing.cdpr.files.documents import DataError, InputError
 from freeswing.cdpr.measured.target import Target
+from freeswing.cdpr.measured.trajectory import Trajectory
 from freeswing.vision.fuse.calibration_share import read_calibration_noise
 from freeswing.vision.fuse.tag_layout import layout_change, with_layout
 from freeswing.vision.jobs import Job, run_jobs
@@ -41,6 +42,21 @@ Progress = Callable[[str, float], None]
 
 _LAYOUT_ROUNDS = 3
 _FOLLOWING = 0.85  # share of the time that goes into the images
+
+
+@dataclass(frozen=True, slots=True)
+class Tracked:
+    """What `track_session` gives.
+
+    Attributes:
+        document: the content of results/tracking.json.
+        trajectories: of the runs in which the platform was seen, by name.
+        refused: why they must not be used; the document explains it.
+    """
+
+    document: dict[str, Any]
+    trajectories: dict[str, Trajectory]
+    refused: str | None = None
 
 
 class RecordedRun(Protocol):
@@ -64,14 +80,15 @@ def track_session(
     workers: int = 0,
     executor: Executor | None = None,
     progress: Progress | None = None,
-) -> dict[str, Any]:
-    """Tracks all runs and writes their trajectories and `tracking.json`.
+) -> Tracked:
+    """Tracks all runs.
 
     Args:
         runs: with `name` and `video`; those without a video are left out.
         cameras: as calibrated.
         target: what is on the platform.
-        results: the session's results folder.
+        results: the session's results folder, of which it reads calibration.json and keeps
+            sightings.
         base_tags: surveyed tags in the base, with `family`, `id`, `corners_base_m`.
         frame_rate_hz: serves recordings without time stamps.
         settings: see `Settings`.
@@ -80,12 +97,8 @@ def track_session(
             same files under the same names.
         progress: told a label and the fraction done.
 
-    Returns:
-        The document written to `tracking.json`.
-
     Raises:
         InputError: a recording is missing, unreadable or of another size than its camera.
-        DataError: in a run the platform was not seen.
     """
     settings = settings or Settings()
     watch = Watch.of(target, base_tags)
@@ -117,9 +130,8 @@ def track_session(
             tracks = _fuse(sources, watch, results, settings, workers, told)
     tracks = [replace(t, problems=(*remarks[t.name], *t.problems)) for t in tracks]
     document = tracking_document(tracks, watch, change, refined=settings.refine_layout)
-    write_json(results / "tracking.json", document)
-    _refuse_empty(tracks)
-    return document
+    known = {track.name: track.trajectory for track in tracks if track.trajectory is not None}
+    return Tracked(document, known, _empty_run(tracks))
 
 
 def sightings_folder(results: Path, run: str) -> Path:
@@ -185,7 +197,7 @@ def _fuse(
         Job(
             f"{name} fused",
             track_run,
-            (name, views, watch, results / "tracks" / f"{name}.csv", settings, noise),
+            (name, views, watch, settings, noise),
         )
         for name, views in sources
     ]
@@ -198,11 +210,13 @@ def _scaled(progress: Progress | None, low: float, high: float) -> Progress | No
     return lambda label, share: progress(label, low + (high - low) * share)
 
 
-def _refuse_empty(tracks: Sequence[RunTrack]) -> None:
-    empty = [track for track in tracks if track.known == 0]
-    if empty:
-        why = empty[0].problems[0] if empty[0].problems else "the platform was not seen"
-        raise DataError(
-            f"run {empty[0].name}: no pose in {empty[0].samples} frames: {why}. "
-            "Check target.toml (family, ids, sizes), the light and the focus"
-        )
+def _empty_run(tracks: Sequence[RunTrack]) -> str | None:
+    """Says in which run the platform was not seen, None where it was in all."""
+    empty = next((track for track in tracks if track.known == 0), None)
+    if empty is None:
+        return None
+    why = empty.problems[0] if empty.problems else "the platform was not seen"
+    return (
+        f"run {empty.name}: no pose in {empty.samples} frames: {why}. "
+        "Check target.toml (family, ids, sizes), the light and the focus"
+    )

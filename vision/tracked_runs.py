@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +22,7 @@ from freeswing.vision.look.pieces import Piece, load_piece
 from freeswing.vision.look.sightings import collect_sightings
 from freeswing.vision.look.target_check import examined_watch
 from freeswing.vision.look.watched_target import Watch
+from freeswing.vision.rig.rig_effects import Finding
 from freeswing.vision.track_session import RecordedRun, run_recordings, sightings_folder
 
 Array = NDArray[np.float64]
@@ -61,52 +60,66 @@ class TrackedRun:
     cameras: tuple[TrackedCamera, ...]
 
 
+@dataclass(frozen=True, slots=True)
+class FoundCameras:
+    """What tracking found of a session's cameras and tags.
+
+    Attributes:
+        seen: names of the cameras of each run.
+        findings: of each run.
+        corners_platform_m: of all tags where they were refined, (tags, 4, 3), else None.
+    """
+
+    seen: Mapping[str, tuple[str, ...]]
+    findings: Mapping[str, tuple[Finding, ...]]
+    corners_platform_m: Array | None = None
+
+    def on(self, run: str, camera: str) -> tuple[Finding, ...]:
+        """The findings on one camera in one run."""
+        return tuple(one for one in self.findings.get(run, ()) if one.camera == camera)
+
+
 def tracked_run(
     run: RecordedRun,
     cameras: Sequence[Camera],
     target: Target,
+    found: FoundCameras,
     *,
     results: Path,
     base_tags: Iterable[SurveyedTag] = (),
     frame_rate_hz: float | None = None,
 ) -> TrackedRun:
-    """A run after `track_session` with the same arguments.
+    """A run after `track_session` with the same arguments, and what that found.
 
     Raises:
         DataError: where it has not been tracked.
     """
-    csv, told = results / "tracks" / f"{run.name}.csv", results / "tracking.json"
-    if not csv.is_file() or not told.is_file():
+    csv = results / "tracks" / f"{run.name}.csv"
+    if not csv.is_file():
         raise DataError(f"run {run.name}: {csv} is not there; run freeswing track first")
-    document = json.loads(told.read_text(encoding="utf-8"))
-    found = run_recordings(run, cameras)
-    watch, _ = examined_watch(Watch.of(target, base_tags), found)
+    recordings = run_recordings(run, cameras)
+    watch, _ = examined_watch(Watch.of(target, base_tags), recordings)
     seen = []
-    for camera, recording in found:
+    for camera, recording in recordings:
         folder = sightings_folder(results, run.name)
         paths = collect_sightings(folder, camera, watch, recording, frame_rate_hz)
-        effects = [
-            effect
-            for effect in document["effects"]
-            if (effect["run"], effect["camera"]) == (run.name, camera.name)
-        ]
-        seen.append(TrackedCamera(as_found(camera, effects), recording, tuple(paths)))
-    if document["layout"]["refined"]:
-        corners = [tag["corners_platform_m"] for tag in document["layout"]["tags"]]
-        watch = with_layout(watch, np.array(corners, dtype=np.float64))
+        own = as_found(camera, found.on(run.name, camera.name))
+        seen.append(TrackedCamera(own, recording, tuple(paths)))
+    if found.corners_platform_m is not None:
+        watch = with_layout(watch, found.corners_platform_m)
     return TrackedRun(run.name, watch, read_trajectory(csv), tuple(seen))
 
 
-def as_found(camera: Camera, effects: Sequence[dict[str, Any]]) -> Camera:
-    """A calibrated camera with the effects of tracking.json that were found on it."""
-    for effect in effects:
-        told = {entry["name"]: float(entry["value"]) for entry in effect["parameters"]}
-        if effect["effect"] == "clock_offset":
+def as_found(camera: Camera, findings: Sequence[Finding]) -> Camera:
+    """A calibrated camera with what was found on it."""
+    for finding in findings:
+        told = {name: value for name, value, _ in finding.parameters}
+        if finding.effect == "clock_offset":
             offset = camera.clock_offset_s + told["offset_s"]
             camera = replace(camera, clock_offset_s=offset)
-        elif effect["effect"] == "rolling_shutter":
+        elif finding.effect == "rolling_shutter":
             camera = replace(camera, line_time_s=camera.line_time_s + told["line_time_s"])
-        elif effect["effect"] == "camera_moved":
+        elif finding.effect == "camera_moved":
             turn = np.array([told[f"rotation_{axis}_rad"] for axis in "xyz"])
             shift = np.array([told[f"shift_{axis}_m"] for axis in "xyz"])
             pose = camera.T_camera_base.copy()

@@ -13,7 +13,8 @@ import numpy as np
 
 from freeswing.calib.camera.camera import Camera
 from freeswing.calib.camera.lens_models import PARAMETER_NAMES, Array, focal_and_centre, normalise
-from freeswing.cdpr.files.documents import Problems, Reader, dump_toml, load_toml
+from freeswing.cdpr.files.documents import Problems, Reader, load_toml, replace_file
+from freeswing.cdpr.files.toml_text import toml_text
 from freeswing.cdpr.rotation import matrix_from_quaternion, quaternion_from_matrix, transform
 
 _UNIT_TOLERANCE = 1e-3
@@ -42,10 +43,13 @@ def read_cameras(path: Path | str) -> tuple[Camera, ...]:
 
 def write_cameras(path: Path | str, cameras: tuple[Camera, ...]) -> None:
     """Write cameras so that `read_cameras` gives them back to the last digit."""
-    dump_toml(
-        Path(path),
-        {"format": "freeswing-cameras/1", "cameras": [camera_entry(c) for c in cameras]},
-    )
+    replace_file(path, cameras_text(cameras).encode())
+
+
+def cameras_text(cameras: tuple[Camera, ...]) -> str:
+    """The same as text."""
+    entries = [camera_entry(camera) for camera in cameras]
+    return toml_text({"format": "freeswing-cameras/1", "cameras": entries})
 
 
 def camera_entry(camera: Camera) -> dict[str, Any]:

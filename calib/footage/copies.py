@@ -9,10 +9,9 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterable, Iterator
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 Image = NDArray[np.uint8]
 Array = NDArray[np.float64]
@@ -59,8 +58,9 @@ def largest_shift_px(before: Image, image: Image) -> float:
     down, right = np.gradient(old)
     shape = (height // _TILE, _TILE, width // _TILE, _TILE)
 
-    def of_tiles(values: NDArray[Any]) -> Array:
-        return np.asarray(values.reshape(shape).sum(axis=(1, 3)), dtype=np.float64)
+    def of_tiles(values: ArrayLike) -> Array:
+        tiles = np.asarray(values).reshape(shape)
+        return np.asarray(tiles.sum(axis=(1, 3)), dtype=np.float64)
 
     steep = of_tiles(down**2 + right**2)
     moved = np.hypot(of_tiles(down * change), of_tiles(right * change))

@@ -72,7 +72,12 @@ def read_csv(path: Path | str, free_coordinates: tuple[str, ...] | None = None) 
 
 
 def write_csv(path: Path | str, trajectory: Trajectory) -> None:
-    """Write a trajectory to full precision; the file is replaced whole.
+    """Write a trajectory as `csv_pieces` gives it; the file is replaced whole."""
+    replace_file(path, csv_pieces(trajectory))
+
+
+def csv_pieces(trajectory: Trajectory) -> Iterator[bytes]:
+    """A trajectory as CSV to full precision, in pieces: an hour's text takes a gigabyte.
 
     Poses are written with quaternions; standard deviations, and correlations other than zero,
     follow when the covariances are known.
@@ -88,11 +93,10 @@ def write_csv(path: Path | str, trajectory: Trajectory) -> None:
         names, noise = noise_columns(trajectory)
         header += names
         parts.append(noise)
-    replace_file(path, _lines(header, np.concatenate(parts, axis=1)))
+    return _lines(header, np.concatenate(parts, axis=1))
 
 
 def _lines(header: list[str], rows: Array) -> Iterator[bytes]:
-    """The file piece by piece: an hour's text at once would take a gigabyte."""
     yield (",".join(header) + "\n").encode()
     for first in range(0, len(rows), _ROWS_AT_ONCE):
         part = rows[first : first + _ROWS_AT_ONCE].tolist()

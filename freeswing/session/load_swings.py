@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,6 +15,8 @@ from freeswing.cdpr.measured.target import Target, read_target
 from freeswing.cdpr.measured.trajectory import Trajectory
 from freeswing.cdpr.robot import Robot
 from freeswing.ident.runs import Payload, SwingRun
+from freeswing.results.files import read_document
+from freeswing.results.tracking import Tracking
 from freeswing.session.marker_runs import MarkerRuns, read_marker_runs
 from freeswing.session.session_file import Run, Session
 
@@ -63,19 +64,12 @@ def calibration_errors(session: Session) -> dict[str, PoseErrors]:
     Raises:
         InputError: when that file is not what tracking writes.
     """
-    path = session.results / "tracking.json"
     filmed = {run.name for run in session.video_runs}
-    if not filmed or not path.is_file():
-        return {}
-    try:
-        runs = json.loads(path.read_text(encoding="utf-8"))["runs"]
-        told = {run["run"]: run.get("calibration_errors") for run in runs}
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
-        raise InputError(f"{path}: not a tracking result ({error}); track again") from error
+    told = read_document(session.results / "tracking.json", Tracking) if filmed else None
     return {
-        name: read_pose_errors(entry)
-        for name, entry in told.items()
-        if name in filmed and entry is not None
+        run.run: read_pose_errors(run.calibration_errors)
+        for run in (() if told is None else told.runs)
+        if run.run in filmed and run.calibration_errors is not None
     }
 
 

@@ -5,20 +5,20 @@ from __future__ import annotations
 import importlib
 import tomllib
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from freeswing.cdpr.files.documents import write_json
+from freeswing.cdpr.files.documents import DataError
 from freeswing.console import Console
 from freeswing.results.codec import Document
 from freeswing.session.load_swings import trajectory_path
+from freeswing.session.made import Made, write_made
 from freeswing.session.provenance import hashes, is_current, provenance
 from freeswing.session.session_file import Session
 from freeswing.workers.crew import Crew
 
-Documents = list[tuple[str, Document]]
-Make = Callable[[Session, Console, dict[str, Any], Crew], Documents]
+Make = Callable[[Session, Console, dict[str, Any], Crew], Made]
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +27,7 @@ class Stage:
 
     Attributes:
         name: of the command, whose module holds `make(session, console, settings, crew)`:
-            it gives the result documents, by their file's name, the main one first.
+            it writes nothing and gives all that is to be written, the main document first.
         result: main result file below the results folder.
         inputs: what it reads.
         due: whether a session needs it at all.
@@ -60,19 +60,27 @@ class Stage:
         """Make the result from scratch and write it with its provenance.
 
         The crew (one process a core where None) does not change it.
+
+        Raises:
+            DataError: where what was made must not be used; it is written without provenance, so
+                that the step stays due.
         """
         chosen = self.settings | (settings or {})
         # Inputs are hashed first: what changes meanwhile makes the result out of date.
         made_of = provenance(session, self.inputs(session), chosen)
         make: Make = importlib.import_module(f"freeswing.commands.session.{self.name}").make
-        documents = make(session, console, chosen, crew or Crew())
-        main, *beside = documents
-        for name, document in reversed(beside):
-            write_json(session.results / name, document.made_of(made_of).to_json())
-        if others := hashes(session, self.others(session)):
-            made_of = {**made_of, "outputs": others}
-        write_json(session.results / main[0], main[1].made_of(made_of).to_json())
-        return session.results / self.result
+        made = make(session, console, chosen, crew or Crew())
+        if made.refused is not None:
+            write_made(session.results, made)
+            raise DataError(made.refused)
+        (name, main), *beside = made.documents
+        told = ((name, main), *((other, one.made_of(made_of)) for other, one in beside))
+
+        def finished(document: Document) -> Document:
+            others = hashes(session, self.others(session))
+            return document.made_of({**made_of, "outputs": others} if others else made_of)
+
+        return write_made(session.results, replace(made, documents=told), finished)
 
 
 def _robot_files(session: Session) -> list[Path]:

@@ -160,7 +160,9 @@ class Problem:
             gradient[at] += known * first
             matrix[at, at] += known
         static = self.given.static
-        for p in range(0 if static is None else len(static.poses)):
+        if static is None:
+            return Normal(float(cost), gradient, matrix, count)
+        for p in range(self.n_static):
             part, place = self._static(static, p, x, theta, zero, by_zero)
             cost, count = cost + part.cost, count + part.n
             gradient[place] += part.gradient

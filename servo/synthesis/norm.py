@@ -63,7 +63,8 @@ def crossings(system: StateSpace, level: float) -> Array:
     F = system.A + system.B @ K
     G = system.B @ np.linalg.solve(R, system.B.T)
     Q = system.C.T @ (system.C + system.D @ K)
-    values = np.asarray(scipy.linalg.eigvals(np.block([[F, G], [-Q, -F.T]])))
+    whole = np.block([[F, G], [-Q, -F.T]])
+    values = np.asarray(scipy.linalg.eigvals(whole), dtype=np.complex128)
     # Eigenvalues on the axis come back with real parts of about the square root of rounding.
     on_axis = np.abs(values.real) <= 1e-8 * np.maximum(np.abs(values), 1e-300)
     return np.unique(np.abs(values.imag[on_axis & (values.imag > 0.0)]))

@@ -217,14 +217,16 @@ def _stable_subspace(H: Array) -> Array | None:
         # Real pairs of nearly equal eigenvalues sometimes cannot be swapped; single complex ones
         # always can, at about three times the cost.
         T, Z, n_stable = _sorted_schur(H, "complex")
-    own = T[:n_stable, :n_stable]
-    rates = np.diag(T) if np.iscomplexobj(T) else np.asarray(scipy.linalg.eigvals(own))
+    if n_stable != size:
+        return None
+    rates = np.diag(T)[:size] if np.iscomplexobj(T) else scipy.linalg.eigvals(T[:size, :size])
     # Closer to the axis than rounding can tell from on it.
-    if n_stable != size or -rates[:size].real.max() <= 1e-13 * np.abs(T).max():
+    if -np.asarray(rates, dtype=np.complex128).real.max() <= 1e-13 * np.abs(T).max():
         return None
     if not np.iscomplexobj(Z):
         return Z[:, :size]
-    parts = np.hstack([Z[:, :size].real, Z[:, :size].imag])
+    basis = np.asarray(Z[:, :size], dtype=np.complex128)
+    parts = np.hstack([basis.real, basis.imag])
     return np.asarray(scipy.linalg.qr(parts, pivoting=True)[0])[:, :size]
 
 

@@ -67,7 +67,8 @@ class StateSpace:
     def at(self, rates_rad_s: Array) -> Complex:
         """Response at the given rates, (n_rates, n_outputs, n_inputs)."""
         s = 1j * np.atleast_1d(rates_rad_s)
-        point = np.asarray(s if self.period_s is None else np.exp(s * self.period_s))
+        point = s if self.period_s is None else np.exp(s * self.period_s)
+        point = np.asarray(point, dtype=np.complex128)
         # One Hessenberg form serves all rates: n^2 instead of n^3 work at each.
         return _response(self.A, self.B, self.C, self.D, point)
 

@@ -176,10 +176,8 @@ def test_a_simulated_session_is_homed_from_its_files(tmp_path):
     robot_file = tmp_path / "robot.toml"
     write_robot(robot_file, bologna_3())
     path = simulate_homing(robot_file, tmp_path / "made", n_poses=37, seed=4)
-    document = home(path)
-    written = json.loads((tmp_path / "made" / "results" / "homing.json").read_text())
+    written = home(path)
     truth = json.loads((tmp_path / "made" / "truth.json").read_text())
-    assert written == document
     error = np.subtract(written["start_pose"]["position_m"], truth["start_pose"]["position_m"])
     spread = np.array(written["start_pose_std"]["position_m"])
     assert (np.abs(error) < 5 * spread).all(), f"errors {error} with std {spread}"

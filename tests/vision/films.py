@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from freeswing.calib.camera.camera import Camera
+from freeswing.cdpr.files.documents import DataError, write_json
+from freeswing.cdpr.files.trajectory_files import write_csv
 from freeswing.cdpr.measured.target import Target
 from freeswing.cdpr.rotation import log_rotation
 from freeswing.vision.render.record import record
@@ -49,8 +51,19 @@ def film(folder, true_cameras, frames=FRAMES, **changes) -> FilmedRun:
     return FilmedRun("swing", folder / "runs" / "swing")
 
 
+def tracked(runs, cameras, target, *, results, **options):
+    """Track, and write what comes of it as the command does; the document."""
+    found = track_session(runs, cameras, target, results=results, **options)
+    for name, trajectory in found.trajectories.items():
+        write_csv(results / "tracks" / f"{name}.csv", trajectory)
+    write_json(results / "tracking.json", found.document)
+    if found.refused is not None:
+        raise DataError(found.refused)
+    return found.document
+
+
 def track(run, folder, view=None, **settings):
-    return track_session(
+    return tracked(
         [run],
         view or cameras(),
         TARGET,

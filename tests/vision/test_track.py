@@ -14,7 +14,6 @@ from freeswing.cdpr.files.trajectory_files import read_trajectory
 from freeswing.cdpr.measured.target import Target
 from freeswing.vision.look import pieces, sightings
 from freeswing.vision.settings import Settings
-from freeswing.vision.track_session import track_session
 from tests.vision.films import (
     BASE,
     FRAMES,
@@ -24,6 +23,7 @@ from tests.vision.films import (
     cameras,
     errors,
     track,
+    tracked,
 )
 
 
@@ -135,7 +135,7 @@ def test_a_tag_that_sits_elsewhere_is_measured_and_put_right(session, tmp_path) 
     pose = tags[3].T_platform_tag.copy()
     pose[:3, 3] += moved
     tags[3] = replace(tags[3], T_platform_tag=pose)
-    document = track_session(
+    document = tracked(
         [run],
         cameras(),
         Target(tuple(tags)),

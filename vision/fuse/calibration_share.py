@@ -9,16 +9,16 @@ them as what they are, errors that all poses of the session share.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.calib.camera.lens_models import PARAMETER_NAMES
+from freeswing.calib.verdict.calibration_result import read_camera_covariance
+from freeswing.cdpr.files.documents import InputError
 from freeswing.cdpr.measured.pose_errors import PoseErrors, error_terms, fitted_terms
 from freeswing.vision.fuse.blocks import blocks
 from freeswing.vision.fuse.fuse_cameras import Fit, free_of, whitened
@@ -67,15 +67,10 @@ class RunShare:
 def read_calibration_noise(path: Path) -> CalibrationNoise | None:
     """From calibration.json; None where there is none, or it tells no covariance."""
     try:
-        table: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        share = table["covariance"]
-        names = tuple(str(name) for name in share["names"])
-        matrix = np.array(share["matrix"], dtype=np.float64)
-    except (OSError, ValueError, KeyError, TypeError, OverflowError, RecursionError):
+        told = read_camera_covariance(path)
+    except InputError:
         return None
-    if matrix.shape != (len(names), len(names)) or not np.isfinite(matrix).all():
-        return None
-    return CalibrationNoise(names, matrix)
+    return CalibrationNoise(told.names, told.matrix) if np.isfinite(told.matrix).all() else None
 
 
 def run_share(

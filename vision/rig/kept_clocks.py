@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from freeswing.calib.camera.camera import Camera
+from freeswing.vision.rig.rig_effects import Finding
 
 MOST_APART_S = 1e-3
 """Cameras of one trigger keep their clocks from run to run to microseconds, free-running ones drift
@@ -16,23 +16,27 @@ by less than this in an hour; ones started by hand differ by tenths of a second.
 
 
 def with_kept_clocks(
-    cameras: Sequence[Camera], document: dict[str, Any]
+    cameras: Sequence[Camera],
+    seen: Mapping[str, Sequence[str]],
+    findings: Mapping[str, Sequence[Finding]],
 ) -> tuple[tuple[Camera, ...], list[str]]:
-    """Cameras with the clocks that all runs of a tracking.json ask for, and what was done.
+    """Cameras with the clocks that all runs ask for, and what was done.
+
+    Args:
+        cameras: as the runs were tracked with them.
+        seen: names of the cameras of each run.
+        findings: of each run.
 
     A clock that differs between the runs is no property of the camera: it is left, and said.
     """
     kept, said = [], []
     for camera in cameras:
-        runs = [
-            run["run"]
-            for run in document["runs"]
-            if any(seen["camera"] == camera.name for seen in run["cameras"])
-        ]
+        runs = [run for run, names in seen.items() if camera.name in names]
         found = {
-            effect["run"]: float(effect["parameters"][0]["value"])
-            for effect in document["effects"]
-            if effect["effect"] == "clock_offset" and effect["camera"] == camera.name
+            run: finding.parameters[0][1]
+            for run, own in findings.items()
+            for finding in own
+            if finding.effect == "clock_offset" and finding.camera == camera.name
         }
         offsets = np.array([found.get(run, 0.0) for run in runs])
         kept.append(camera)

@@ -51,6 +51,7 @@ def run(options: Namespace, console: Console) -> None:
     from freeswing.cdpr.system.confine import results_folder
     from freeswing.excite.excite import ExcitationOptions, SwingLimits, excite
     from freeswing.results.planning import Excitation
+    from freeswing.session.made import Made, write_made
 
     path = Path(options.robot)
     limits = SwingLimits(tension_N=tuple(options.tension_n), reach_m=options.reach_m)
@@ -68,7 +69,10 @@ def run(options: Namespace, console: Console) -> None:
         seed=options.seed,
     )
     folder = results_folder(path.parent, options.results)
-    document = Excitation.from_json(excite(path, asked, console.progress, folder))
+    told, tables = excite(path, asked, console.progress)
+    document = Excitation.from_json(told)
+    files = tuple((folder / name, text.encode()) for name, text in tables.items())
+    result = write_made(folder, Made((("excitation.json", document),), files))
     console.say(f"conditioning cost C {document.cost_C:.2f} (below 10 is good)")
     random = document.random_plans
     if random:
@@ -82,5 +86,5 @@ def run(options: Namespace, console: Console) -> None:
         by_hand = entry.winch_release is None
         told = "; by hand: no winch motion within the limits" if by_hand else ""
         console.say(f"  {count:2}: lengths {lengths} m, tensions {low:.0f} to {high:.0f} N{told}")
-    console.say(str(folder / "excitation.json"))
-    console.show_file(folder / "excitation.json")
+    console.say(str(result))
+    console.show_file(result)

@@ -51,10 +51,12 @@ def _home(path: Path, options: Namespace, console: Console) -> None:
     from freeswing.cdpr.system.confine import results_folder
     from freeswing.homing.home import home
     from freeswing.results.planning import Homing
+    from freeswing.session.made import Made, write_made
 
     beside = path if path.is_dir() else path.parent
     folder = results_folder(beside, options.results)
-    document = Homing.from_json(home(path, console.progress, folder))
+    document = Homing.from_json(home(path, console.progress))
+    result = write_made(folder, Made((("homing.json", document),)))
     pose, std = document.start_pose, document.start_pose_std
     for key, unit, scale in (("position_m", "mm", 1e3), ("angles_rad", "mrad", 1e3)):
         values = ", ".join(f"{scale * value:.3f}" for value in getattr(pose, key))
@@ -67,7 +69,6 @@ def _home(path: Path, options: Namespace, console: Console) -> None:
         console.say(
             f"the readings differ {ratio:.1f} times more (in square) than their stated noise"
         )
-    result = folder / "homing.json"
     console.say(str(result))
     console.show_file(result)
 
@@ -76,9 +77,11 @@ def _advise(path: Path, options: Namespace, console: Console) -> None:
     from freeswing.cdpr.system.confine import results_folder
     from freeswing.homing.swivel_advice import advise
     from freeswing.results.planning import HomingAdvice
+    from freeswing.session.made import Made, write_made
 
     folder = results_folder(path.parent, options.results)
-    document = HomingAdvice.from_json(advise(path, console.progress, folder))
+    document = HomingAdvice.from_json(advise(path, console.progress))
+    result = write_made(folder, Made((("homing-advice.json", document),)))
     for name, quality in (("declared", document.declared), ("advised", document.advised)):
         console.say(
             f"{name}: start position to {1e3 * quality.position_std_m:.2f} mm, "
@@ -88,7 +91,6 @@ def _advise(path: Path, options: Namespace, console: Console) -> None:
         if cable.changed:
             axis = ", ".join(f"{value:.3f}" for value in cable.swivel_z)
             console.say(f"cable {cable.name}: swivel_z = [{axis}]")
-    result = folder / "homing-advice.json"
     console.say(str(result))
     console.show_file(result)
 

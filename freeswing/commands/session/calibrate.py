@@ -10,7 +10,7 @@ from freeswing.console import Console
 
 if TYPE_CHECKING:
     from freeswing.calib.calibrate import CalibrationResult
-    from freeswing.results.codec import Document
+    from freeswing.session.made import Made
     from freeswing.session.session_file import Session
     from freeswing.workers.crew import Crew
 
@@ -37,15 +37,15 @@ def run(options: Namespace, console: Console) -> None:
     console.show_file(result)
 
 
-def make(
-    session: Session, console: Console, settings: dict[str, Any], crew: Crew
-) -> list[tuple[str, Document]]:
-    """cameras.toml on disk, and calibration.json as a document."""
-    from freeswing.calib.calibrate import calibrate_session
+def make(session: Session, console: Console, settings: dict[str, Any], crew: Crew) -> Made:
+    """calibration.json as a document, and cameras.toml where it may be used."""
+    from freeswing.calib.calibrate import KEPT_BOARDS, calibrate_session
+    from freeswing.calib.camera.cameras_file import cameras_text
     from freeswing.cdpr.files.documents import InputError
     from freeswing.cdpr.files.robot_file import read_robot
     from freeswing.cdpr.robot import STANDARD_GRAVITY_M_S2
     from freeswing.results.calibration import Calibration
+    from freeswing.session.made import Made
 
     source = session.calibration
     if source is None or source.recordings is None or source.board is None:
@@ -58,13 +58,15 @@ def make(
         source.board,
         source.base_tags,
         frame_rate_hz=session.frame_rate_hz,
-        cameras_path=session.cameras,
-        results_folder=session.results,
+        kept_boards=session.results / KEPT_BOARDS,
         model=settings["model"],
         plumb_line=source.plumb_line,
         gravity_m_s2=gravity_m_s2,
         progress=console.progress,
     )
+    if found.refused is not None:
+        explained = Calibration.from_json(found.document)
+        return Made((("calibration.json", explained),), refused=found.refused)
     beside = _beside_colmap(found, console) if settings.get("check_with") else {}
     document = Calibration.from_json({**found.document, **beside})
     for entry in document.cameras:
@@ -74,7 +76,8 @@ def make(
         console.say(vertical.sentence)
     for warning in document.verdict.warnings if document.verdict else ():
         console.complain(warning)
-    return [("calibration.json", document)]
+    files = ((session.cameras, cameras_text(found.cameras).encode()),)
+    return Made((("calibration.json", document),), files)
 
 
 def _beside_colmap(found: CalibrationResult, console: Console) -> dict[str, Any]:

@@ -9,9 +9,9 @@ from freeswing.commands.arguments import add_session, add_workers, crew_of, open
 from freeswing.console import Console
 
 if TYPE_CHECKING:
-    from freeswing.results.codec import Document
     from freeswing.results.common import SeenDirection
     from freeswing.results.diagnosis import Diagnosis
+    from freeswing.session.made import Made
     from freeswing.session.session_file import Session
     from freeswing.workers.crew import Crew
 
@@ -39,9 +39,7 @@ def run(options: Namespace, console: Console) -> None:
     console.show_file(result)
 
 
-def make(
-    session: Session, console: Console, settings: dict[str, Any], crew: Crew
-) -> list[tuple[str, Document]]:
+def make(session: Session, console: Console, settings: dict[str, Any], crew: Crew) -> Made:
     """diagnosis.json and diagnosis_motion.json as documents."""
     import os
 
@@ -52,6 +50,7 @@ def make(
     from freeswing.results.motions import ladder_motions
     from freeswing.session.load_bench import is_bench
     from freeswing.session.load_swings import load_robot, load_swings, load_target
+    from freeswing.session.made import Made
     from freeswing.session.repeated_runs import refuse_repeated
 
     only = settings["only"]
@@ -72,7 +71,8 @@ def make(
     found = diagnose(swings, robot, console.progress, count, candidates, crew.executor)
     document = Diagnosis.from_json(found.document())
     _summarise(document, console)
-    return [("diagnosis.json", document), ("diagnosis_motion.json", ladder_motions(found.ladder))]
+    motions = ladder_motions(found.ladder)
+    return Made((("diagnosis.json", document), ("diagnosis_motion.json", motions)))
 
 
 def _summarise(document: Diagnosis, console: Console) -> None:

@@ -11,8 +11,8 @@ from freeswing.console import Console
 if TYPE_CHECKING:
     from freeswing.cdpr.robot import Robot
     from freeswing.ident.runs import SwingRun
-    from freeswing.results.codec import Document
     from freeswing.results.identification import Identification
+    from freeswing.session.made import Made
     from freeswing.session.marker_runs import MarkerRuns
     from freeswing.session.session_file import Session
     from freeswing.workers.crew import Crew
@@ -62,9 +62,7 @@ def run(options: Namespace, console: Console) -> None:
     console.show_file(result)
 
 
-def make(
-    session: Session, console: Console, settings: dict[str, Any], crew: Crew
-) -> list[tuple[str, Document]]:
+def make(session: Session, console: Console, settings: dict[str, Any], crew: Crew) -> Made:
     """identification.json and motion.json as documents."""
     from freeswing.cdpr.files.documents import InputError
     from freeswing.ident.identify import IdentifySettings, identify
@@ -75,6 +73,7 @@ def make(
     from freeswing.results.motions import predicted_motions
     from freeswing.session.load_bench import is_bench
     from freeswing.session.load_swings import load_robot, load_swings, load_target
+    from freeswing.session.made import Made
     from freeswing.session.marker_runs import read_marker_runs
     from freeswing.session.repeated_runs import refuse_repeated
 
@@ -111,10 +110,10 @@ def make(
     _summarise(document, found.best, console)
     for sentence in document.estimates[found.best].notes:
         console.say(f"  {sentence}")
-    return [("identification.json", document), ("motion.json", predicted_motions(found))]
+    return Made((("identification.json", document), ("motion.json", predicted_motions(found))))
 
 
-def _make_bench(session: Session, console: Console, robot: Robot) -> list[tuple[str, Document]]:
+def _make_bench(session: Session, console: Console, robot: Robot) -> Made:
     """The same of a bench: all its runs in one fit."""
     from freeswing.ident.bench.identify_bench import identify_bench
     from freeswing.report.bench_words import bench_lines
@@ -122,12 +121,13 @@ def _make_bench(session: Session, console: Console, robot: Robot) -> list[tuple[
     from freeswing.results.motion import Motion
     from freeswing.session.load_bench import load_bench
     from freeswing.session.load_swings import load_target
+    from freeswing.session.made import Made
 
     told = identify_bench(load_bench(session, robot, load_target(session)), robot).document()
     for line in bench_lines(told):
         console.say(line)
     document = Identification.from_json({**told, "entries_m": robot.entries_m})
-    return [("identification.json", document), ("motion.json", Motion())]
+    return Made((("identification.json", document), ("motion.json", Motion())))
 
 
 def _recording_notes(

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import json
 from argparse import ArgumentParser, Namespace
-from pathlib import Path
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from freeswing.commands.arguments import add_session, add_workers, crew_of, open_session
 from freeswing.console import Console
 
 if TYPE_CHECKING:
-    from freeswing.results.codec import Document
     from freeswing.results.tracking import Tracking
+    from freeswing.session.made import Made
     from freeswing.session.session_file import Session
     from freeswing.workers.crew import Crew
 
@@ -61,19 +60,19 @@ def run(options: Namespace, console: Console) -> None:
     if options.view or options.overlay:
         _draw(session, console, view=options.view, overlay=options.overlay)
     if options.write_clocks:
-        _write_clocks(session, result, console)
+        _write_clocks(session, console)
     console.say(str(result))
     console.show_file(result)
 
 
-def make(
-    session: Session, console: Console, settings: dict[str, Any], crew: Crew
-) -> list[tuple[str, Document]]:
-    """The tracks on disk, and tracking.json as a document."""
+def make(session: Session, console: Console, settings: dict[str, Any], crew: Crew) -> Made:
+    """tracking.json as a document, and the tracks."""
     from freeswing.calib.camera.cameras_file import read_cameras
     from freeswing.cdpr.files.documents import DataError, InputError
+    from freeswing.cdpr.files.trajectory_csv import csv_pieces
     from freeswing.results.tracking import Tracking
     from freeswing.session.load_swings import load_target
+    from freeswing.session.made import Made
     from freeswing.vision.settings import Settings
     from freeswing.vision.track_session import track_session
 
@@ -94,15 +93,21 @@ def make(
         executor=crew.executor,
         progress=console.progress,
     )
-    document = Tracking.from_json(found)
-    _summarise(document, console)
-    return [("tracking.json", document)]
+    document = Tracking.from_json(found.document)
+    if found.refused is None:
+        _summarise(document, console)
+    tracks = [
+        (session.tracks / f"{name}.csv", partial(csv_pieces, trajectory))
+        for name, trajectory in found.trajectories.items()
+    ]
+    return Made((("tracking.json", document),), tuple(tracks), found.refused)
 
 
 def _draw(session: Session, console: Console, *, view: bool, overlay: bool) -> None:
     """The pictures of a tracked session."""
     from freeswing.calib.camera.cameras_file import read_cameras
     from freeswing.session.load_swings import load_target
+    from freeswing.session.load_tracking import found_cameras
     from freeswing.vision.show.overlay import write_overlay
     from freeswing.vision.show.rerun_view import write_view
     from freeswing.vision.tracked_runs import tracked_run
@@ -110,11 +115,13 @@ def _draw(session: Session, console: Console, *, view: bool, overlay: bool) -> N
     target = load_target(session)
     if target is None:
         return
+    found = found_cameras(session)
     runs = [
         tracked_run(
             run,
             read_cameras(session.cameras),
             target,
+            found,
             results=session.results,
             base_tags=session.calibration.base_tags if session.calibration else (),
             frame_rate_hz=session.frame_rate_hz,
@@ -132,13 +139,14 @@ def _draw(session: Session, console: Console, *, view: bool, overlay: bool) -> N
         console.say(f"  {path}")
 
 
-def _write_clocks(session: Session, result: Path, console: Console) -> None:
+def _write_clocks(session: Session, console: Console) -> None:
     """cameras.toml with the clocks that the runs agree on; tracks made before are then old."""
     from freeswing.calib.camera.cameras_file import read_cameras, write_cameras
+    from freeswing.session.load_tracking import found_cameras
     from freeswing.vision.rig.kept_clocks import with_kept_clocks
 
-    document = json.loads(result.read_text(encoding="utf-8"))
-    cameras, said = with_kept_clocks(read_cameras(session.cameras), document)
+    told = found_cameras(session)
+    cameras, said = with_kept_clocks(read_cameras(session.cameras), told.seen, told.findings)
     write_cameras(session.cameras, cameras)
     for text in said or ["no clock was found off: cameras.toml stays"]:
         console.say(f"  {text}")

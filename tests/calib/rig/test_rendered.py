@@ -1,6 +1,5 @@
 """Calibration from rendered images: corner bias, and the whole way from recordings to a rig."""
 
-import json
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,10 +8,10 @@ import pytest
 from freeswing.calib.board.boards import Board, board_from, read_board
 from freeswing.calib.board.detection import BoardDetector
 from freeswing.calib.calibrate import calibrate_session
-from freeswing.calib.camera.cameras_file import read_cameras
+from freeswing.calib.camera.cameras_file import read_cameras, write_cameras
 from freeswing.calib.rig.triangulation import triangulate
 from freeswing.calib.verdict.calibration_result import read_camera_covariance
-from freeswing.cdpr.files.documents import DataError, InputError
+from freeswing.cdpr.files.documents import InputError, write_json
 from freeswing.cdpr.rotation import exp_rotation, transform
 from freeswing.vision.render.patterns import (
     aprilgrid_patch,
@@ -95,7 +94,7 @@ def film(folder, cameras, count, seed=3):
 
 
 def test_from_images_to_the_base_frame(tmp_path):
-    """Two cameras, 16 still poses: points on the platform to 0.1 mm; refusals write no cameras."""
+    """Two cameras, 16 still poses: points on the platform to 0.1 mm; mirrored tags are refused."""
     cameras = films.small_rig(2)
     tags = film(tmp_path / "calibration", cameras, 16)
     table = {
@@ -110,29 +109,25 @@ def test_from_images_to_the_base_frame(tmp_path):
         tmp_path / "calibration",
         table,
         tags,
-        cameras_path=tmp_path / "cameras.toml",
-        results_folder=tmp_path / "results",
         progress=lambda label, share: told.append((label, share)),
     )
     assert told[-1][1] == 1.0
+    assert result.refused is None
+    write_cameras(tmp_path / "cameras.toml", result.cameras)
     found = read_cameras(tmp_path / "cameras.toml")
     places = np.random.default_rng(4).uniform(-0.3, 0.3, (200, 3))
     pixels = np.stack([camera.project(camera.to_camera(places)) for camera in cameras])
     error = np.linalg.norm(triangulate(found, pixels) - places, axis=1)
     rms_mm = 1e3 * float(np.sqrt(np.mean(error**2)))
     assert rms_mm < 0.1, f"{rms_mm} mm"
+    write_json(tmp_path / "results" / "calibration.json", result.document)
     covariance = read_camera_covariance(tmp_path / "results" / "calibration.json")
     std = np.sqrt(np.diag(covariance.pose("cam1")))
     np.testing.assert_allclose(std[:3], result.document["cameras"][1]["position_std_m"])
-    document = json.loads((tmp_path / "results" / "calibration.json").read_text())
-    assert document["verdict"]["usable"]
-    (tmp_path / "cameras.toml").unlink()
+    assert result.document["verdict"]["usable"]
     mirrored = [Tag(t.family, t.id, t.corners_base_m * [1, -1, 1]) for t in tags]
-    with pytest.raises(DataError, match="mirror image"):
-        calibrate_session(
-            tmp_path / "calibration", table, mirrored, cameras_path=tmp_path / "cameras.toml"
-        )
-    assert not (tmp_path / "cameras.toml").exists()
+    refused = calibrate_session(tmp_path / "calibration", table, mirrored)
+    assert "mirror image" in (refused.refused or ""), refused.refused
 
 
 def test_boards_are_read_and_checked(tmp_path):

@@ -16,7 +16,7 @@ from freeswing.vision.look.markers import ball_shrink, find_blobs
 from freeswing.vision.render.patterns import Sphere
 from freeswing.vision.render.record import record
 from freeswing.vision.render.render_scene import Look, Renderer, Scene, still
-from freeswing.vision.track_session import track_session
+from tests.vision.films import tracked
 from tests.vision.scenes import OPENCV_PARAMS, arc_of_cameras, camera, swing
 
 PLACES = np.array(
@@ -43,7 +43,7 @@ def track(tmp_path, markers, count=40, chosen=slice(None)):
     balls = tuple(Sphere(m.position_m, m.diameter_m) for m in markers)
     scene = Scene((), swing, balls)
     record(tmp_path / "run", cameras, scene, np.arange(count) / 50.0, Look(background=50.0))
-    document = track_session(
+    document = tracked(
         [FilmedRun("run", tmp_path / "run")],
         cameras,
         Target((), tuple(markers)),

@@ -16,7 +16,7 @@ from freeswing.cdpr.measured.target import Target
 from freeswing.vision.look.video import write_stamps, write_video
 from freeswing.vision.render.record import record
 from freeswing.vision.render.render_scene import Renderer
-from freeswing.vision.track_session import track_session
+from tests.vision.films import tracked
 from tests.vision.scenes import OPENCV_PARAMS, arc_of_cameras, platform_tags, scene_of, swing
 
 TARGET = Target(platform_tags())
@@ -33,7 +33,7 @@ class FilmedRun:
 
 
 def track(folder, frame_rate_hz=None, workers=1):
-    document = track_session(
+    document = tracked(
         [FilmedRun("run", folder / "run")],
         CAMERAS,
         TARGET,

@@ -10,6 +10,8 @@ import pytest
 
 from freeswing.cdpr.files.documents import InputError
 from freeswing.main import main
+from freeswing.results.tracking import Tracking
+from freeswing.session.load_tracking import found_in
 from freeswing.vision.show.overlay import projected_outlines, sighted, write_overlay
 from freeswing.vision.show.rerun_view import require_viewer, write_view
 from freeswing.vision.tracked_runs import tracked_run
@@ -19,8 +21,9 @@ from tests.vision.loops import small_cameras, write_looped_session
 
 @pytest.fixture(scope="module")
 def run(session):
-    folder, filmed, _ = session
-    return tracked_run(filmed, cameras(), TARGET, results=folder / "results", base_tags=BASE)
+    folder, filmed, document = session
+    found = found_in(Tracking.from_json(document))
+    return tracked_run(filmed, cameras(), TARGET, found, results=folder / "results", base_tags=BASE)
 
 
 @pytest.mark.parametrize("index", [0, 1, 2])
