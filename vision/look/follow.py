@@ -50,6 +50,7 @@ _EAGER_SEARCHES = 5
 _FACING = 0.25
 _DARK_SPREAD = 5.0
 _SATURATED = 253.0
+_BRIGHT_SHARE = 0.3  # of an image: a lamp and its reflections cover less
 _KEPT_POSES = 3
 
 
@@ -236,7 +237,7 @@ class Follower:
         if any(s.thing >= self.watch.first_marker for s in sightings):
             return USED
         coarse = image[::8, ::8]
-        if bright or float(np.mean(coarse > _SATURATED)) > 0.3:
+        if bright or float(np.mean(coarse > _SATURATED)) > _BRIGHT_SHARE:
             return OVEREXPOSED
         if float(coarse.std()) < _DARK_SPREAD:
             return COVERED

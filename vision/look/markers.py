@@ -19,6 +19,7 @@ _LEAST_PIXELS = 4
 _MOST_SIDE_PX = 80
 _LEAST_CONTRAST = 30.0
 _LEAST_FILL = 0.55
+_LEAST_ASPECT = 0.5
 _EDGE_LEVEL = 0.35
 _CENTRE_FLOOR_PX = 0.01
 
@@ -51,7 +52,10 @@ def find_blobs(image: Image, camera: Camera, near_px: Array | None = None) -> li
     for (left, top_row, width, height, area), centre in zip(stats[1:], centres[1:], strict=True):
         if area < _LEAST_PIXELS or max(width, height) > _MOST_SIDE_PX:
             continue
-        if min(width, height) < 0.5 * max(width, height) or area < _LEAST_FILL * width * height:
+        if (
+            min(width, height) < _LEAST_ASPECT * max(width, height)
+            or area < _LEAST_FILL * width * height
+        ):
             continue
         if near_px is not None and not _is_near(centre, near_px):
             continue

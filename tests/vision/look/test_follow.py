@@ -37,6 +37,7 @@ def test_every_tag_is_followed_and_the_pose_is_right(frames) -> None:
     assert min(seen) == 6, f"tags seen {seen}"
     assert {view.status for view in views} == {USED}
     assert np.abs(error).max() < 3e-4, f"{1e3 * np.abs(error).max():.3f} mm"
+    assert len(follower.past) == 3, "the motion is predicted from three poses"
 
 
 def test_it_searches_only_when_lost(frames, monkeypatch) -> None:
