@@ -2,11 +2,29 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
+from freeswing.calib.camera.camera import Camera
+from freeswing.cdpr.files.documents import DataError
+from freeswing.cdpr.rotation import exp_rotation, invert
+from freeswing.vision.fuse.fuse_cameras import Fit
+from freeswing.vision.rig.alignment import _chosen, _needed
 from freeswing.vision.rig.correct_rig import is_real
-from freeswing.vision.rig.rig_effects import LEAST_CLOCK_S, LEAST_LINE_S, was_moved
+from freeswing.vision.rig.gross_faults import (
+    Evidence,
+    _size_of_tags,
+    moved_too_far,
+    refuse_disagreement,
+    refuse_gross,
+)
+from freeswing.vision.rig.kept_clocks import with_kept_clocks
+from freeswing.vision.rig.rig_effects import LEAST_CLOCK_S, LEAST_LINE_S, Finding, was_moved
+from tests.vision.scenes import camera
 
 
 @pytest.mark.parametrize(("miss_px", "moved"), [(0.39, False), (0.41, True)])
@@ -27,3 +45,113 @@ def test_base_tags_that_lie_off(miss_px, moved) -> None:
 )
 def test_what_is_surely_not_zero(value, deviation, least, real) -> None:
     assert is_real(np.array([value]), np.array([deviation]), least).tolist() == [real]
+
+
+VIEW = camera()
+
+
+def turned(angle_rad: float, shift_m: float) -> Camera:
+    """The camera turned about a slanted axis and then moved in the base."""
+    pose = VIEW.T_camera_base.copy()
+    pose[:3, :3] = exp_rotation(angle_rad * np.array([0.6, 0.0, 0.8])) @ pose[:3, :3]
+    place = VIEW.position_base_m + np.array([0.0, shift_m, 0.0])
+    pose[:3, 3] = -pose[:3, :3] @ place
+    return replace(VIEW, T_camera_base=pose)
+
+
+@pytest.mark.parametrize(
+    ("angle_rad", "shift_m", "far"),
+    [(0.14, 0.0, False), (0.16, 0.0, True), (0.0, 0.19, False), (0.0, 0.21, True)],
+)
+def test_more_than_a_knock(angle_rad, shift_m, far) -> None:
+    assert moved_too_far(VIEW, turned(angle_rad, shift_m)) == far
+
+
+@pytest.mark.parametrize(
+    ("floor_px", "lost", "refused"),
+    [(0.9, 0, False), (1.1, 0, True), (0.1, 45, False), (0.1, 55, True)],
+)
+def test_cameras_that_still_do_not_agree(floor_px, lost, refused) -> None:
+    """Floors in px, and how many of a hundred sightings contradict the other camera's."""
+    views = [SimpleNamespace(camera=VIEW), SimpleNamespace(camera=replace(VIEW, name="cam1"))]
+    rejected = {(0, 0): (lost, 0, 9.0)} if lost else {}
+    fit = Fit(np.array([floor_px, 0.1]), np.zeros(2), np.zeros(2), np.array([100 - lost, 100]),
+              rejected, (0.0, 1))  # fmt: skip
+    with pytest.raises(DataError, match="camera cam0") if refused else nullcontext():
+        refuse_disagreement(views, fit)
+
+
+def evidence(angle_rad: float, ratios) -> tuple[list[Evidence], list[np.ndarray]]:
+    """Cameras 1 m apart, seen from the first by a platform whose size is wrong."""
+    poses, told = [np.eye(4)], []
+    for k, ratio in enumerate(ratios, start=1):
+        pose = np.eye(4)
+        pose[:3, 3] = [-1.0, 0.1 * k, 0.0]
+        poses.append(pose)
+        seen = invert(pose)
+        seen[:3, :3] = exp_rotation(np.array([0.0, 0.0, angle_rad])) @ seen[:3, :3]
+        seen[:3, 3] /= ratio
+        told.append(Evidence(0, k, seen))
+    return told, poses
+
+
+@pytest.mark.parametrize(
+    ("angle_rad", "ratios", "named"),
+    [
+        (0.045, (2.0, 2.0), True),
+        (0.055, (2.0, 2.0), False),
+        (0.0, (2.0, 2.055), True),
+        (0.0, (2.0, 2.068), False),
+        (0.0, (1.027, 1.027), False),
+        (0.0, (1.034, 1.034), True),
+        (0.0, (2.8, 2.8), True),
+        (0.0, (3.2, 3.2), False),
+        (0.0, (0.32, 0.32), True),
+        (0.0, (0.28, 0.28), False),
+    ],
+)
+def test_one_factor_for_all_distances_is_a_wrong_size(angle_rad, ratios, named) -> None:
+    assert (_size_of_tags(*evidence(angle_rad, ratios)) is not None) == named
+
+
+@pytest.mark.parametrize(("known_m", "kept"), [(0.085, 0), (0.095, 1)])
+def test_cameras_that_see_the_platform_apart(monkeypatch, known_m, kept) -> None:
+    """Free of base tags; three times the pair's own miss of 1 cm is allowed on top of 6 cm."""
+    monkeypatch.setattr("freeswing.vision.rig.gross_faults._by_base_tags", lambda *_: [])
+    pair = SimpleNamespace(known_m=known_m, miss_m=0.01, T_first_second=np.eye(4))
+    views = [SimpleNamespace(camera=VIEW), SimpleNamespace(camera=replace(VIEW, name="cam1"))]
+    with pytest.raises(DataError, match="one of them moved") if kept else nullcontext():
+        refuse_gross(views, None, {(0, 1): pair})
+
+
+@pytest.mark.parametrize(("apart_s", "written"), [(0.9e-3, True), (1.1e-3, False)])
+def test_a_clock_that_is_the_cameras_own(apart_s, written) -> None:
+    seen = {"a": ("cam0",), "b": ("cam0",)}
+    clock = {
+        run: (Finding("clock_offset", "cam0", (("offset_s", value, 1e-6),)),)
+        for run, value in (("a", 0.01), ("b", 0.01 + apart_s))
+    }
+    (kept,), _ = with_kept_clocks([VIEW], seen, clock)
+    assert (kept.clock_offset_s != 0.0) == written
+
+
+@pytest.mark.parametrize(
+    ("at_zero_m", "decided_m", "needed"),
+    [(0.0175, 0.01, False), (0.0185, 0.01, True), (0.0335, 0.02, True), (0.0325, 0.02, False)],
+)
+def test_when_a_camera_was_started_apart(at_zero_m, decided_m, needed) -> None:
+    assert _needed(SimpleNamespace(at_zero_m=at_zero_m, decided_m=decided_m)) == needed
+
+
+@pytest.mark.parametrize(("miss_m", "tried"), [(0.029, 2), (0.031, 1)])
+def test_other_starts_that_are_tried_in_earnest(miss_m, tried) -> None:
+    view = SimpleNamespace(camera=VIEW, believed=lambda camera: camera)
+    pair = SimpleNamespace(lag_s=1.0, decided_m=0.01, rivals=[(2.0, miss_m)])
+    asked = []
+
+    def misfit(known, new):
+        asked.append(new)
+        return 0.1 * len(asked), 50
+
+    _chosen(pair, view, view, misfit)
+    assert len(asked) == tried
