@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from freeswing.calib.board.board_motion import Timeline, in_pieces
 from freeswing.calib.camera.camera import Camera
@@ -33,8 +34,9 @@ Progress = Callable[[str, float], None]
 
 VIEW_OUTLIER_SIGMAS = 5.0
 VIEW_OUTLIER_FLOOR_PX = 0.5
-# share of normal errors within the limit of a corner's: 6 sigma for a corner on its own
-CORNER_WITHIN = 1.0 - np.exp(-18.0)
+CORNER_SIGMAS = 6.0
+# share of normal errors within the limit of a corner's on its own, as large for corners together
+CORNER_WITHIN = 1.0 - np.exp(-0.5 * CORNER_SIGMAS**2)
 _LEAST_CORNERS = 4
 LINE_TIME_SIGMAS = 5.0
 SHAPE_SIGMAS = 6.0
@@ -153,7 +155,7 @@ def _with_board_shape(rig: Rig) -> Rig:
     shared, boards = damped_step(normal, free, 0.0)
     shape = shared[end : end + WARP]
     std = np.sqrt(np.diag(covariances(normal, free)[0])[end : end + WARP])
-    shown = (np.abs(shape) > SHAPE_SIGMAS * std) & (np.abs(shape) > LEAST_SHAPE_M)
+    shown = is_shown(shape, std)
     if not shown.any():
         return rig
     free[end : end + WARP] &= shown
@@ -163,6 +165,17 @@ def _with_board_shape(rig: Rig) -> Rig:
     return refine(scene, problem, rig.reference, rig.dropped, rig.n_trimmed)
 
 
+def is_shown(shape_m: Array, std_m: Array) -> NDArray[np.bool_]:
+    """Which of a board's deformations the views show beyond doubt, (k,)."""
+    return (np.abs(shape_m) > SHAPE_SIGMAS * std_m) & (np.abs(shape_m) > LEAST_SHAPE_M)
+
+
+def reads_in_lines(line_time_s: float, std_s: float, rows: int) -> bool:
+    """Whether a line time stands out, and from the first row to the last makes a difference."""
+    stands_out = abs(line_time_s) > LINE_TIME_SIGMAS * std_s
+    return stands_out and rows * abs(line_time_s) > LEAST_READOUT_S
+
+
 def _without_idle_lines(rig: Rig) -> Rig:
     """Hold line times at zero where they do not stand out: most cameras have a global shutter."""
     free, scene = rig.problem.free.copy(), rig.adjustment.scene
@@ -170,9 +183,8 @@ def _without_idle_lines(rig: Rig) -> Rig:
     for index, own in enumerate(camera_slices(scene.cameras)):
         last = own.stop - 1
         std = float(np.sqrt(rig.adjustment.covariance[last, last]))
-        readout = cameras[index].size_px[1] * abs(cameras[index].line_time_s)
-        stands_out = abs(cameras[index].line_time_s) > LINE_TIME_SIGMAS * std
-        if free[last] and not (stands_out and readout > LEAST_READOUT_S):
+        camera = cameras[index]
+        if free[last] and not reads_in_lines(camera.line_time_s, std, camera.size_px[1]):
             free[last] = False
             cameras[index] = replace(cameras[index], line_time_s=0.0)
     if np.array_equal(free, rig.problem.free):
