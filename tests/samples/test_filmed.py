@@ -20,11 +20,11 @@ MOST_BYTES = 3_000_000
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The results folder after check, calibrate, track and identify."""
+    """The results folder after check, calibrate beside COLMAP, track and identify."""
     folder = tmp_path_factory.mktemp("filmed")
+    more = {"calibrate": ["--check-with", "pycolmap"], "track": ["--workers", "1"]}
     for command in ("check", "calibrate", "track", "identify"):
-        more = ["--workers", "1"] if command == "track" else []
-        words = [command, str(FILMED), "--results", str(folder), "--quiet", *more]
+        words = [command, str(FILMED), "--results", str(folder), "--quiet", *more.get(command, [])]
         assert main(words) == 0, command
     return folder
 
@@ -52,6 +52,18 @@ def test_cameras_are_where_they_were(results: Path) -> None:
         late_s = abs(found[camera.name].clock_offset_s - camera.clock_offset_s)
         assert off_m < wanted["position_tolerance_m"], f"{camera.name}: {1e3 * off_m:.2f} mm"
         assert late_s < wanted["clock_tolerance_s"], f"{camera.name}: {1e3 * late_s:.2f} ms"
+
+
+def test_colmap_adjusts_the_same_corners_to_the_same_cameras(results: Path) -> None:
+    told = result(results, "calibration")
+    assert told["provenance"]["settings"]["check_with"] == "pycolmap", told["provenance"]
+    beside = told["beside_colmap"]
+    assert [one["camera"] for one in beside] == ["left", "right"], beside
+    for one in beside:
+        assert one["agrees"], one
+        assert abs(one["focal"]) < 3.0 * one["focal_std"], one
+        assert one["place_mm"] < 3.0, one
+    assert not any("COLMAP" in text for text in told["verdict"]["warnings"]), told["verdict"]
 
 
 @pytest.mark.parametrize("run", RUNS)
