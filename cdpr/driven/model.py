@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.cdpr.driven.drive import LEAST_DRIVEN, Drive
-from freeswing.cdpr.driven.equations import quaternion_rate, rotation_of
+from freeswing.cdpr.driven.equations import rotation_of
 from freeswing.cdpr.driven.parameters import Numbers, declared_numbers
 from freeswing.cdpr.driven.scene import Premises, Scene, premises, scene
 from freeswing.cdpr.effects import Parameter, effect_named
@@ -47,10 +47,7 @@ class DrivenModel:
         needed: (state, acceleration, theta) -> the left side of (10), (6,): what the currents'
             wrench W_I I must be; force in the base frame, moment about P in the platform frame.
         wrench_matrix: (pose 7, theta) -> W_I (6, n) of (13), in the same frames as `needed`.
-        step: (state, currents, references, period, theta) -> state, currents after one period of
-            held references, and by how much the sign of a motor's friction changed at most.
-        stages: (the same) -> the four states at which a step looks (13, 4), the currents that it
-            takes there (n, 4).
+        lags: (theta) -> time constant of each current loop (n,).
         energy: (state, currents, theta) -> kinetic energy with the motors', potential energy of
             weight, springs and held currents.
     """
@@ -68,8 +65,7 @@ class DrivenModel:
     motion: Function
     needed: Function
     wrench_matrix: Function
-    step: Function
-    stages: Function
+    lags: Function
     energy: Function
 
     @property
@@ -162,16 +158,15 @@ def _functions(given: Premises) -> dict[str, Function]:
     left = {"needed": now.balanced.whole @ acceleration - unpowered}
     fastest = (motors.coulomb / motors.coulomb_width + motors.viscous) / motors.inertia
     outputs = {"acceleration": solved, "tensions": tensions, "signs": now.pulled.signs}
-    motion = function("motion", moving, outputs)
     return {
         "lengths": function("lengths", posed, {"lengths": now.lengths}),
         "drums": function("drums", {"theta": given.theta}, {"drums": motors.drum_radius}),
         "decays": function("decays", {"theta": given.theta}, {"decays": fastest}),
-        "motion": motion,
+        "lags": function("lags", {"theta": given.theta}, {"lags": motors.time_constant}),
+        "motion": function("motion", moving, outputs),
         "needed": function("needed", asked, left),
         "wrench_matrix": function("wrench_matrix", posed, {"matrix_wrench": gains}),
         "energy": function("energy", moving, _energy(given, now, state, currents)),
-        **_steps(given, motion),
     }
 
 
@@ -188,56 +183,3 @@ def _energy(
         motors.torque_constant * currents, wound
     )
     return {"scalar_kinetic": kinetic / 2, "scalar_potential": potential}
-
-
-def _steps(given: Premises, motion: Function) -> dict[str, Function]:
-    """Runge and Kutta's step of fourth order with the current loop's exponential in it.
-
-    The currents that its stages take are chosen so that the impulse and its first moment are
-    those of the exponential itself: PRBS edges then cost no accuracy at steps near the loop's
-    time constant.
-    """
-    n = given.robot.n_cables
-    state, start = ca.SX.sym("state", N_STATE), ca.SX.sym("currents", n)
-    references, period = ca.SX.sym("references", n), ca.SX.sym("scalar_period")
-    ratio = given.terms.motors.time_constant / period
-    left = ca.exp(-1 / ratio)
-    impulse = ratio * (1 - left)  # integral of the decay over the period, over the period
-    moment = 2 * ratio * (1 - impulse)  # the same weighted with the time that is left, times 2
-    middle = (3 * moment - 1) / 2
-    last = 6 * impulse - 1 - 4 * middle
-    gap = start - references
-    currents = [
-        start,
-        references + gap * middle,
-        references + gap * middle,
-        references + gap * last,
-    ]
-
-    signs = []
-
-    def slope(at: Expression, stage: int) -> Expression:
-        twist_rate, _, sign = motion(at, currents[stage], given.theta)
-        signs.append(sign)
-        return ca.vertcat(at[7:10], quaternion_rate(at[3:7], at[10:]), twist_rate)
-
-    states, slopes = [state], [slope(state, 0)]
-    for stage, fraction in ((1, 0.5), (2, 0.5), (3, 1.0)):
-        states.append(state + fraction * period * slopes[-1])
-        slopes.append(slope(states[-1], stage))
-    after = state + period / 6 * (slopes[0] + 2 * slopes[1] + 2 * slopes[2] + slopes[3])
-    quaternion = after[3:7] / ca.norm_2(after[3:7])
-    ends = {
-        "state_after": ca.vertcat(after[:3], quaternion, after[7:]),
-        "currents_after": references + gap * left,
-        "scalar_turned": ca.mmax(ca.fabs(signs[3] - signs[0])),
-    }
-    inputs = {
-        "state": state,
-        "currents": start,
-        "references": references,
-        "scalar_period": period,
-        "theta": given.theta,
-    }
-    looks = {"matrix_states": ca.horzcat(*states), "matrix_currents": ca.horzcat(*currents)}
-    return {"step": function("step", inputs, ends), "stages": function("stages", inputs, looks)}

@@ -7,8 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from freeswing.cdpr.compiled.native import native
+from freeswing.cdpr.driven.kernels.rigid_kernels import Machine, Pace, all_samples, one_sample
 from freeswing.cdpr.driven.model import N_STATE, DrivenModel
-from freeswing.cdpr.model.batch import Bound, evaluate
+from freeswing.cdpr.model.batch import evaluate
 
 Array = NDArray[np.float64]
 
@@ -89,7 +91,7 @@ def substeps_for(model: DrivenModel, period_s: float, theta: Array) -> int:
 
 
 class Stepper:
-    """Advances a state by one period after another, its memory bound once.
+    """Advances a state by one period after another, as machine code.
 
     A period in which a motor turns round, and its friction with it, is taken again in steps so
     fine that the smoothed sign changes by at most `MOST_TURN` in each.
@@ -104,33 +106,39 @@ class Stepper:
     def __init__(
         self, model: DrivenModel, theta: Array, period_s: float, least: int | None = None
     ) -> None:
-        self.least = substeps_for(model, period_s, theta) if least is None else least
-        self.period_s = period_s
-        self._step = Bound(model.step, 1)
-        self._step.inputs[4][:] = theta
+        self.machine = machine_of(model, theta)
+        self.pace = pace_of(model, theta, period_s, least)
+        self._unused = np.empty(model.n_cables)
 
     def advance(self, state: Array, currents: Array, references: Array) -> tuple[Array, Array, int]:
         """State (13,) and currents (n,) after one period of held references (n,); steps taken."""
-        turned = self._run(state, currents, references, self.least)
-        count = self.least
-        if turned > MOST_TURN:
-            count = self.least * min(int(np.ceil(turned / MOST_TURN)), MOST_REFINED)
-            self._run(state, currents, references, count)
-        outputs = self._step.outputs
-        return outputs[0][0], outputs[1][0], count
+        after, flowing = np.array(state), np.array(currents)
+        count = one_sample(self.machine, self.pace, after, flowing, references, self._unused)
+        return after, flowing, count
 
-    def _run(self, state: Array, currents: Array, references: Array, count: int) -> float:
-        """Take `count` steps; the largest change of a sign in one of them."""
-        step = self._step
-        step.inputs[3][:] = self.period_s / count
-        step.inputs[0][0], step.inputs[1][0], step.inputs[2][0] = state, currents, references
-        step.run()
-        turned = float(step.outputs[2][0, 0])
-        for _ in range(count - 1):
-            step.inputs[0][0], step.inputs[1][0] = step.outputs[0][0], step.outputs[1][0]
-            step.run()
-            turned = max(turned, float(step.outputs[2][0, 0]))
-        return turned
+
+def machine_of(model: DrivenModel, theta: Array) -> Machine:
+    """The model's equations as machine code with memory of its own."""
+    n = model.n_cables
+    code = native(model.motion)
+    inputs = np.zeros(code.n_in)
+    inputs[N_STATE + n :] = theta
+    return Machine(
+        code.address,
+        inputs,
+        np.zeros(code.n_out),
+        evaluate(model.lags, theta)[0],
+        np.zeros((4, N_STATE)),
+        np.zeros((4, n)),
+        np.zeros((4, N_STATE)),
+    )
+
+
+def pace_of(model: DrivenModel, theta: Array, period_s: float, least: int | None) -> Pace:
+    """How steps are chosen for these numbers."""
+    least = substeps_for(model, period_s, theta) if least is None else least
+    reach = LARGEST_REACH * float(np.abs(model.robot.entries_m).max())
+    return Pace(period_s, least, MOST_TURN, MOST_REFINED, reach)
 
 
 def simulate_driven(
@@ -160,23 +168,20 @@ def simulate_driven(
         ValueError: for wrong shapes or numbers, and when the platform leaves its frame for good.
     """
     theta = model.declared if theta is None else np.asarray(theta, dtype=np.float64)
-    references = np.ascontiguousarray(references_A, dtype=np.float64)
+    references = np.array(references_A, dtype=np.float64, order="C")  # kernels want it writable
     start = references[0] if currents_A is None else np.asarray(currents_A, dtype=np.float64)
     _check(model, state, references, start, rate_hz)
-    stepper = Stepper(model, theta, 1.0 / rate_hz, least)
+    pace = pace_of(model, theta, 1.0 / rate_hz, least)
     states, currents = np.empty((len(references), N_STATE)), np.empty_like(references)
     states[0], currents[0] = state, start
-    steps = np.ones(len(references) - 1, dtype=np.intp)
-    limit = LARGEST_REACH * float(np.abs(model.robot.entries_m).max())
-    for k in range(len(references) - 1):
-        after = stepper.advance(states[k], currents[k], references[k])
-        states[k + 1], currents[k + 1], steps[k] = after
-        if not abs(states[k + 1, :3]).max() < limit:
-            raise ValueError(
-                f"at {(k + 1) / rate_hz:.3f} s the platform is at {states[k + 1, :3]} m, more than "
-                f"{LARGEST_REACH:g} frames away: the currents pull it out; take smaller ones"
-            )
-    tensions = evaluate(model.motion, states, currents, theta)[1]
+    tensions, steps = np.empty_like(references), np.ones(len(references) - 1, dtype=np.intp)
+    machine = machine_of(model, theta)
+    lost = all_samples(machine, pace, states, currents, references, tensions, steps)
+    if lost > 0:
+        raise ValueError(
+            f"at {lost / rate_hz:.3f} s the platform is at {states[lost, :3]} m, more than "
+            f"{LARGEST_REACH:g} frames away: the currents pull it out; take smaller ones"
+        )
     times = np.arange(len(references)) / rate_hz
     return DrivenMotion(model, theta, times, states, currents, references, tensions, steps)
 

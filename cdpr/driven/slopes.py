@@ -52,6 +52,31 @@ def motion_slope(model: DrivenModel, chosen: tuple[str, ...] = ()) -> Function:
 
 
 @lru_cache(maxsize=32)
+def directed_slope(model: DrivenModel, chosen: tuple[str, ...] = ()) -> Function:
+    """(state, currents, theta, direction 6) -> direction . (acceleration's derivatives).
+
+    By state, currents and the chosen names of theta, one after another. The acceleration a solves
+    M a = e, so that direction . da = (M^-1 direction) . d(e - M a) with a held: one sweep backwards
+    through the equations instead of one forwards a column.
+
+    Raises:
+        ValueError: for a name that the model does not have.
+    """
+    given, n = model.premises, model.n_cables
+    state, currents = ca.SX.sym("state", N_STATE), ca.SX.sym("currents", n)
+    direction, held, lifted = (ca.SX.sym(name, 6) for name in ("direction", "held", "lifted"))
+    now = scene(given, state[:3], rotation_of(state[3:7]), state[7:], currents)
+    columns = [given.theta[model.index(name)] for name in chosen]
+    by = ca.vertcat(state, currents, *columns)
+    rest = now.balanced.effort - now.balanced.whole @ held
+    slope = ca.gradient(ca.dot(lifted, rest), by)
+    solved = now.balanced.solved(ca.horzcat(now.balanced.effort, direction))
+    slope = ca.substitute(slope, ca.vertcat(held, lifted), ca.vec(solved))
+    inputs = {"state": state, "currents": currents, "theta": given.theta, "direction": direction}
+    return function("directed_slope", inputs, {"slope": slope})
+
+
+@lru_cache(maxsize=32)
 def length_slope(model: DrivenModel, chosen: tuple[str, ...] = ()) -> Function:
     """(pose 7, theta) -> lengths over drum radii (n,), by pose (n, 7), by the chosen (n, k)."""
     given = model.premises

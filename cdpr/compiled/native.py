@@ -1,0 +1,89 @@
+"""CasADi functions compiled for this processor by LLVM, which numba brings along."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cache, lru_cache
+from typing import Any
+
+import llvmlite.binding as llvm
+import numba
+import numpy as np
+from llvmlite import ir
+from numba.core import types
+from numba.extending import intrinsic
+from numpy.typing import NDArray
+
+from freeswing.cdpr.compiled.emit import intermediate
+
+Array = NDArray[np.float64]
+
+# Level 1 compiles 1,800 operations in 0.05 s, and what it makes runs as fast as level 2's.
+OPTIMISED = 1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Native:
+    """Machine code of a function: void (double *in, double *out).
+
+    Attributes:
+        address: where it lies, for `call_at` in kernels.
+        n_in: entries of all inputs.
+        n_out: entries of all outputs.
+        lanes: instants a call.
+        engine: keeps the code in memory.
+    """
+
+    address: int
+    n_in: int
+    n_out: int
+    lanes: int
+    engine: Any
+
+
+@lru_cache(maxsize=64)
+def native(function: Any, lanes: int = 1) -> Native:
+    """The function as machine code; see `emit.intermediate` for how inputs and outputs lie.
+
+    Args:
+        function: a casadi Function of SX expressions with dense outputs.
+        lanes: instants a call.
+
+    Raises:
+        ValueError: for an operation that is not one of scalars.
+    """
+    module = llvm.parse_assembly(intermediate(function, "compiled", lanes))
+    engine = llvm.create_mcjit_compiler(module, _machine())
+    engine.finalize_object()
+    sizes = (
+        sum(function.nnz_in(i) for i in range(function.n_in())),
+        sum(function.nnz_out(i) for i in range(function.n_out())),
+    )
+    return Native(engine.get_function_address("compiled"), *sizes, lanes, engine)
+
+
+@cache
+def _machine() -> Any:
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    features = llvm.get_host_cpu_features().flatten()
+    cpu = llvm.get_host_cpu_name()
+    target = llvm.Target.from_default_triple()
+    return target.create_target_machine(cpu=cpu, features=features, opt=OPTIMISED)
+
+
+@intrinsic
+def call_at(typing_context, address, inputs, outputs):
+    """In a kernel: call `Native.address` with the addresses of two contiguous arrays."""
+
+    def generate(context, builder, signature, arguments):
+        pointer = ir.PointerType(ir.DoubleType())
+        kind = ir.PointerType(ir.FunctionType(ir.VoidType(), [pointer, pointer]))
+        places = [builder.inttoptr(argument, pointer) for argument in arguments[1:]]
+        builder.call(builder.inttoptr(arguments[0], kind), places)
+        return context.get_dummy_value()
+
+    whole = types.none(types.intp, types.intp, types.intp)
+    return whole, generate
