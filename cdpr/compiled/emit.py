@@ -54,7 +54,8 @@ def intermediate(function: Any, name: str, lanes: int = 1) -> str:
         name: what the machine code is called.
         lanes: how many instants one call computes.
 
-    `in` holds all inputs one after another, columns first, each entry `lanes` times; `out` likewise.
+    `in` holds all inputs one after another, columns first, each entry `lanes` times; `out` does
+    so for the outputs.
 
     Raises:
         ValueError: for an operation that is not one of scalars.
@@ -98,7 +99,8 @@ class _Text:
     def whole(self, name: str) -> str:
         head = "\n".join(sorted(self.declared))
         body = "\n".join(self.lines)
-        return f"{head}\ndefine void @{name}(ptr noalias %in, ptr noalias %out) {{\n{body}\nret void\n}}\n"
+        signature = f"define void @{name}(ptr noalias %in, ptr noalias %out)"
+        return f"{head}\n{signature} {{\n{body}\nret void\n}}\n"
 
     def constant(self, value: float) -> str:
         bits = f"0x{np.float64(value).view(np.uint64):016X}"

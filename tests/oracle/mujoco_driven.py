@@ -53,24 +53,21 @@ def mujoco_driven(
 
     A motor of inertia j on a drum of radius r is an armature of j / r^2 on its tendon, its viscous
     friction a damping of f / r^2, its balancing spring a stiffness of k_sp r_pe^2 / r^2 with zero
-    rest length; a current pulls with -k_em I / r. RK4 at 0.2 ms; the current of a step is that of
-    the first-order lag at its middle.
+    rest length; a current pulls with -k_em I / r. RK4 at 0.2 ms, currents among its states: held
+    over each step instead, they alone leave 0.5 um and 0.013 mrad at 5 Hz, a quarter at half the
+    step.
     """
     model = mujoco.MjModel.from_xml_string(_xml(robot, body, pose))
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
+    data.act[:] = start_A
     per_sample = round(1.0 / (rate_hz * TIME_STEP_S))
-    poses, current = np.empty((len(references_A), 7)), np.array(start_A, dtype=float)
-    whole = np.exp(-TIME_STEP_S / body.time_constant_s)
-    # Mean of the exponential over a step: what a held force must be for the same impulse.
-    mean = (1.0 - whole) * body.time_constant_s / TIME_STEP_S
+    poses = np.empty((len(references_A), 7))
     for k, reference in enumerate(references_A):
         poses[k] = data.qpos
+        data.ctrl[:] = reference
         for _ in range(per_sample):
-            held = reference + (current - reference) * mean
-            data.ctrl[:] = -body.torque_constant / body.drum_m * held
             mujoco.mj_step(model, data)
-            current = reference + (current - reference) * whole
     return poses
 
 
@@ -90,7 +87,12 @@ def _xml(robot: Robot, body: DrivenBody, pose: Array) -> str:
         f'<site site="d{k}"/><site site="a{k}"/></spatial>'
         for k in range(robot.n_cables)
     )
-    motors = "".join(f'<motor tendon="t{k}"/>' for k in range(robot.n_cables))
+    gains = -body.torque_constant / body.drum_m
+    motors = "".join(
+        f'<general tendon="t{k}" gainprm="{float(gains[k])!r}" dyntype="filter" '
+        f'dynprm="{body.time_constant_s!r}"/>'
+        for k in range(robot.n_cables)
+    )
     return f"""
 <mujoco>
   <compiler angle="radian"/>

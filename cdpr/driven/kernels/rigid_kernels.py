@@ -172,7 +172,7 @@ def one_sample(machine, pace, state, currents, references, tensions):
 
 @numba.njit(cache=True, nogil=True)
 def all_samples(machine, pace, states, currents, references, tensions, steps):
-    """Fill states (n_t, 13), currents and tensions (n_t, n), steps (n_t - 1,) from their first rows.
+    """Fill states (n_t, 13), currents and tensions (n_t, n), steps (n_t - 1,) from first rows.
 
     Returns the row at which the platform is lost, or -1.
     """

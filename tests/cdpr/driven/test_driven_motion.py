@@ -38,20 +38,19 @@ def apart(poses, others):
     return np.linalg.norm(poses[:, :3] - others[:, :3], axis=1).max(), turn.max()
 
 
-@pytest.mark.parametrize("rate_hz", [1, 5])
-def test_the_motion_is_mujocos(rate_hz):
+@pytest.mark.parametrize(("rate_hz", "seed"), [(1, 4), (5, 4), (5, 5)])
+def test_the_motion_is_mujocos(rate_hz, seed):
     model = inca()
     theta = model.theta({"coulomb_N_m": 0.0})
     start = static_pose(model, np.zeros(8), theta).pose
-    references = random_bits(rate_hz, 3.0, seed=4)
+    references = random_bits(rate_hz, 3.0, seed)
     found = simulate_driven(model, np.concatenate([start, np.zeros(6)]), references, 1000.0, theta)
     expected = mujoco_driven(model.robot, TABLE_1, start, references, 1000.0, references[0])
     travel = np.ptp(expected[:, :3], axis=0).max()
     assert travel > 0.5, f"travels {travel:.2f} m: nothing was compared"
     metres, radians = apart(found.poses, expected)
-    # Measured 1e-7 to 5e-7 m and 1e-6 to 1e-5 rad: MuJoCo holds the current over its 0.2 ms.
     assert metres < 1e-6, f"{metres * 1e3:.6f} mm apart"
-    assert radians < 1.5e-5, f"{radians * 1e3:.4f} mrad apart"
+    assert radians < 1e-5, f"{radians * 1e3:.4f} mrad apart"
 
 
 def test_energy_is_kept_under_constant_currents():
@@ -61,8 +60,7 @@ def test_energy_is_kept_under_constant_currents():
     currents = np.linspace(0.2, 0.9, 8)
     references = np.tile(currents, (5001, 1))
     start = random_states(1)[0]
-    # 1 ms steps leave 1.1e-9; a sample of two steps has a sixteenth of that.
-    found = simulate_driven(model, start, references, 1000.0, theta, least=2)
+    found = simulate_driven(model, start, references, 1000.0, theta)
     kinetic, potential = evaluate(model.energy, found.states, found.currents_A, theta)
     drift = np.abs(kinetic + potential - kinetic[0] - potential[0]).max()
     assert drift < 1e-9 * kinetic.max(), f"drift {drift / kinetic.max():.1e} of the kinetic energy"
@@ -184,9 +182,11 @@ def test_dry_friction_is_followed_whatever_the_step():
 
 def test_steps_follow_the_fastest_friction():
     model = inca()
-    decay = 4.4e-3 / 0.1 / 3.88e-5 + 6.68e-5 / 3.88e-5
-    assert substeps_for(model, 0.99 * MOST_DECAY / decay, model.declared) == 1
-    assert substeps_for(model, 1.01 * MOST_DECAY / decay, model.declared) == 2
+    theta = model.theta({"coulomb_N_m": 44e-3})
+    decay = 44e-3 / 0.1 / 3.88e-5 + 6.68e-5 / 3.88e-5
+    assert substeps_for(model, 0.99 * MOST_DECAY / decay, theta) == 1
+    assert substeps_for(model, 1.01 * MOST_DECAY / decay, theta) == 2
+    assert substeps_for(model, 1e-3, model.declared) == 2
     with pytest.raises(ValueError, match="motor_inertia_kg_m2"):
         substeps_for(model, 1.0, model.declared)
 

@@ -31,7 +31,7 @@ class MujocoBody:
         self._model = mujoco.MjModel.from_xml_string(mujoco_driven._xml(robot, body, pose7(start)))
         self._data = mujoco.MjData(self._model)
         mujoco.mj_forward(self._model, self._data)
-        self.currents = OwnBody(loop, start).currents
+        self._data.act[:] = OwnBody(loop, start).currents
         self._zero = self._data.ten_length.copy()
 
     @property
@@ -43,15 +43,14 @@ class MujocoBody:
         mujoco.mj_fwdPosition(self._model, self._data)
         return (self._zero - self._data.ten_length) / self._body.drum_m
 
+    @property
+    def currents(self):
+        return self._data.act.copy()
+
     def move(self, references):
-        step, tau = mujoco_driven.TIME_STEP_S, self._body.time_constant_s
-        whole = np.exp(-step / tau)
-        mean = (1.0 - whole) * tau / step
-        for _ in range(round(1e-3 / step)):
-            held = references + (self.currents - references) * mean
-            self._data.ctrl[:] = -self._body.torque_constant / self._body.drum_m * held
+        self._data.ctrl[:] = references
+        for _ in range(round(1e-3 / mujoco_driven.TIME_STEP_S)):
             mujoco.mj_step(self._model, self._data)
-            self.currents = references + (self.currents - references) * whole
 
 
 OwnBody = closed_loop._Body
