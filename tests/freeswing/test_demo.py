@@ -56,6 +56,7 @@ def test_a_short_one_by_motion_capture(
     check_ending(folder, capsys.readouterr().out)
 
 
+@pytest.mark.slow
 def test_held_out_swings_under_their_true_model(tmp_path: Path) -> None:
     """All swings are predicted to their noise; a fit of the start that gets stuck is begun anew."""
     session = read_session(mocap.write_mocap_session(tmp_path / "demo"))

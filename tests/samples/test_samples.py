@@ -13,6 +13,7 @@ from freeswing.main import main
 from tests.samples.expectations import SAMPLES, check_diagnosis, check_inertia, result
 
 NAMES = ("mocap-trc", "three-cables", "two-cables", "undeclared-drag")
+QUICK = "two-cables"
 
 
 def test_all_samples_are_tested() -> None:
@@ -27,7 +28,10 @@ def test_a_sample_is_found_in_order(name: str, tmp_path: Path) -> None:
     assert [one for one in findings if one["level"] != "note"] == []
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(
+    "name",
+    [name if name == QUICK else pytest.param(name, marks=pytest.mark.slow) for name in NAMES],
+)
 def test_a_sample_is_identified(name: str, tmp_path: Path) -> None:
     assert main(["identify", str(SAMPLES / name), "--results", str(tmp_path), "--quiet"]) == 0
     check_inertia(name, tmp_path)

@@ -51,7 +51,8 @@ def whole(session, tmp_path_factory) -> Path:
     return results
 
 
-@pytest.mark.parametrize("workers", [1, pytest.param(2, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("workers", [1, 2])
 def test_kill_9_in_the_middle_leaves_the_same_result(session, whole, tmp_path, workers) -> None:
     done = killed_after_a_piece(session, tmp_path, workers)
     assert 1 <= done < 4, f"{done} of 4 pieces were there when it was killed"

@@ -35,6 +35,7 @@ def accepted(found):
     }
 
 
+@pytest.mark.slow
 def test_one_displaced_attachment_is_found_without_touching_the_others(tmp_path):
     truth, found = diagnosed(tmp_path, {"attachment_offset": "medium"}, 21, POINTS)
     values = accepted(found)
@@ -48,6 +49,7 @@ def test_one_displaced_attachment_is_found_without_touching_the_others(tmp_path)
         assert abs(value - expected[key]) < 4 * std + 5e-5, (key, value, std, expected[key])
 
 
+@pytest.mark.slow
 def test_a_clock_offset_between_orientations_and_positions_is_found(tmp_path):
     _, found = diagnosed(tmp_path, {"clock_offset": "medium"}, 22, POINTS)
     values = accepted(found)

@@ -130,7 +130,7 @@ def _identified(runs: list[SwingRun], settings: IdentifySettings) -> dict[str, E
     return identify(runs, paper_model().robot, settings).estimates
 
 
-@pytest.mark.parametrize("method", ["likely", "published"])
+@pytest.mark.parametrize("method", [pytest.param("likely", marks=pytest.mark.slow), "published"])
 def test_estimates_are_held_to_possible_bodies(method: str, request: pytest.FixtureRequest):
     free, held = request.getfixturevalue(method)
     assert not free.consistency.is_possible, f"{free.consistency}"
@@ -141,6 +141,7 @@ def test_estimates_are_held_to_possible_bodies(method: str, request: pytest.Fixt
     assert any("held to the inertia" in note for note in held.notes), f"{held.notes}"
 
 
+@pytest.mark.slow
 def test_holding_brings_maximum_likelihood_no_farther_from_the_truth(likely: Pair):
     free, held = likely
     off = [one.values - thin_plate() for one in likely]
@@ -150,6 +151,7 @@ def test_holding_brings_maximum_likelihood_no_farther_from_the_truth(likely: Pai
     assert np.abs(z).max() < 4.0, f"z-scores {np.round(z, 1)}"
 
 
+@pytest.mark.slow
 def test_consistent_at_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     write_robot(tmp_path / "robot.toml", paper_model().robot)
     runs = []

@@ -64,7 +64,12 @@ def session(folder: Path, runs: list[SwingRun]) -> Path:
 
 @pytest.mark.parametrize(
     ("seed", "more"),
-    [(0, ["--fidim-only"]), (1, ["--fidim-only"]), (2, ["--fidim-only"]), (2, [])],
+    [
+        (0, ["--fidim-only"]),
+        pytest.param(1, ["--fidim-only"], marks=pytest.mark.slow),
+        pytest.param(2, ["--fidim-only"], marks=pytest.mark.slow),
+        pytest.param(2, [], marks=pytest.mark.slow),
+    ],
 )
 def test_made_up_curves_are_refused_at_the_command_line(
     seed: int, more: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -42,8 +42,15 @@ def filmed(equilibrium: int, rate_hz: int, coordinates: tuple[str, ...], seed: i
     return prepared
 
 
-@pytest.mark.parametrize("coordinates", [("x", "y"), POSE_COORDINATES])
-@pytest.mark.parametrize("equilibrium", [7, 11])
+@pytest.mark.parametrize(
+    ("equilibrium", "coordinates"),
+    [
+        (7, POSE_COORDINATES),
+        (11, ("x", "y")),
+        pytest.param(7, ("x", "y"), marks=pytest.mark.slow),
+        pytest.param(11, POSE_COORDINATES, marks=pytest.mark.slow),
+    ],
+)
 def test_fast_swings_at_40_hz_are_predicted_to_their_noise(
     equilibrium: int, coordinates: tuple[str, ...]
 ):
