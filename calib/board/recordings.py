@@ -163,7 +163,8 @@ def _video(recording: Recording) -> Iterator[tuple[int, str, Image]]:
                 number = places.get(frame.pts, index) if frame.pts is not None else index
                 label = f"{recording.path.name} frame {number}"
                 image = np.asarray(frame.to_ndarray(format="gray"), np.uint8)
-                yield number, label, upright(image, turn_of(frame))
+                # One layout for all: kernels are compiled once for each they meet.
+                yield number, label, np.ascontiguousarray(upright(image, turn_of(frame)))
     except (FFmpegError, OSError) as error:
         raise InputError(f"{recording.path}: cannot be decoded ({error})") from error
 

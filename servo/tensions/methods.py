@@ -111,7 +111,7 @@ def distribute_all(demands: Demands, method: str = "nearest") -> Shares:
         status, scale = [row.status for row in rows], np.array([row.scale for row in rows])
         stops = [row.stops for row in rows]
     else:
-        A, b, offset, lower, upper, wish = (np.ascontiguousarray(array) for array in numbers)
+        A, b, offset, lower, upper, wish = (np.array(array, order="C") for array in numbers)
         x, status, scale, stops = distribute_rows(A, b, offset, lower, upper, wish, KERNELS[method])
     named = tuple(None if c < 0 else (int(c) // 2, "high" if c % 2 else "low") for c in stops)
     return Shares(x, tuple(WORDS[int(s)] for s in status), scale, named)

@@ -87,5 +87,7 @@ def wrench_cases(
         lower = np.maximum(0.0, (1.48 - springs) / per_A)
         upper = np.minimum(3.0, (18.5 - springs) / per_A)
         wish = (10.0 - springs) / per_A
-        cases.append((-J.T * per_A, wrench, -J.T @ springs, lower, upper, wish))
+        cases.append(
+            (np.ascontiguousarray(-J.T * per_A), wrench, -J.T @ springs, lower, upper, wish)
+        )
     return cases

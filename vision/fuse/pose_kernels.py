@@ -287,7 +287,7 @@ def solve_block(
             lags[a:b],
             counts[a:b],
             limit,
-            12,
+            np.int64(12),  # not a literal, for which it would be compiled once more
             covariances[k],
             scores[a:b],
         )

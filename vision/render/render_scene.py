@@ -258,7 +258,8 @@ class Renderer:
 
 def _per_row(values: Array, rows: int) -> Array:
     """One value an image row, from as many or from a single one."""
-    return np.ascontiguousarray(np.broadcast_to(values, (rows, *values.shape[1:])), np.float64)
+    # A copy: kernels would be compiled once more for a read-only view.
+    return np.array(np.broadcast_to(values, (rows, *values.shape[1:])), np.float64, order="C")
 
 
 def _changes(patch: Patch) -> bool:

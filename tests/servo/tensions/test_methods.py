@@ -140,7 +140,7 @@ def test_tensions_are_continuous_along_a_path(method):
         lengths, J = cables(np.array([0.2 * np.sin(s), 0.1 * np.cos(2 * s), 0.1, 0, 0, 0.05]))
         wrench = 0.8 * np.array([2.5 * np.sin(3 * s), 2.0 * np.cos(s), 2.8, 0, 0.1 * np.sin(s), 0])
         ends = np.full(8, 1.48), np.full(8, 18.5)
-        return distribute(-J.T, wrench, np.zeros(6), *ends, lengths, method)
+        return distribute(np.ascontiguousarray(-J.T), wrench, np.zeros(6), *ends, lengths, method)
 
     steps = []
     for count in (200, 400, 800):
