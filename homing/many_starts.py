@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from freeswing.homing.fit_start_pose import LOSS_LIMIT
 from freeswing.homing.guess_from_tensions import TensionEnergy, stable_starts
 
 if TYPE_CHECKING:
@@ -31,7 +32,6 @@ ROWS = 13  # that lie far apart tell a wrong start as surely as all of them, and
 _STEPS = 20
 _DAMPING = 1e-6
 _SMALLEST_STEP = 1e-7
-_LOSS_LIMIT = 3.0  # standard deviations, as in the fit that follows
 
 
 def many_starts(energy: TensionEnergy, n_cables: int) -> Array:
@@ -132,5 +132,5 @@ def _place(
 
 def _huber(residuals: Array) -> Array:
     size = np.abs(residuals)
-    inside = np.minimum(size, _LOSS_LIMIT)
-    return (0.5 * inside**2 + _LOSS_LIMIT * (size - inside)).sum(axis=1)
+    inside = np.minimum(size, LOSS_LIMIT)
+    return (0.5 * inside**2 + LOSS_LIMIT * (size - inside)).sum(axis=1)

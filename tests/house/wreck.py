@@ -44,6 +44,11 @@ class Held:
     tests: str
 
 
+LOOK = "tests/vision/look/test_look_limits.py"
+FUSE = "tests/vision/fuse/test_fuse_limits.py"
+RIG = "tests/vision/rig/test_rig_limits.py"
+HOMING = "tests/homing/test_limits.py"
+
 HELD = (
     Held(
         "calib/verdict/grades.py",
@@ -101,8 +106,79 @@ HELD = (
         "tests/ident/signals/test_limits.py",
     ),
     Held("ident/signals/motions.py", ("LENGTH_LIMIT_M",), "tests/ident/signals/test_limits.py"),
-    Held("ident/signals/prepare.py", ("LEAST_SIGNAL",), "tests/ident/signals/test_limits.py"),
-    Held("vision/rig/correct_rig.py", ("SIGMAS",), "tests/vision/rig/test_rig_limits.py"),
+    Held(
+        "ident/signals/prepare.py",
+        ("LARGEST_AMPLIFICATION", "LEAST_SIGNAL"),
+        "tests/ident/signals/test_limits.py",
+    ),
+    Held(
+        "vision/look/markers.py",
+        (
+            "_MARGIN", "_NEAR_PX", "_LEAST_PIXELS", "_MOST_SIDE_PX", "_LEAST_CONTRAST",
+            "_LEAST_FILL", "_LEAST_ASPECT",
+        ),
+        LOOK,
+    ),
+    Held(
+        "vision/look/label.py",
+        ("_GATE_M", "_CLEAR", "_MATCH_M", "_RAYS_MEET_M", "_FORGET", "_START_EVERY"),
+        LOOK,
+    ),
+    Held("vision/look/marker_pose.py", ("MOST_SPOTS", "_NEAR_M", "_EXACT_M", "_CLEAR"), LOOK),
+    Held("vision/look/occlusion.py", ("_RIM_CELLS", "_READ_CELLS", "_LEAST_HEIGHT"), LOOK),
+    Held(
+        "vision/look/target_check.py",
+        ("WRONG_SHARE", "_FITS_SHARE", "_LEAST_FRAMES", "_SAME_SIZE"),
+        LOOK,
+    ),
+    Held(
+        "vision/look/follow.py",
+        (
+            "_BASE_EVERY", "_SEARCH_EVERY", "_EAGER_SEARCHES", "_FACING", "_DARK_SPREAD",
+            "_SATURATED", "_BRIGHT_SHARE",
+        ),
+        LOOK,
+    ),
+    Held("vision/fuse/fuse_cameras.py", ("LEAST_FLOOR_PX", "_REJECT"), FUSE),
+    Held("vision/fuse/calibration_share.py", ("_LEFT_OUT",), FUSE),
+    Held(
+        "vision/rig/gross_faults.py",
+        (
+            "MOST_TURN_RAD", "MOST_SHIFT_M", "MOST_APART_M", "MOST_FLOOR_PX", "MOST_REJECTED",
+            "_SAME_TURN_RAD", "_SAME_SIZE",
+        ),
+        RIG,
+    ),
+    Held("vision/rig/kept_clocks.py", ("MOST_APART_S",), RIG),
+    Held("vision/rig/alignment.py", ("CLEARLY_BETTER", "IN_EARNEST", "WORSE_M"), RIG),
+    Held(
+        "calib/rig/solve_rig.py",
+        (
+            "VIEW_OUTLIER_SIGMAS", "VIEW_OUTLIER_FLOOR_PX", "CORNER_SIGMAS", "LINE_TIME_SIGMAS",
+            "SHAPE_SIGMAS", "LEAST_SHAPE_M", "LEAST_READOUT_S", "_SURVEY_PRIOR",
+            "LEAST_SURVEY_STD_M",
+        ),
+        "tests/calib/rig/test_rejections.py",
+    ),
+    Held(
+        "calib/rig/coarse_clocks.py",
+        (
+            "MOST_OFFSET_S", "LEAST_OVERLAP", "LEAST_CORRELATION", "LEAST_SPEED_PX_S",
+            "LEAST_MOVING", "_MOST_GAP",
+        ),
+        "tests/calib/rig/test_rejections.py",
+    ),
+    Held("calib/rig/triangulation.py", ("_LEAST_ANGLE_RAD",), "tests/calib/rig/test_rejections.py"),
+    Held("homing/best_fit.py", ("_GOOD_FIT", "_FAR_OFF"), HOMING),
+    Held("homing/home.py", ("_DOUBTFUL_FIT",), HOMING),
+    Held("homing/homing_document.py", ("_SUSPECT_WEIGHT",), HOMING),
+    Held("homing/fit_start_pose.py", ("LOSS_LIMIT",), HOMING),
+    Held(
+        "homing/swivel_advice.py",
+        ("_SMALLEST_ARM_RADII", "_SMALLEST_ARM_SHARE", "_WORTHWHILE"),
+        HOMING,
+    ),
+    Held("vision/rig/correct_rig.py", ("SIGMAS",), RIG),
     Held(
         "vision/rig/rig_effects.py",
         ("MOVED_PX", "LEAST_CLOCK_S", "LEAST_LINE_S"),
