@@ -35,6 +35,7 @@ NAMES = {
     "commands.session.run": "usage",
     "demo": "demo",
     "export": "export",
+    "front": "usage",
     "excite": "plan",
     "homing": "homing",
     "ident": "fit",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import subprocess
 import sys
@@ -29,8 +30,9 @@ def test_example_runs(title: str, code: str) -> None:
     assert done.stdout.strip() != "", title
 
 
+@pytest.mark.slow
 def test_it_is_built_without_warnings(tmp_path: Path) -> None:
-    pytest.importorskip("mkdocs", reason="the extra `docs` is not installed")
+    pytest.importorskip("mkdocstrings", reason="the extra `docs` is not installed")
     words = ["-m", "mkdocs", "build", "--strict", "--site-dir", str(tmp_path / "site")]
     done = subprocess.run(
         [sys.executable, *words], cwd=ROOT, capture_output=True, text=True, check=False
@@ -38,6 +40,10 @@ def test_it_is_built_without_warnings(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert "WARNING" not in done.stderr, done.stderr
     assert (tmp_path / "site" / "api.html").is_file()
+    reference = (tmp_path / "site" / "reference" / "front.html").read_text(encoding="utf-8")
+    assert 'id="freeswing.front.found.Found.plot"' in reference, "docstrings become a reference"
+    index = json.loads((tmp_path / "site" / "search" / "search_index.json").read_bytes())
+    assert any("swivel" in page["text"] for page in index["docs"]), "and all of it is searched"
 
 
 def test_every_package_has_an_example() -> None:
