@@ -14,12 +14,21 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from freeswing.cdpr.driven.equations import quaternion_rate, rotation_of
+from freeswing.cdpr.compiled.native import native
+from freeswing.cdpr.driven.equations import rotation_of
+from freeswing.cdpr.driven.kernels.elastic_kernels import ElasticMachine, elastic_samples
 from freeswing.cdpr.driven.model import N_STATE, DrivenModel, function
+from freeswing.cdpr.driven.motion import (
+    LARGEST_REACH,
+    MOST_DECAY,
+    DrivenMotion,
+    pace_of,
+    substeps_for,
+)
 from freeswing.cdpr.driven.scene import scene
 from freeswing.cdpr.driven.slopes import moved
 from freeswing.cdpr.driven.statics import static_pose
-from freeswing.cdpr.model.batch import Bound, evaluate
+from freeswing.cdpr.model.batch import evaluate
 from freeswing.cdpr.model.factors import Factors
 
 Array = NDArray[np.float64]
@@ -31,46 +40,22 @@ MOST_SUBSTEPS = 200
 
 
 @dataclass(frozen=True, slots=True)
-class ElasticMotion:
-    """A simulated motion at the sample times.
+class Stretch:
+    """How cables give way.
 
     Attributes:
-        model: the robot.
-        theta: its numbers.
-        times_s: (n_t,).
-        states: as of the rigid model, (n_t, 13).
-        lengths_out_m: unstretched cable let out, (n_t, n).
-        currents_A: (n_t, n).
-        references_A: held from each sample to the next, (n_t, n).
-        tensions_N: never negative, (n_t, n).
-        substeps: integration steps a sample.
+        stiffness_EA_N: axial stiffness EA.
+        relaxation_s: damping over stiffness (Kelvin and Voigt).
     """
 
-    model: DrivenModel
-    theta: Array
-    times_s: Array
-    states: Array
-    lengths_out_m: Array
-    currents_A: Array
-    references_A: Array
-    tensions_N: Array
-    substeps: int
-
-    def angles_rad(self, zero_pose: Array) -> Array:
-        """Motor angles, zero where cables to this pose would be let out unstretched, (n_t, n)."""
-        zero = evaluate(self.model.lengths, zero_pose, self.theta)[0]
-        return (zero - self.lengths_out_m) / evaluate(self.model.drums, self.theta)[0]
-
-    @property
-    def slack(self) -> NDArray[np.bool_]:
-        """Where a cable does not pull, (n_t, n)."""
-        return self.tensions_N <= 0.0
+    stiffness_EA_N: float
+    relaxation_s: float = 0.0
 
 
 def elastic_rest(
-    model: DrivenModel, currents: Array, stiffness_EA_N: float, theta: Array | None = None
-) -> tuple[Array, Array]:
-    """Pose (7,) and lengths let out (n,) at rest under held currents, all cables taut.
+    model: DrivenModel, currents: Array, stretch: Stretch, theta: Array | None = None
+) -> Array:
+    """Pose (7,) at rest under held currents, all cables taut.
 
     Raises:
         ValueError: when a cable is slack there or the search does not settle.
@@ -78,14 +63,14 @@ def elastic_rest(
     theta = model.declared if theta is None else theta
     pose, force = static_pose(model, currents, theta).pose, np.full(6, np.inf)
     for _ in range(50):
-        force, out = _pull_at_rest(model, pose, currents, stiffness_EA_N, theta)
+        force = _pull_at_rest(model, pose, currents, stretch, theta)
         if np.abs(force).max() < 1e-11:
-            return pose, out
+            return pose
         columns = []
         for k in range(6):
             shift = 1e-6 * np.eye(6)[k]
             ends = [
-                _pull_at_rest(model, moved(pose, s * shift), currents, stiffness_EA_N, theta)[0]
+                _pull_at_rest(model, moved(pose, s * shift), currents, stretch, theta)
                 for s in (1.0, -1.0)
             ]
             columns.append((ends[0] - ends[1]) / 2e-6)
@@ -93,27 +78,29 @@ def elastic_rest(
     raise ValueError(f"no rest found: {np.abs(force).max():.2g} N are left at {pose.round(4)}")
 
 
-def _pull_at_rest(
-    model: DrivenModel, pose: Array, currents: Array, stiffness: float, theta: Array
-) -> tuple[Array, Array]:
-    """Wrench on the platform (6,) with every motor at rest, and the lengths let out (n,)."""
-    lengths = evaluate(model.lengths, pose, theta)[0]
+def out_at_rest(
+    model: DrivenModel, poses: Array, currents: Array, stretch: Stretch, theta: Array
+) -> Array:
+    """Lengths let out where every motor balances its cable, (..., n), for poses (..., 7)."""
+    lengths = evaluate(model.lengths, poses, theta)[0]
     spring, constant = evaluate(_held(model), currents, theta)
     # EA (L - l) / l = spring l + constant: the positive root.
-    half = 0.5 * (constant + stiffness)
-    out = (
-        2.0
-        * stiffness
-        * lengths
-        / (2.0 * half + 2.0 * np.sqrt(half**2 + spring * stiffness * lengths))
-    )
+    half, stiffness = 0.5 * (constant + stretch.stiffness_EA_N), stretch.stiffness_EA_N
+    return stiffness * lengths / (half + np.sqrt(half**2 + spring * stiffness * lengths))
+
+
+def _pull_at_rest(
+    model: DrivenModel, pose: Array, currents: Array, stretch: Stretch, theta: Array
+) -> Array:
+    """Wrench on the platform (6,) with every motor at rest."""
+    out = out_at_rest(model, pose, currents, stretch, theta)
+    spring, constant = evaluate(_held(model), currents, theta)
     tensions = spring * out + constant
     if tensions.min() <= 0.0:
         raise ValueError(f"cable {int(np.argmin(tensions)) + 1} is slack at rest")
     state = np.concatenate([pose, np.zeros(6)])
     rows = evaluate(_rows(model), pose, theta)[0]
-    weight = evaluate(_weight(model), state, theta)[0]
-    return weight - rows.T @ tensions, out
+    return evaluate(_weight(model), state, theta)[0] - rows.T @ tensions
 
 
 @lru_cache(maxsize=8)
@@ -145,116 +132,138 @@ def _weight(model: DrivenModel) -> Function:
 
 
 @lru_cache(maxsize=8)
-def _step(model: DrivenModel) -> Function:
-    """(state, out, rates, currents, references, period, EA, theta) -> all of them afterwards."""
+def _elastic_motion(model: DrivenModel) -> Function:
+    """(state, out, rates, currents, EA, relaxation, theta) -> accelerations, tensions."""
     given, n = model.premises, model.n_cables
     motors = given.terms.motors
-    names = {"state": N_STATE, "out": n, "rates": n, "currents": n, "references": n}
-    s = {name: ca.SX.sym(name, size) for name, size in names.items()}
-    period, stiffness = ca.SX.sym("scalar_period"), ca.SX.sym("scalar_EA")
-
-    def slope(y: Any, fraction: float) -> tuple[Any, Any]:
-        state, out, rates = y[:N_STATE], y[N_STATE : N_STATE + n], y[N_STATE + n :]
-        turn = rotation_of(state[3:7])
-        now = scene(given, state[:3], turn, state[7:], ca.SX.zeros(n))
-        tensions = ca.fmax(stiffness * (now.lengths - out) / out, 0)
-        gap = s["currents"] - s["references"]
-        flows = s["references"] + gap * ca.exp(-fraction * period / motors.time_constant)
-        unwinding = rates / motors.drum_radius
-        torque = (
-            motors.drum_radius * tensions
-            - motors.spring * out / motors.drum_radius
-            - motors.torque_constant * flows
-            - motors.viscous * unwinding
-            - motors.coulomb * ca.tanh(unwinding / motors.coulomb_width)
-        )
-        effort = now.outer - now.body.gyration(turn, state[10:]) - now.rows.T @ tensions
-        twist_rate = Factors.of(now.body.matrix(turn)).solved(effort)
-        pose_rate = ca.vertcat(state[7:10], quaternion_rate(state[3:7], state[10:]))
-        return ca.vertcat(
-            pose_rate, twist_rate, rates, motors.drum_radius * torque / motors.inertia
-        ), tensions
-
-    y = ca.vertcat(s["state"], s["out"], s["rates"])
-    first, tensions = slope(y, 0.0)
-    second = slope(y + period / 2 * first, 0.5)[0]
-    third = slope(y + period / 2 * second, 0.5)[0]
-    fourth = slope(y + period * third, 1.0)[0]
-    y = y + period / 6 * (first + 2 * second + 2 * third + fourth)
-    quaternion = y[3:7] / ca.norm_2(y[3:7])
-    left = ca.exp(-period / motors.time_constant)
+    sizes = {"state": N_STATE, "out": n, "rates": n, "currents": n}
+    s = {name: ca.SX.sym(name, size) for name, size in sizes.items()}
+    stiffness, relaxation = ca.SX.sym("scalar_EA"), ca.SX.sym("scalar_relaxation")
+    state, out = s["state"], s["out"]
+    turn = rotation_of(state[3:7])
+    now = scene(given, state[:3], turn, state[7:], ca.SX.zeros(n))
+    lengthening = ca.vertcat(*[one.rate for one in now.lines])
+    strain = (now.lengths - out) / out
+    straining = (lengthening - s["rates"] * (1 + strain)) / out
+    tensions = ca.fmax(stiffness * (strain + relaxation * straining), 0)
+    unwinding = s["rates"] / motors.drum_radius
+    sign = ca.tanh(unwinding / motors.coulomb_width)
+    torque = (
+        motors.drum_radius * tensions / (1 + motors.roll * sign)
+        - motors.spring * out / motors.drum_radius
+        - motors.torque_constant * s["currents"]
+        - motors.viscous * unwinding
+        - motors.coulomb * sign
+    )
+    effort = now.outer - now.body.gyration(turn, state[10:]) - now.rows.T @ tensions
     outputs = {
-        "state_after": ca.vertcat(y[:3], quaternion, y[7:N_STATE]),
-        "out_after": y[N_STATE : N_STATE + n],
-        "rates_after": y[N_STATE + n :],
-        "currents_after": s["references"] + (s["currents"] - s["references"]) * left,
+        "acceleration": Factors.of(now.body.matrix(turn)).solved(effort),
+        "letting": motors.drum_radius * torque / motors.inertia,
         "tensions": tensions,
     }
-    inputs = {**s, "scalar_period": period, "scalar_EA": stiffness, "theta": given.theta}
-    return function("elastic_step", inputs, outputs)
+    constants = {"scalar_EA": stiffness, "scalar_relaxation": relaxation, "theta": given.theta}
+    return function("elastic_motion", {**s, **constants}, outputs)
 
 
 def simulate_elastic(
     model: DrivenModel,
-    pose: Array,
-    lengths_out_m: Array,
+    state: Array,
     references_A: Array,
     rate_hz: float,
-    stiffness_EA_N: float,
+    stretch: Stretch,
     theta: Array | None = None,
+    *,
     currents_A: Array | None = None,
-) -> ElasticMotion:
-    """The motion from rest at a pose with given lengths let out, see `elastic_rest`.
+) -> DrivenMotion:
+    """The motion of elastic cables, slack ones included; motors begin in balance with currents.
+
+    Args:
+        model: the equations.
+        state: at the first sample, (13,).
+        references_A: held from each row to the next, (n_t, n).
+        rate_hz: samples a second.
+        stretch: of the cables.
+        theta: the model's numbers; None as declared.
+        currents_A: what flows at the start, (n,); None: the first references.
 
     Raises:
         ValueError: for a stiffness that is not positive, or so large that `MOST_SUBSTEPS` steps a
-            sample do not follow it: the rigid model is the limit then.
+            sample do not follow it: the rigid model is the limit then; and when the platform
+            leaves its frame for good.
     """
     theta = model.declared if theta is None else theta
-    if not stiffness_EA_N > 0.0:
-        raise ValueError(f"stiffness EA is {stiffness_EA_N} N, must be > 0")
-    count = _substeps(model, pose, stiffness_EA_N, rate_hz, theta)
-    references = np.asarray(references_A, dtype=np.float64)
+    if not stretch.stiffness_EA_N > 0.0:
+        raise ValueError(f"stiffness EA is {stretch.stiffness_EA_N} N, must be > 0")
+    references = np.array(references_A, dtype=np.float64, order="C")
     n_t, n = references.shape
-    step = Bound(_step(model), 1)
-    step.inputs[5][:], step.inputs[6][:], step.inputs[7][:] = (
-        1.0 / (rate_hz * count),
-        stiffness_EA_N,
-        theta,
+    first = references[0] if currents_A is None else np.asarray(currents_A, dtype=np.float64)
+    count = _substeps(model, state[:7], stretch, rate_hz, theta)
+    looks = np.zeros((n_t, N_STATE + 2 * n))
+    looks[0, :N_STATE] = state
+    looks[0, N_STATE : N_STATE + n] = out_at_rest(model, state[:7], first, stretch, theta)
+    looks[0, N_STATE + n :] = evaluate(_rows(model), state[:7], theta)[0] @ state[7:]
+    currents, tensions = np.empty_like(references), np.empty_like(references)
+    currents[0] = first
+    pace = pace_of(model, theta, 1.0 / rate_hz, count)
+    machine = _machine(model, stretch, theta)
+    lost = elastic_samples(
+        machine, pace.period, count, pace.reach, looks, currents, references, tensions
     )
-    first = references[0] if currents_A is None else currents_A
-    now = [np.concatenate([pose, np.zeros(6)]), lengths_out_m, np.zeros(n), first]
-    states, outs, currents, tensions = (np.empty((n_t, k)) for k in (N_STATE, n, n, n))
-    for row in range(n_t):
-        states[row], outs[row], currents[row] = now[0], now[1], now[3]
-        for sub in range(count):
-            for place, value in enumerate(now):
-                step.inputs[place][0] = value
-            step.inputs[4][0] = references[row]
-            step.run()
-            if sub == 0:
-                tensions[row] = step.outputs[4][0]
-            now = [step.outputs[k][0].copy() for k in range(4)]
-    times = np.arange(n_t) / rate_hz
-    return ElasticMotion(model, theta, times, states, outs, currents, references, tensions, count)
+    if lost >= 0:
+        raise ValueError(
+            f"at {lost / rate_hz:.3f} s the platform is more than {LARGEST_REACH:g} frames away: "
+            "the currents pull it out; take smaller ones"
+        )
+    return DrivenMotion(
+        model,
+        theta,
+        np.arange(n_t) / rate_hz,
+        looks[:, :N_STATE].copy(),
+        currents,
+        references,
+        tensions,
+        np.full(n_t - 1, count),
+        looks[:, N_STATE : N_STATE + n].copy(),
+    )
+
+
+def _machine(model: DrivenModel, stretch: Stretch, theta: Array) -> ElasticMachine:
+    code, n = native(_elastic_motion(model)), model.n_cables
+    size = N_STATE + 2 * n
+    inputs = np.zeros(code.n_in)
+    inputs[size + n], inputs[size + n + 1] = stretch.stiffness_EA_N, stretch.relaxation_s
+    inputs[size + n + 2 :] = theta
+    return ElasticMachine(
+        code.address,
+        inputs,
+        np.zeros(code.n_out),
+        evaluate(model.lags, theta)[0],
+        np.zeros((4, size)),
+        np.zeros((4, n)),
+        np.zeros((4, size)),
+    )
 
 
 def _substeps(
-    model: DrivenModel, pose: Array, stiffness: float, rate_hz: float, theta: Array
+    model: DrivenModel, pose: Array, stretch: Stretch, rate_hz: float, theta: Array
 ) -> int:
     """Steps a sample for the fastest oscillation of cables against motors and platform."""
-    state, unit = np.concatenate([pose, np.zeros(6)]), np.eye(6)
+    state, unit, stiffness = np.concatenate([pose, np.zeros(6)]), np.eye(6), stretch.stiffness_EA_N
     lengths = evaluate(model.lengths, pose, theta)[0]
     rows = evaluate(_rows(model), pose, theta)[0]
     still = evaluate(model.needed, state, np.zeros(6), theta)[0]
     whole = np.array([evaluate(model.needed, state, one, theta)[0] - still for one in unit])
-    reflected = (
-        np.array([theta[k] for k in _motor_places(model)]) / evaluate(model.drums, theta)[0] ** 2
-    )
+    inertia = np.array([theta[k] for k in _motor_places(model)])
+    reflected = inertia / evaluate(model.drums, theta)[0] ** 2
     body = whole - rows.T @ (reflected[:, None] * rows)
     apart = rows @ np.linalg.solve(body, rows.T) + np.diag(1.0 / reflected)
     fastest = np.sqrt(float(np.linalg.eigvals(apart * (stiffness / lengths)).real.max()))
-    count = max(1, int(np.ceil(fastest / (rate_hz * MOST_TURN))))
+    damped = fastest**2 * stretch.relaxation_s
+    count = max(
+        substeps_for(model, 1.0 / rate_hz, theta),
+        int(np.ceil(fastest / (rate_hz * MOST_TURN))),
+        int(np.ceil(damped / (rate_hz * MOST_DECAY))),
+    )
     if count > MOST_SUBSTEPS:
         raise ValueError(
             f"cables of EA {stiffness:g} N swing at {fastest:.3g} rad/s: {count} steps a sample, "

@@ -42,6 +42,7 @@ class DrivenMotion:
         tensions_N: at each sample with rigid cables, negative where one would have pushed,
             (n_t, n).
         steps: integration steps taken from each sample to the next, (n_t - 1,).
+        lengths_out_m: unstretched cable let out where cables are elastic, (n_t, n); None: rigid.
     """
 
     model: DrivenModel
@@ -52,6 +53,14 @@ class DrivenMotion:
     references_A: Array
     tensions_N: Array
     steps: NDArray[np.intp]
+    lengths_out_m: Array | None = None
+
+    @property
+    def turns(self) -> Array:
+        """Length let out over drum radius, of which motor angles are the change, (n_t, n)."""
+        out = self.lengths_out_m
+        out = evaluate(self.model.lengths, self.poses, self.theta)[0] if out is None else out
+        return out / evaluate(self.model.drums, self.theta)[0]
 
     @property
     def poses(self) -> Array:
@@ -60,12 +69,16 @@ class DrivenMotion:
 
     @property
     def slack(self) -> NDArray[np.bool_]:
-        """Where a cable would have had to push, wrong from there on, (n_t, n)."""
-        return self.tensions_N < 0.0
+        """Where a cable does not pull, (n_t, n).
+
+        A rigid one would have had to push there, and what follows is wrong; an elastic one hangs.
+        """
+        return self.tensions_N < 0.0 if self.lengths_out_m is None else self.tensions_N <= 0.0
 
     def angles_rad(self, zero_pose: Array) -> Array:
         """Motor angles that are zero at a pose and grow with winding (2), (n_t, n)."""
-        return motor_angles(self.model, self.poses, zero_pose, self.theta)
+        zero = evaluate(self.model.lengths, zero_pose, self.theta)[0]
+        return zero / evaluate(self.model.drums, self.theta)[0] - self.turns
 
 
 def motor_angles(model: DrivenModel, poses: Array, zero_pose: Array, theta: Array) -> Array:

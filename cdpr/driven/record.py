@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from freeswing.cdpr.driven.elastic import ElasticMotion
+from freeswing.cdpr.driven.behaviour import readings_of
 from freeswing.cdpr.driven.motion import DrivenMotion
 from freeswing.cdpr.driven.slopes import moved
 
@@ -66,11 +66,10 @@ class Instruments:
 
 
 def observed(
-    motion: DrivenMotion | ElasticMotion,
+    motion: DrivenMotion,
     zero_pose: Array,
     instruments: Instruments,
     generator: np.random.Generator,
-    offsets_rad: Array | None = None,
 ) -> DriveRecord:
     """The readings of a motion: quantised angles, late and noisy poses, noisy currents.
 
@@ -79,11 +78,11 @@ def observed(
         zero_pose: where all angles are zero, (7,).
         instruments: how it is measured.
         generator: of the noise.
-        offsets_rad: added to the angles before they are quantised, (n_t, n) or (n,).
+
+    What the model's effects do to readings is in them.
     """
-    angles = motion.angles_rad(zero_pose)
-    if offsets_rad is not None:
-        angles = angles + offsets_rad
+    errors = readings_of(motion.model, motion.theta, motion.times_s)
+    angles = motion.angles_rad(zero_pose) + errors.offsets_rad
     if instruments.encoder_step_rad > 0.0:
         angles = np.round(angles / instruments.encoder_step_rad) * instruments.encoder_step_rad
     noise = generator.normal(size=motion.currents_A.shape) * instruments.current_std_A
@@ -91,7 +90,8 @@ def observed(
     rate = 1.0 / (motion.times_s[1] - motion.times_s[0])
     every = max(1, round(rate / instruments.pose_rate_hz))
     rows = np.arange(0, len(poses), every)
-    true = poses_at(motion.times_s, motion.states, motion.times_s[rows] - instruments.latency_s)
+    late = instruments.latency_s + errors.latency_s
+    true = poses_at(motion.times_s, motion.states, motion.times_s[rows] - late)
     stds = np.repeat([instruments.position_std_m, instruments.angle_std_rad], 3)
     poses[rows] = moved(true, generator.normal(size=(len(rows), 6)) * stds)
     return DriveRecord(

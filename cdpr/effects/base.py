@@ -151,6 +151,21 @@ class Recorded:
     slow_errors: bool = False
 
 
+@dataclass(frozen=True, slots=True)
+class Readings:
+    """How the instruments of a driven robot err together.
+
+    Attributes:
+        times_s: of the rows, (n_t,).
+        latency_s: the pose in a row was true this much earlier than the session says.
+        offsets_rad: what each encoder reads too much, (n_t, n).
+    """
+
+    times_s: Array
+    latency_s: float
+    offsets_rad: Array
+
+
 class Clues(Protocol):
     """What a residual tells an effect about where its shape parameters start."""
 
@@ -233,6 +248,20 @@ class Effect:
     def measured(self, instant: Instant, values: Expression) -> Expression | None:
         """Change of the measured pose: translation and small base-frame rotation, (6,)."""
         return None
+
+    def readings(self, readings: Readings, values: Array) -> Readings:
+        """Changed readings of a driven robot: numbers, not expressions."""
+        return readings
+
+    def stretch(self, values: Array, mass_kg: float) -> tuple[float, float]:
+        """Compliance 1/EA of a driven robot's cables in 1/N, and their relaxation time in s."""
+        return 0.0, 0.0
+
+    @property
+    def beside_motion(self) -> bool:
+        """Whether the equations of a driven robot with rigid cables know nothing of it."""
+        kind = type(self)
+        return kind.readings is not Effect.readings or kind.stretch is not Effect.stretch
 
     def cannot_show(self, robot: Robot, recorded: Recorded) -> str:
         """Why this robot or these recordings could not show it, or "" where they could."""

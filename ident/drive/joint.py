@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from freeswing.cdpr.driven.behaviour import turns_at_rest
 from freeswing.cdpr.driven.model import DrivenModel
 from freeswing.cdpr.driven.sensitivity import N_POSE
 from freeswing.cdpr.driven.slopes import length_slope, moved, pose_map
@@ -207,7 +208,8 @@ class Problem:
         rows[:n, : self.k] -= weight * (found[2] @ self.asked.spread)
         rows[:n, self.n_shared :] = -weight * (found[1] @ pose_map(pose))
         rows[n:, self.n_shared :] = np.diag(1.0 / static.pose_std)
-        gaps = weight * (zero - found[0] - static.angles_rad[p])
+        turns = turns_at_rest(self.given.model, pose, static.currents_A[p], theta)
+        gaps = weight * (zero - turns - static.angles_rad[p])
         right = np.concatenate([gaps, x[own] / static.pose_std])
         part = Normal(float(right @ right) / 2, rows.T @ right, rows.T @ rows, len(right))
         return part, np.concatenate([np.arange(self.n_shared), own])

@@ -7,11 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from freeswing.cdpr.driven.behaviour import readings_of, simulate, stretch_of
 from freeswing.cdpr.driven.model import DrivenModel
 from freeswing.cdpr.driven.motion import DrivenMotion, simulate_driven
 from freeswing.cdpr.driven.record import DriveRecord, poses_at
 from freeswing.cdpr.driven.sensitivity import N_POSE, state_slopes
 from freeswing.cdpr.driven.slopes import length_slope, turn_map
+from freeswing.cdpr.effects import effect_named
 from freeswing.cdpr.model.batch import evaluate
 from freeswing.ident.drive.direct_kinematics import poses_from_turns
 from freeswing.ident.drive.unknowns import Asked
@@ -20,6 +22,8 @@ Array = NDArray[np.float64]
 
 # Newey and West's window: encoder counts and start errors stay alike for less than this.
 SCORE_WINDOW_S = 0.1
+# Of an effect's typical size: what elastic cables and instruments answer is a difference over it.
+DIFFERENCE = 0.02
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +109,7 @@ def simulated(
     state = np.concatenate([start_pose, np.zeros(6)])
     record = run.record
     first = record.currents_A[0] if start_A is None else start_A
-    return simulate_driven(model, state, record.references_A, run.rate_hz, theta, currents_A=first)
+    return simulate(model, state, record.references_A, run.rate_hz, theta, currents_A=first)
 
 
 def compared(
@@ -121,20 +125,82 @@ def compared(
         asked: what to differentiate by; None: residuals alone.
     """
     record, rows = run.record, run.record.seen
-    wanted = record.times_s[rows] - noise.latency_s
-    true = poses_at(motion.times_s, motion.states, wanted)
-    pose_gaps = _pose_gaps(true, record.poses[rows]) / noise.pose_std
+    told = _told(run, motion, noise)
+    pose_gaps = _pose_gaps(told.poses, record.poses[rows]) / noise.pose_std
+    gaps = (zero - told.turns - record.angles_rad) / noise.angle_std_rad
     if asked is None:
-        turns = evaluate(length_slope(motion.model), motion.poses, motion.theta)[0]
-        gaps = (zero - turns - record.angles_rad) / noise.angle_std_rad
         return Seen(motion, gaps, pose_gaps, rows, None, None)
+    rigid = _rigid(motion, run.rate_hz)
     spread = _spread(asked, motion.model.n_cables)
-    states = state_slopes(motion, asked.members) @ spread
-    turns, slopes = _turns(motion, asked, states)
-    gaps = (zero - turns - record.angles_rad) / noise.angle_std_rad
-    tangents = _tangents(motion, states)
-    by_pose = _between(motion.times_s, tangents, wanted) / noise.pose_std[:, None]
-    return Seen(motion, gaps, pose_gaps, rows, -slopes / noise.angle_std_rad, by_pose)
+    states = state_slopes(rigid, asked.members) @ spread
+    turns = _turn_slopes(rigid, asked, states)
+    poses = _between(motion.times_s, _tangents(motion, states), told.times_s)
+    n_start = N_POSE + motion.model.n_cables
+    for k, name in enumerate(asked.members):
+        if _is_beside(motion.model, name):
+            more = _differences(run, motion, noise, name, told)
+            turns[..., n_start:] += more[0][..., None] * asked.spread[k]
+            poses[..., n_start:] += more[1][..., None] * asked.spread[k]
+    by_pose = poses / noise.pose_std[:, None]
+    return Seen(motion, gaps, pose_gaps, rows, -turns / noise.angle_std_rad, by_pose)
+
+
+@dataclass(frozen=True, slots=True)
+class _Told:
+    """What the instruments would tell of a motion.
+
+    Attributes:
+        turns: L / r less what the encoders read too much, (n_t, n).
+        poses: of the rows with one, (n_p, 7).
+        times_s: when those were true, (n_p,).
+    """
+
+    turns: Array
+    poses: Array
+    times_s: Array
+
+
+def _told(run: DriveRun, motion: DrivenMotion, noise: Noise, theta: Array | None = None) -> _Told:
+    """With `theta`, the instruments' errors are those of other numbers than the motion's."""
+    theta = motion.theta if theta is None else theta
+    errors = readings_of(motion.model, theta, motion.times_s)
+    wanted = run.record.times_s[run.record.seen] - noise.latency_s - errors.latency_s
+    poses = poses_at(motion.times_s, motion.states, wanted)
+    return _Told(motion.turns - errors.offsets_rad, poses, wanted)
+
+
+def _rigid(motion: DrivenMotion, rate_hz: float) -> DrivenMotion:
+    """The motion of rigid cables from the same start: elastic ones answer to numbers alike."""
+    if motion.lengths_out_m is None:
+        return motion
+    start, first = motion.states[0], motion.currents_A[0]
+    references = motion.references_A
+    return simulate_driven(motion.model, start, references, rate_hz, motion.theta, currents_A=first)
+
+
+def _is_beside(model: DrivenModel, name: str) -> bool:
+    """Whether a number is of an effect that the rigid equations know nothing of."""
+    effect = name.partition(".")[0]
+    return effect in model.effects and effect_named(effect).beside_motion
+
+
+def _differences(
+    run: DriveRun, motion: DrivenMotion, noise: Noise, name: str, told: _Told
+) -> tuple[Array, Array]:
+    """How turns (n_t, n) and poses (n_p, 6) answer to a number beside the rigid equations."""
+    model, place = motion.model, motion.model.index(name)
+    first = len(model.numbers.names)
+    step = DIFFERENCE * model.parameters[place - first].scale
+    theta = motion.theta.copy()
+    theta[place] += step
+    other = motion
+    if stretch_of(model, theta) != stretch_of(model, motion.theta):
+        now, start = motion, motion.states[0]
+        other = simulate(
+            model, start, now.references_A, run.rate_hz, theta, currents_A=now.currents_A[0]
+        )
+    ahead = _told(run, other, noise, theta)
+    return (ahead.turns - told.turns) / step, _pose_gaps(ahead.poses, told.poses) / step
 
 
 def _spread(asked: Asked, n: int) -> Array:
@@ -145,13 +211,13 @@ def _spread(asked: Asked, n: int) -> Array:
     return whole
 
 
-def _turns(motion: DrivenMotion, asked: Asked, states: Array) -> tuple[Array, Array]:
-    """L / r at every sample (n_t, n) and its slopes by start and unknowns (n_t, n, s + k)."""
+def _turn_slopes(motion: DrivenMotion, asked: Asked, states: Array) -> Array:
+    """Slopes of L / r at every sample by start and unknowns, (n_t, n, s + k)."""
     found = evaluate(length_slope(motion.model, asked.members), motion.poses, motion.theta)
     slopes = found[1] @ states[:, :7]
     if asked.members:
         slopes[..., N_POSE + motion.model.n_cables :] += found[2] @ asked.spread
-    return found[0], slopes
+    return slopes
 
 
 def _pose_gaps(true: Array, measured: Array) -> Array:

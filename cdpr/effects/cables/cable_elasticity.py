@@ -23,6 +23,7 @@ class CableElasticity(Effect):
     separated_by = (PAYLOAD, LONG_RUN)
     tolerance = "stretch_s2_m"
     needs_tension = True
+    on_driven = True
 
     def parameters(self, robot: Robot) -> tuple[Parameter, ...]:
         """Mass over EA and that times the relaxation time, the same for all cables."""
@@ -43,6 +44,11 @@ class CableElasticity(Effect):
     def length_pattern(self, times_s: Array, lengths_m: Array, tensions: Array) -> Array:
         """The stretch of every cable for a compliance of one."""
         return (lengths_m * tensions)[..., None]
+
+    def stretch(self, values: Array, mass_kg: float) -> tuple[float, float]:
+        """Compliance and relaxation of the same two numbers, where the mass is known."""
+        relaxation = float(values[1] / values[0]) if values[0] > 0.0 else 0.0
+        return float(values[0] / mass_kg), relaxation
 
 
 def _lengths(instant: Instant) -> Expression:

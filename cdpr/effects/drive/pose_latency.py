@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from freeswing.cdpr.effects.base import Effect, Parameter
-from freeswing.cdpr.robot import Robot
+from dataclasses import replace
+
+from freeswing.cdpr.effects.base import Effect, Parameter, Readings
+from freeswing.cdpr.robot import Array, Robot
 
 
 class PoseLatency(Effect):
     """A measured pose was true `added_s` before the time that the session's latency gives.
 
-    What is measured changes, not the motion: simulation and fits shift the poses' time stamps.
+    What is measured changes, not the motion.
     """
 
     name = "pose_latency"
@@ -21,6 +23,10 @@ class PoseLatency(Effect):
     def parameters(self, robot: Robot) -> tuple[Parameter, ...]:
         """The additional delay."""
         return (Parameter("added_s", -0.05, 0.1, 0.002),)
+
+    def readings(self, readings: Readings, values: Array) -> Readings:
+        """Poses that much older."""
+        return replace(readings, latency_s=readings.latency_s + values[0])
 
 
 EFFECT = PoseLatency()

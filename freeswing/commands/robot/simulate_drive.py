@@ -13,8 +13,7 @@ if TYPE_CHECKING:
     from numpy import ndarray
 
     from freeswing.cdpr.driven.model import DrivenModel
-
-MEASURED = ("pose_latency", "encoder_jump")
+    from freeswing.cdpr.driven.motion import DrivenMotion
 
 
 def add_drive_arguments(parser: ArgumentParser) -> None:
@@ -44,10 +43,8 @@ def run_drive(options: Namespace, console: Console) -> None:
     """Start from rest without current, integrate, measure, write."""
     import numpy as np
 
-    from freeswing.cdpr.driven.elastic import elastic_rest, simulate_elastic
-    from freeswing.cdpr.driven.motion import simulate_driven
     from freeswing.cdpr.driven.record import Instruments, observed
-    from freeswing.cdpr.driven.statics import CENTRE, static_pose
+    from freeswing.cdpr.driven.statics import CENTRE
     from freeswing.cdpr.files.documents import InputError
     from freeswing.cdpr.files.drive_csv import write_drive_run
 
@@ -55,38 +52,50 @@ def run_drive(options: Namespace, console: Console) -> None:
     if result.suffix.lower() != ".csv":
         raise InputError(f"{result}: recordings of driven robots are .csv files")
     generator = np.random.default_rng(options.seed)
-    model, theta, values = driven_model(options)
+    model, theta = driven_model(options)
     asked, rate_hz = _references(model, options, generator)
     limits = model.drive.current_limits_A
     references = np.clip(asked, limits[:, 0], limits[:, 1])
-    still = np.zeros(model.n_cables)
-    if options.elastic_n is not None and not options.elastic_n > 0.0:
-        raise InputError(f"--elastic-n {options.elastic_n:g}: a stiffness must be > 0")
-    if options.elastic_n is not None:
-        pose, out = elastic_rest(model, still, options.elastic_n, theta)
-        motion = simulate_elastic(
-            model, pose, out, references, rate_hz, options.elastic_n, theta, still
-        )
-    else:
-        rest = static_pose(model, still, theta)
-        state = np.concatenate([rest.pose, np.zeros(6)])
-        motion = simulate_driven(model, state, references, rate_hz, theta, currents_A=still)
+    motion = _motion(model, theta, references, rate_hz, options.elastic_n)
     instruments = Instruments(
         pose_rate_hz=options.pose_rate_hz,
-        latency_s=options.latency_s + values.get("pose_latency.added_s", 0.0),
+        latency_s=options.latency_s,
         position_std_m=options.noise_m,
         angle_std_rad=options.noise_rad,
         encoder_step_rad=options.encoder_step_rad,
         current_std_A=options.current_noise_a,
     )
-    jumps = _jumps(model, values, motion.times_s)
-    record = observed(motion, CENTRE, instruments, generator, jumps)
+    record = observed(motion, CENTRE, instruments, generator)
     write_drive_run(result, record, motion.tensions_N)
     slack = [*_said_of_limits(model, asked, references), *_said_of_slack(model, motion)]
     for line in slack:
         console.complain(line)
     console.say(str(result))
     console.say_json({"format": "freeswing-simulation/1", "result": str(result), "warnings": slack})
+
+
+def _motion(
+    model: DrivenModel, theta: ndarray, references: ndarray, rate_hz: float, elastic_n: float | None
+) -> DrivenMotion:
+    """From rest without current."""
+    import numpy as np
+
+    from freeswing.cdpr.driven.behaviour import rest_pose, simulate
+    from freeswing.cdpr.driven.elastic import Stretch, elastic_rest, simulate_elastic
+    from freeswing.cdpr.files.documents import DataError, InputError
+
+    still = np.zeros(model.n_cables)
+    if elastic_n is not None and not elastic_n > 0.0:
+        raise InputError(f"--elastic-n {elastic_n:g}: a stiffness must be > 0")
+    try:
+        if elastic_n is None:
+            state = np.concatenate([rest_pose(model, still, theta), np.zeros(6)])
+            return simulate(model, state, references, rate_hz, theta, currents_A=still)
+        stretch = Stretch(elastic_n)
+        state = np.concatenate([elastic_rest(model, still, stretch, theta), np.zeros(6)])
+        return simulate_elastic(model, state, references, rate_hz, stretch, theta, currents_A=still)
+    except ValueError as error:
+        raise DataError(f"{model.robot.name}: {error}") from error
 
 
 def _said_of_limits(model: DrivenModel, asked: ndarray, given: ndarray) -> list[str]:
@@ -99,14 +108,14 @@ def _said_of_limits(model: DrivenModel, asked: ndarray, given: ndarray) -> list[
     ]
 
 
-def _said_of_slack(model: DrivenModel, motion) -> list[str]:
+def _said_of_slack(model: DrivenModel, motion: DrivenMotion) -> list[str]:
     """Which cables are slack, or would be: the rigid model pulls with a negative tension."""
     import numpy as np
 
     lines = []
     for index in np.flatnonzero(motion.slack.any(axis=0)):
         rows = np.flatnonzero(motion.slack[:, index])
-        if motion.tensions_N.min() >= 0.0:  # elastic cables: slack is in the motion
+        if motion.lengths_out_m is not None:  # elastic cables: slack is in the motion
             lines.append(
                 f"cable {model.robot.cables[index].name} is slack at {len(rows)} samples, first at "
                 f"{motion.times_s[rows[0]]:.3f} s"
@@ -121,8 +130,8 @@ def _said_of_slack(model: DrivenModel, motion) -> list[str]:
     return lines
 
 
-def driven_model(options: Namespace) -> tuple[DrivenModel, ndarray, dict[str, float]]:
-    """The model with the effects of --effect, its numbers with --set, and what --set said.
+def driven_model(options: Namespace) -> tuple[DrivenModel, ndarray]:
+    """The model with the effects of --effect, and its numbers with --set.
 
     Raises:
         InputError: for an effect or a parameter that there is not.
@@ -143,10 +152,12 @@ def driven_model(options: Namespace) -> tuple[DrivenModel, ndarray, dict[str, fl
     values = {}
     for name, value in options.set:
         full = [one for one in model.names if name in (one, one.partition(".")[2])]
-        if len(full) != 1:
+        if len(full) > 1:
+            raise InputError(f"--set {name}: is {' and '.join(full)}; write the effect's name too")
+        if not full:
             raise InputError(f"--set {name}: not one of {', '.join(model.names)}")
         values[full[0]] = value
-    return model, model.theta(values), values
+    return model, model.theta(values)
 
 
 def _references(model: DrivenModel, options: Namespace, generator) -> tuple[ndarray, float]:
@@ -189,15 +200,3 @@ def _check_limits(model: DrivenModel, levels: tuple[float, ...]) -> None:
             f"--levels-a {levels[0]:g} {levels[1]:g}: outside current_limits_A "
             f"[{limits[:, 0].max():g}, {limits[:, 1].min():g}]"
         )
-
-
-def _jumps(model: DrivenModel, values: dict[str, float], times_s: ndarray) -> ndarray | None:
-    """What `encoder_jump` adds to the angles."""
-    import numpy as np
-
-    if "encoder_jump" not in model.effects:
-        return None
-    names = [f"encoder_jump.jump_{cable.name}_rad" for cable in model.robot.cables]
-    jumps = np.array([values.get(name, 0.0) for name in names])
-    after = times_s >= values.get("encoder_jump.after_s", 1.0)
-    return after[:, None] * jumps
