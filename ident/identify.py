@@ -13,6 +13,7 @@ from freeswing.cdpr.robot import Robot
 from freeswing.ident.estimate import Estimate
 from freeswing.ident.fidim.fidim_stage import Weighting, fidim_estimates
 from freeswing.ident.judge.comparison import ParameterComparison, compare
+from freeswing.ident.judge.far_samples import far_from_prediction
 from freeswing.ident.judge.free_swing_law import LawlessError, fidim_complaint
 from freeswing.ident.judge.prediction import Prediction, fitted_motions
 from freeswing.ident.judge.validate import ValidatedRun, validate_run
@@ -162,6 +163,9 @@ def identify(
             comparison[method] = _compared(estimates[f"{method}_free"], estimates[f"{method}_full"])
     truer = fitted[best].robot if best in fitted else robot
     validation = _validated(truer, prepared, estimates[best], best, settings, progress)
+    followed = [*fitted[best].motions] if best in fitted else []
+    followed += [run.prediction for run in validation if run.prediction]
+    far = (far_from_prediction(one) for one in followed)
     return Identification(
         estimates=estimates,
         comparison=comparison,
@@ -169,7 +173,7 @@ def identify(
         best=best,
         free_coordinates=prepared.free,
         amplification=prepared.amplification,
-        notes=tuple(session_notes(model, prepared, failures)),
+        notes=(*session_notes(model, prepared, failures), *filter(None, far)),
         prepared=prepared,
         fitted=fitted[best].motions if best in fitted else (),
     )

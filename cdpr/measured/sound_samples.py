@@ -31,6 +31,15 @@ LONGEST_DOUBLE = 4
 # Second differences this many deviations large are no motion: releases by hand reach ten.
 WILD_DEVIATIONS = 50.0
 NORMAL_BY_MAD = 1.4826
+HALF_WITHIN = 0.2
+# A step from one sample to the next, beyond that of its neighbours, this many usual ones large and
+# this large: no platform jumps so, and a cable that goes taut makes less.
+STEP_DEVIATIONS = 40.0
+LEAST_STEP_M, LEAST_STEP_RAD = 0.003, 0.015
+# ... and back again by as much: what is slung to and fro comes back by chance alone.
+BACK_WITHIN = 0.3
+# Samples between two such steps are a wrong match for a moment; a camera that was pushed stays so.
+LONGEST_WILD_S = 0.5
 # No swing is followed with a step of a second; in other units of time 1 to 5000 Hz are usual.
 LONGEST_STEP_S = 1.0
 USUAL_RATES_HZ = (5.0, 5000.0)
@@ -75,10 +84,9 @@ def sound_samples(trajectory: Trajectory) -> Trajectory:
             "the capture stalled; the repeats are left out"
         )
         values[first + 1 : last + 1] = np.nan
-    wild = _wild(values)
-    for k in np.flatnonzero(wild.any(axis=1)):
-        notes.append(f"{_wild_text(trajectory, values, wild, int(k))}; it is left out")
-    values[wild.any(axis=1)] = np.nan
+    for first, last in _wild(values, trajectory.times_s, trajectory.coordinates):
+        notes.append(f"{_wild_text(trajectory, values, first, last)} left out")
+        values[first : last + 1] = np.nan
     if not notes:
         return trajectory
     return replace(trajectory, values=values, notes=(*trajectory.notes, *notes))
@@ -123,30 +131,88 @@ def _is_finer(values: Array, same: Mask) -> bool:
     return False
 
 
-def _wild(values: Array) -> Mask:
-    """Single samples far from the middle of their neighbours, (n_t, n_c)."""
-    wild = np.zeros(values.shape, dtype=bool)
+def _wild(values: Array, times_s: Array, coordinates: tuple[str, ...]) -> list[tuple[int, int]]:
+    """First and last of each few samples that lie far from those around them."""
+    single = _single(values)
+    rest = np.where(single[:, None], np.nan, values)
+    steps, known = _steps(rest, coordinates), np.isfinite(rest).all(axis=1)
+    found = [(k, k) for k in np.flatnonzero(single).tolist()]
+    joined = known[1:] & known[:-1] & ~steps.any(axis=1)
+    starts = np.flatnonzero(known & ~np.concatenate([[False], joined])).tolist()
+    ends = np.flatnonzero(known & ~np.concatenate([joined, [False]])).tolist()
+    for first, last in zip(starts, ends, strict=True):
+        is_short = times_s[last] - times_s[first] <= LONGEST_WILD_S
+        if is_short and _stands_off(steps, first, last):
+            found.append((first, last))
+    return sorted(found)
+
+
+def _stands_off(steps: Array, first: int, last: int) -> bool:
+    """Whether a step leads to these samples and one leads back; one at the recording's ends."""
+    if first == 0 and last == len(steps):
+        return False
+    if first == 0:
+        return bool(steps[last].any())
+    if last == len(steps):
+        return bool(steps[first - 1].any())
+    there, back = steps[first - 1], steps[last]
+    sizes = np.maximum(np.abs(there), np.abs(back))
+    return bool(((np.abs(there + back) < BACK_WITHIN * sizes) & (sizes > 0.0)).any())
+
+
+def _single(values: Array) -> Mask:
+    """Samples far from the middle of their neighbours, (n_t,)."""
+    wild = np.zeros(len(values), dtype=bool)
     if len(values) < 2 * FEWEST_HELD:
         return wild
     off = np.full(values.shape, np.nan)
     off[1:-1] = values[1:-1] - 0.5 * (values[2:] + values[:-2])
-    for k, column in enumerate(off.T):
+    for column in off.T:
         known = np.isfinite(column)
         if known.sum() < FEWEST_HELD:
             continue
         usual = NORMAL_BY_MAD * float(np.median(np.abs(column[known])))
         size = np.nan_to_num(np.abs(column))
-        peak = (size[1:-1] > size[2:]) & (size[1:-1] > size[:-2])
-        wild[1:-1, k] = peak & (size[1:-1] > WILD_DEVIATIONS * usual) & (usual > 0.0)
+        # It pulls the middles of both neighbours half as far as it lies off, and no others do.
+        before, here, after = column[:-2], column[1:-1], column[2:]
+        halves = [
+            np.isnan(one) | (np.abs(one + 0.5 * here) < HALF_WITHIN * np.abs(here))
+            for one in (before, after)
+        ]
+        told = halves[0] & halves[1] & (np.isfinite(before) | np.isfinite(after))
+        wild[1:-1] |= told & (size[1:-1] > WILD_DEVIATIONS * usual) & (usual > 0.0)
     return wild
 
 
-def _wild_text(trajectory: Trajectory, values: Array, wild: Mask, k: int) -> str:
-    off = np.abs(values[k] - 0.5 * (values[k + 1] + values[k - 1]))
-    column = int(np.flatnonzero(wild[k])[0])
-    name = trajectory.coordinates[column]
+def _steps(values: Array, coordinates: tuple[str, ...]) -> Array:
+    """Steps from one sample to the next beyond their neighbours', 0 where usual, (n_t - 1, n_c)."""
+    steps = np.diff(values, axis=0)
+    if len(steps) < 2 * FEWEST_HELD:
+        return np.zeros(steps.shape)
+    padded = np.pad(steps, ((2, 2), (0, 0)), constant_values=np.nan)
+    around = np.stack([padded[k : len(steps) + k] for k in (0, 1, 3, 4)])
+    beyond = np.nan_to_num(steps - around, nan=np.inf)  # of what a gap hides nothing is said
+    nearest = np.abs(beyond).argmin(axis=0)
+    off = np.take_along_axis(beyond, nearest[None], axis=0)[0]
+    off[~np.isfinite(off)] = 0.0
+    usual = NORMAL_BY_MAD * np.median(np.abs(off), axis=0)
+    least = [LEAST_STEP_M if name in ("x", "y", "z") else LEAST_STEP_RAD for name in coordinates]
+    limit = np.where(usual > 0.0, np.maximum(STEP_DEVIATIONS * usual, least), np.inf)
+    return np.where(np.abs(off) > limit, off, 0.0)
+
+
+def _wild_text(trajectory: Trajectory, values: Array, first: int, last: int) -> str:
+    """What is wrong with these samples; ends with the verb of what is done about it."""
+    beside = [k for k in (first - 1, last + 1) if 0 <= k < len(values)]
+    known = [k for k in beside if np.isfinite(values[k]).all()] or beside
+    off = np.abs(values[first : last + 1].mean(axis=0) - values[known].mean(axis=0))
+    column = int(np.argmax(np.nan_to_num(off)))
+    name, times = trajectory.coordinates[column], trajectory.times_s
     unit = "mm" if name in ("x", "y", "z") else "mrad"
-    time = trajectory.times_s[k]
+    size = f"{1e3 * off[column]:.1f} {unit} off"
+    if first == last:
+        return f"the sample at {times[first]:.2f} s is {size} its neighbours in {name}; it is"
     return (
-        f"the sample at {time:.2f} s is {1e3 * off[column]:.1f} {unit} off its neighbours in {name}"
+        f"the samples from {times[first]:.2f} to {times[last]:.2f} s are {size} their neighbours "
+        f"in {name}; they are"
     )

@@ -71,6 +71,72 @@ def test_a_wild_sample_is_left_out_and_named(size_m, is_wild):
         assert "off its neighbours in y" in found.notes[0]
 
 
+BLOCKS = {
+    "two": (250, 252),
+    "ten": (250, 260),
+    "half a second": (250, 301),
+    "first": (0, 1),
+    "first five": (0, 5),
+    "last": (399, 400),
+    "last five": (395, 400),
+}
+
+
+@pytest.mark.parametrize("block", BLOCKS)
+@pytest.mark.parametrize("size_m", [0.03, -0.5])
+def test_wild_samples_together_are_left_out_and_named(block, size_m):
+    values, (first, end) = swing(), BLOCKS[block]
+    values[first:end, 1] += size_m
+    found = sound(values)
+    assert np.flatnonzero(~found.is_known).tolist() == list(range(first, end))
+    (note,) = found.notes
+    when = f"{TIMES[first]:.2f} s is" if end == first + 1 else f"to {TIMES[end - 1]:.2f} s are"
+    assert when in note
+    assert note.endswith("left out")
+    assert abs(float(note.partition(" mm off")[0].rpartition(" ")[2]) - 1e3 * abs(size_m)) < 25.0
+
+
+def motion_of(kind):
+    """Motions that look wild and are none."""
+    values = swing()
+    if kind == "pushed camera":  # stays where it is
+        values[200:, 0] += 0.05
+    if kind == "longer than half a second":
+        values[200:260, 0] += 0.05
+    if kind == "release":  # a jerk, not a jump
+        values[:150] = values[150]
+        values += 1e-4 * np.random.default_rng(3).normal(size=values.shape)
+    if kind == "knocked against a stop":  # velocities of 1 m/s turn round within a sample
+        values[:, 0] = 0.02 * np.abs(np.mod(TIMES, 0.08) - 0.04) / 0.02
+        values[:, 0] += 1e-5 * np.random.default_rng(4).normal(size=len(TIMES))
+    if kind == "between gaps":  # what happened meanwhile nobody knows
+        values[195:200] = np.nan
+        values[210:215] = np.nan
+        values[200:210, 0] += 0.004
+    if kind == "3 mm":
+        values[200:210, 0] += 0.0028
+    if kind == "to and fro":  # there by 50 mm, back by 20
+        values[200:210, 0] += 0.05
+        values[210:, 0] += 0.03
+    if kind == "noisy":  # 40 deviations are none
+        values = swing(noise=2e-3)
+        values[200:210, 0] += 0.04
+    return values
+
+
+@pytest.mark.parametrize(
+    "kind",
+    [
+        "pushed camera", "longer than half a second", "release", "knocked against a stop",
+        "between gaps", "3 mm", "to and fro", "noisy",
+    ],
+)  # fmt: skip
+def test_what_may_be_motion_stays(kind):
+    values = motion_of(kind)
+    found = sound(values)
+    assert found.notes == ()
+
+
 @pytest.mark.parametrize(
     ("factor", "unit"), [(1e3, "milliseconds"), (1e6, "microseconds"), (1e9, "nanoseconds")]
 )
