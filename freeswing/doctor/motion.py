@@ -15,6 +15,7 @@ from freeswing.cdpr.robot import Robot
 from freeswing.cdpr.rotation import transform
 from freeswing.doctor.finding import Finding
 from freeswing.ident.runs import SwingRun
+from freeswing.session.exchanged_lengths import LENGTH_DIFFERENCE_M, exchanged_sentence
 
 # The slowest modes of a metre of cable take 2 s: two and a half periods tell its frequency.
 WORTHWHILE_WINDOW_S = 5.0
@@ -36,8 +37,6 @@ TURNED_BETTER = 0.2
 # Locked cables keep their length to the poses' noise: 0.1 to 0.5 mm, of which 98 % of the samples
 # span 4.7 deviations. 3 mm is more than that, and less than any slip of a drum's turn.
 LENGTH_CHANGE_M = 0.003
-# Told lengths come from a tape or from counted turns, good to a few mm; 20 mm is another datum.
-LENGTH_DIFFERENCE_M = 0.02
 # Swings of use are 10 mm and more; 0.1 mm is what standing platforms show as noise.
 HARDLY_MOVES_M = 1e-4
 # The shortest filter needs eight.
@@ -180,6 +179,9 @@ def _cables(subject: str, run: SwingRun, part: Trajectory, robot: Robot) -> Iter
             yield Finding("warning", subject, text, remedy)
     if run.lengths_m is not None:
         off = lengths.mean(axis=0) - run.lengths_m
+        if exchanged := exchanged_sentence(run, robot, lengths.mean(axis=0)):
+            yield Finding("error", subject, exchanged, "put each cable's length in its place")
+            return
         for cable, difference in zip(robot.cables, off, strict=True):
             if abs(difference) > LENGTH_DIFFERENCE_M:
                 text = f"cable {cable.name} is {1e3 * difference:+.0f} mm from its cable_lengths_m"

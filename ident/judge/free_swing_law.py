@@ -86,6 +86,8 @@ def fidim_complaint(
             f"no body can have its inertia ({found.consistency.size()}), and {lost} or more: these "
             "are no free swings of this robot"
         )
+    if lawless:
+        return f"no motion that it predicts follows a run, and {lost} or more"
     if not supported and least > WORST_ACCELERATION:
         return (
             f"{lost} or more: these are no free swings of this robot, or too small or too few; "

@@ -72,10 +72,23 @@ HELD = (
         "freeswing/doctor/motion.py",
         (
             "WORTHWHILE_WINDOW_S", "MOST_MISSING", "LONGEST_GAP_S", "RATE_TOLERANCE", "FARTHEST_M",
-            "FARTHEST_REACHES", "LENGTH_CHANGE_M", "LENGTH_DIFFERENCE_M", "HARDLY_MOVES_M",
+            "FARTHEST_REACHES", "LENGTH_CHANGE_M", "HARDLY_MOVES_M",
             "LEAST_SAMPLES", "SKIPPED_STEPS",
         ),
         "tests/freeswing/doctor/test_doctor.py",
+    ),
+    Held(
+        "freeswing/session/exchanged_lengths.py",
+        ("LENGTH_DIFFERENCE_M", "LEFT_OVER"),
+        "tests/freeswing/session/test_exchanged_lengths.py",
+    ),
+    Held(
+        "ident/judge/far_samples.py", ("FAR", "MOST_FAR"), "tests/ident/judge/test_far_samples.py"
+    ),
+    Held(
+        "cdpr/measured/sound_samples.py",
+        ("STEP_DEVIATIONS", "LONGEST_WILD_S", "BACK_WITHIN"),
+        "tests/cdpr/measured/test_sound_samples.py",
     ),
     Held(
         "calib/verdict/survey_check.py",

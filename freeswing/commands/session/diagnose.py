@@ -48,6 +48,7 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
     from freeswing.ident.diagnose.diagnose import diagnose
     from freeswing.results.diagnosis import Diagnosis
     from freeswing.results.motions import ladder_motions
+    from freeswing.session.exchanged_lengths import refuse_exchanged_lengths
     from freeswing.session.load_bench import is_bench
     from freeswing.session.load_swings import load_robot, load_swings, load_target
     from freeswing.session.made import Made
@@ -66,6 +67,7 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
         )
     swings = list(load_swings(session, robot, load_target(session)))
     refuse_repeated(swings)
+    refuse_exchanged_lengths(swings, robot)
     candidates = None if only is None else tuple(only)
     count = crew.processes or os.cpu_count() or 1
     found = diagnose(swings, robot, console.progress, count, candidates, crew.executor)

@@ -71,6 +71,7 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
     from freeswing.results.identification import Identification
     from freeswing.results.markers import marker_document
     from freeswing.results.motions import predicted_motions
+    from freeswing.session.exchanged_lengths import refuse_exchanged_lengths
     from freeswing.session.load_bench import is_bench
     from freeswing.session.load_swings import load_robot, load_swings, load_target
     from freeswing.session.made import Made
@@ -84,6 +85,7 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
     markers = read_marker_runs(session, target)
     swings = load_swings(session, robot, target, markers)
     refuse_repeated(swings)
+    refuse_exchanged_lengths(swings, robot)
     try:
         geometry = GeometryPriors(settings.get("entry_std_m"), settings.get("attachment_std_m"))
     except ValueError as error:

@@ -48,3 +48,8 @@ def test_an_inertia_that_no_body_has(monkeypatch, unexplained, lawless, refused)
     text = complaint(monkeypatch, unexplained, True, True, lawless)
     assert bool(text) == refused, text
     assert ("no body can have its inertia" in text) == refused
+
+
+def test_equations_alone_are_no_answer_where_no_motion_follows_a_run(monkeypatch) -> None:
+    text = complaint(monkeypatch, 0.01, refuted=False, supported=False, lawless=True)
+    assert "no motion that it predicts follows a run" in text
