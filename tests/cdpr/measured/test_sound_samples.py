@@ -143,7 +143,7 @@ def test_what_may_be_motion_stays(kind):
         (2e-3, 0.078, 0.078, False),
         (2e-3, 0.086, 0.086, True),
         (1e-6, 2.8e-3, 2.8e-3, False),
-        (1e-6, 3.2e-3, 3.2e-3, True),
+        (1e-6, 3.5e-3, 3.5e-3, True),
         (1e-6, 0.05, 0.036, True),
         (1e-6, 0.05, 0.034, False),
     ],

@@ -11,12 +11,7 @@ from freeswing.cdpr.files.robot_file import read_robot
 from freeswing.cdpr.measured.trajectory import Trajectory
 from freeswing.ident.runs import SwingRun
 from freeswing.main import main
-from freeswing.session.exchanged_lengths import (
-    LEFT_OVER,
-    LENGTH_DIFFERENCE_M,
-    exchanged_sentence,
-    pose_lengths,
-)
+from freeswing.session.exchanged_lengths import exchanged_sentence, pose_lengths
 from freeswing.session.load_swings import load_swings
 from freeswing.session.session_file import read_session
 from tests.oracle.robots import declared_robot
@@ -44,19 +39,19 @@ def test_lengths_that_are_merely_wrong_are_another_matter(off_m: float) -> None:
     assert said_of(OWN + off_m) == ""
 
 
-@pytest.mark.parametrize(("share", "named"), [(0.95, False), (1.05, True)])
-def test_what_a_tape_leaves_is_not_named(share: float, named: bool) -> None:
+@pytest.mark.parametrize(("apart_m", "named"), [(0.019, False), (0.021, True)])
+def test_what_a_tape_leaves_is_not_named(apart_m: float, named: bool) -> None:
     close = OWN.copy()
-    close[1] = close[0] + share * LENGTH_DIFFERENCE_M
+    close[1] = close[0] + apart_m
     motion = Trajectory(np.arange(2.0), ("x",), np.zeros((2, 1)))
     run = SwingRun("a", "identify", motion, close[[1, 0, 2, 3]])
     assert bool(exchanged_sentence(run, ROBOT, close)) == named
 
 
-@pytest.mark.parametrize(("share", "named"), [(0.95, True), (1.05, False)])
-def test_so_much_may_be_left(share: float, named: bool) -> None:
+@pytest.mark.parametrize(("left_m", "named"), [(0.019, True), (0.021, False)])
+def test_so_much_may_be_left(left_m: float, named: bool) -> None:
     stated = OWN[[1, 0, 2, 3]].copy()
-    stated[2] += share * LEFT_OVER * 0.1
+    stated[2] += left_m  # of 0.1
     assert bool(said_of(stated)) == named
 
 
