@@ -16,6 +16,7 @@ Array = NDArray[np.float64]
 
 _RANK_LIMIT = 1e-13
 _SETTLED = 1e-11
+_LARGEST_DAMPING = 1e100  # far beyond any step; unbounded it would overflow
 _STRAIGHT = 0.03
 
 
@@ -149,7 +150,7 @@ def solve_arrow(
             return _finish(
                 blocks, border, current, loss_limit, cost, iteration, "cost at its floor"
             )
-        damping, growth = damping * growth, growth * 2
+        damping, growth = min(damping * growth, _LARGEST_DAMPING), growth * 2
     text = f"no convergence after {max_iterations} iterations"
     return _finish(blocks, border, current, loss_limit, cost, max_iterations, text, False)
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from freeswing.cdpr.files.documents import DataError
 from freeswing.homing.arrow_least_squares import ArrowSolution
-from freeswing.homing.fit_start_pose import LOSS_LIMIT, StartFit, StartProblem
+from freeswing.homing.fit_start_pose import GOOD_FIT, LOSS_LIMIT, StartFit, StartProblem
 from freeswing.homing.guess_from_tensions import TensionEnergy, free_indices
 from freeswing.homing.homing_files import Homing, ReadingNoise
 from freeswing.homing.many_starts import far_rows, many_starts, rank_starts
@@ -19,7 +19,6 @@ from freeswing.homing.rest_readings import RestModel
 
 Array = NDArray[np.float64]
 
-_GOOD_FIT = 9.0
 # Mean squares over the noise's: a geometry that is some millimetres off leaves tens to thousands,
 # a wrong start, unit or sign a million and more.
 _FAR_OFF = 1e4
@@ -46,7 +45,7 @@ class Judgement:
             return False
         squares = np.sort((solution.linearization.residuals**2).sum(axis=1))
         kept = squares[: int(np.ceil(self.share * len(squares)))]
-        return float(kept.sum()) < _GOOD_FIT * problem.degrees
+        return float(kept.sum()) < GOOD_FIT * problem.degrees
 
 
 PLAIN = Judgement(np.inf, 1.0)

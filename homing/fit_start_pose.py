@@ -27,6 +27,7 @@ from freeswing.homing.rest_readings import RestModel
 Array = NDArray[np.float64]
 
 LOSS_LIMIT = 3.0
+GOOD_FIT = 9.0  # mean squares over the noise's that readings of some start pose leave at most
 _SMALLEST_NOISE = 1e-7
 _SCALE_ROUNDS = 3
 
@@ -200,7 +201,7 @@ class StartProblem:
         """Noise of swivel angles and lengths as the residuals show it, wrong readings aside."""
         part = self.linearize(noise, solution.blocks, solution.border)
         weights = huber_weights(part.residuals, LOSS_LIMIT)
-        left = 1 - self._determined(part, weights).predicted(part.by_block, part.by_border)
+        left = 1 - self._judged(solution, part, weights).predicted(part.by_block, part.by_border)
         ratio = {}
         for kind in ("sigma", "length"):
             columns = self.model.columns(kind)
@@ -217,13 +218,28 @@ class StartProblem:
     def _spread(self, solution: ArrowSolution) -> ArrowCovariance:
         """The covariance, where there is one."""
         if not solution.converged:
-            worst = np.argsort((solution.weights * solution.linearization.residuals**2).sum(axis=1))
-            rows = ", ".join(str(k + 2) for k in worst[:-4:-1])
-            raise DataError(
-                f"the start pose was not found: {solution.stop}; the readings in lines {rows} fit "
-                "worst: look at their signs and units, and at the robot's cables"
-            )
-        return self._determined(solution.linearization, solution.weights)
+            squares = (solution.weights * solution.linearization.residuals**2).sum(axis=1)
+            raise self._not_found(solution, squares)
+        return self._judged(solution, solution.linearization, solution.weights)
+
+    def _judged(
+        self, solution: ArrowSolution, linearization: Linearization, weights: Array
+    ) -> ArrowCovariance:
+        """The covariance; where there is none, whether readings are too few or wrong is said."""
+        try:
+            return self._determined(linearization, weights)
+        except DataError as few:
+            squares = (weights * linearization.residuals**2).sum(axis=1)
+            if float(squares.sum()) < GOOD_FIT * self.degrees:
+                raise
+            raise self._not_found(solution, squares) from few
+
+    def _not_found(self, solution: ArrowSolution, squares: Array) -> DataError:
+        rows = ", ".join(str(k + 2) for k in np.argsort(squares)[:-4:-1])
+        return DataError(
+            f"the start pose was not found: {solution.stop}; the readings in lines {rows} fit "
+            "worst: look at their signs and units, and at the robot's cables"
+        )
 
     def _determined(self, linearization: Linearization, weights: Array) -> ArrowCovariance:
         """The covariance of what all poses determine."""

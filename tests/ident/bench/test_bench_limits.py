@@ -1,0 +1,133 @@
+"""When a bench says a number, doubts it or refuses a column: both sides of each limit."""
+
+from __future__ import annotations
+
+from contextlib import nullcontext
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from freeswing.cdpr.files.documents import DataError
+from freeswing.ident.bench import noise, solve
+from freeswing.ident.bench.classic import BESIDE, ClassicRun, _period, leaning_sentence
+from freeswing.ident.bench.identify_bench import _check_moves
+from freeswing.ident.bench.noise import _colours, rescaled, scatter_std
+from freeswing.ident.bench.report_objects import told_object
+from freeswing.ident.bench.runs import BenchRun, Signal
+from freeswing.ident.bench.swing import Column
+from freeswing.ident.likelihood.unknowns import Gaussian, Unknown, Unknowns
+
+
+def body(mass_std: float, prior_std: float = 0.1) -> SimpleNamespace:
+    """A fit of a platform of 5 kg whose other numbers are held."""
+    prior = Gaussian(np.full(10, 5.0), np.full(10, prior_std), "declared")
+    platform = Unknown("platform", np.full(10, 5.0), np.ones(10), prior)
+    covariance = mass_std**2 * np.eye(10)
+    return SimpleNamespace(
+        unknowns=Unknowns((platform,)), value=lambda name: platform.value,
+        std=lambda name: np.sqrt(np.diag(covariance)), covariance_of=lambda name: covariance,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(("declared_kg", "contradicted"), [(5.28, False), (5.32, True)])
+def test_a_declared_mass_that_payload_runs_exclude(monkeypatch, declared_kg, contradicted):
+    """Runs that know the mass to 0.1 kg."""
+    monkeypatch.setattr(solve, "fit", lambda swings, unknowns, how: body(0.1))
+    model = SimpleNamespace(robot=SimpleNamespace(platform=SimpleNamespace(mass_kg=declared_kg)))
+    start = SimpleNamespace(runs=[SimpleNamespace(payloads=("one",))])
+    bench = SimpleNamespace(mass_std_kg=None)
+    _, verdict = solve._mass(bench, model, (), body(0.1), start)
+    assert verdict is not None
+    assert verdict.contradicted == contradicted, verdict
+
+
+@pytest.mark.parametrize(("runs", "looked"), [(4, False), (5, True)])
+def test_scatter_is_looked_for_between_enough_runs(monkeypatch, runs, looked) -> None:
+    asked = []
+    monkeypatch.setattr(solve, "fit", lambda *_: body(0.1))
+    monkeypatch.setattr(solve, "_rough", lambda swings, unknowns: unknowns)
+    monkeypatch.setattr(solve, "_fastest", lambda *_: 1.0)
+    monkeypatch.setattr(solve, "rescaled", lambda swings, *_: swings)
+    monkeypatch.setattr(solve, "_mass", lambda bench, model, swings, found, start: (found, None))
+    monkeypatch.setattr(solve, "scatter_std", lambda found: asked.append(1) or 0.0)
+    swings = tuple(range(runs))
+    solve.solved(None, None, SimpleNamespace(swings=swings, unknowns=body(0.1).unknowns))
+    assert bool(asked) == looked
+
+
+@pytest.mark.parametrize(("chi_square", "seen"), [(2.4, False), (3.0, True)])
+def test_a_scatter_that_is_significant(chi_square, seen) -> None:
+    """Twelve runs of deviation 1 whose spread makes the likelihood rise by this much."""
+    pattern = np.tile([1.0, -1.0], 6)
+    sizes = np.linspace(1.0, 2.0, 4001)
+    rise = 12.0 * (sizes**2 - 1.0 - np.log(sizes**2))  # twice the logarithm, maximal scatter
+    values = 1e-4 * sizes[int(np.argmin(np.abs(rise - chi_square)))] * pattern
+    prior = Gaussian(np.zeros(12), np.full(12, 1e-3), "test")
+    found = SimpleNamespace(
+        value=lambda name: values, covariance_of=lambda name: np.eye(12) * 1e-8,
+        unknowns=Unknowns((Unknown("scatter", values, np.array([1e-4]), prior),)),
+    )  # fmt: skip
+    assert (scatter_std(found) > 0.0) == seen
+
+
+def swing_of(values: np.ndarray, rate_hz: float = 50.0) -> SimpleNamespace:
+    times = np.arange(len(values)) / rate_hz
+    column = Column("chi", np.zeros(len(values)), np.ones(len(values)), 5)
+    return SimpleNamespace(times_s=times, columns=(column,))
+
+
+@pytest.mark.parametrize(("held", "factor"), [(60, np.sqrt(100 / 40)), (90, 2.0)])
+def test_a_fit_never_uses_up_more_than_three_quarters_of_the_samples(monkeypatch, held, factor):
+    """A hundred residuals of one, and so many unknowns."""
+    monkeypatch.setattr(noise, "replace", lambda one, **changes: SimpleNamespace(**changes))
+    unknown = Unknown("all", np.zeros(held), np.ones(held))
+    found = SimpleNamespace(residuals=[np.ones(100)], unknowns=Unknowns((unknown,)))
+    (scaled,) = rescaled([swing_of(np.ones(100))], found, 1.0, coloured=False)
+    assert scaled.columns[0].factor == pytest.approx(factor, rel=0.02)
+
+
+@pytest.mark.parametrize(("over", "counts"), [(2.8, True), (3.2, False)])
+def test_noise_near_the_swing_counts(over, counts) -> None:
+    """A disturbance at so many times the fastest swing of 1 Hz."""
+    white = np.sin(2.0 * np.pi * over * np.arange(1000) / 50.0)
+    found = SimpleNamespace(residuals=[white])
+    colour = _colours([swing_of(white)], found, 1.0, 0.0)["chi"]
+    assert (colour > 2.0) == counts, colour
+
+
+@pytest.mark.parametrize(("share", "told"), [(0.46, True), (0.54, False)])
+def test_a_number_that_rests_on_its_prior(share, told) -> None:
+    """The share of the prior's variance that is left."""
+    found = body(0.1 * np.sqrt(share))
+    solved = SimpleNamespace(solution=found, first=found.unknowns)
+    rows = told_object(solved, "platform", np.zeros(10, bool), one_way=False)
+    assert [row.identifiable for row in rows[1:]] == [told] * 9
+
+
+@pytest.mark.parametrize(("percent", "warned"), [(0.9, False), (1.1, True)])
+def test_izz_that_leans_on_an_unseen_centre_of_mass(percent, warned) -> None:
+    run = ClassicRun("a", 1.0, 1.0, 1.0, ((BESIDE, -percent),))
+    assert bool(leaning_sentence([run], sway_seen=False)) == warned
+
+
+@pytest.mark.parametrize(("periods", "found"), [(2.2, True), (1.75, False)])
+def test_a_period_needs_two_of_them(periods, found) -> None:
+    times = np.arange(501) / 50.0
+    values = 0.1 * np.cos(2.0 * np.pi * periods * times / 10.0)
+    period = _period(times, Column("chi", values, np.ones(501), 5))
+    assert period is not None
+    assert (abs(period * periods / 10.0 - 1.0) < 0.02) == found, period
+
+
+@pytest.mark.parametrize(("over", "usable"), [(4.6, False), (5.5, True)])
+def test_a_channel_that_moves_above_its_noise(over, usable) -> None:
+    """A slow sine beside noise, its spread over the noise's."""
+    random = np.random.default_rng(0).standard_normal(4000)
+    slow = np.sin(np.arange(4000) / 300.0)
+    values = slow / slow.std() * np.sqrt(over**2 - 1.0) + random / random.std()
+    signal = Signal("laser", values, None)
+    times = np.arange(4000) / 100.0
+    run = BenchRun("a", "identify", times, (signal,), None, None, None, (), ())
+    with nullcontext() if usable else pytest.raises(DataError, match="never moves above its noise"):
+        _check_moves(run, signal)

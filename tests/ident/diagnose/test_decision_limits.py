@@ -1,0 +1,296 @@
+"""What the rules of the diagnosis decide on made-up scores: both sides of each limit."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from freeswing.ident.diagnose import base, decision, diagnose, outstanding_runs, removal
+from freeswing.ident.diagnose import unexplained as rest
+from freeswing.ident.diagnose.decision import (
+    Decision,
+    _as_good,
+    _complaint,
+    _gain,
+    promising,
+    runs_worse,
+    settles,
+)
+from freeswing.ident.diagnose.leave_one_out import Score
+
+NOTHING = np.zeros(0)
+WIDE = 1e6  # samples: what is left of a run's excess beside them is a share of nothing
+
+
+def score(held_out, cost: float = 0.0) -> Score:
+    return Score(NOTHING, NOTHING, NOTHING, cost, np.asarray(held_out, dtype=float), 0)
+
+
+def fitted(held_out, cost: float = 0.0, count: float = 4.0) -> SimpleNamespace:
+    """A fit as the rules see it: left-out squares by run, cost, number of samples."""
+    known = score(held_out, cost)
+    counts = np.full(len(known.held_out), count / len(known.held_out))
+    return SimpleNamespace(
+        score=known, held_out=float(known.held_out.sum()), evidence=SimpleNamespace(counts=counts)
+    )
+
+
+@pytest.fixture(autouse=True)
+def plain(monkeypatch):
+    """Effects are names, each with two unknowns for all runs; all values are plausible."""
+    monkeypatch.setattr(decision, "plausible", lambda *_: [])
+    monkeypatch.setattr(decision, "unknowns", lambda current, key: (2, 0))
+    monkeypatch.setattr(decision, "effect_of", lambda key: key)
+
+
+def complaint(drop: float, tried: int = 1, count: float = 4.0, later: bool = False) -> str:
+    """On a candidate whose cost is lower by so much, and which every left-out run likes."""
+    before, after = fitted([100.0] * 4, 1e4, count), fitted([10.0] * 4, 1e4 - drop, count)
+    return _complaint(before, after, "effect", 1.0, tried, later)
+
+
+@pytest.mark.parametrize(("chance", "passes"), [(0.92e-3, True), (1.08e-3, False)])
+def test_a_likelihood_that_chance_may_have_raised(chance, passes) -> None:
+    """Two unknowns, a thousand candidates tried: each of them could have been lucky."""
+    assert (complaint(float(chi2.isf(chance / 1000, 2)), 1000) == "") == passes
+    text = complaint(float(chi2.isf(chance / 1000, 2)), 1000)
+    assert passes or "not significant: p = 0.0011 with 1000" in text, text
+
+
+@pytest.mark.parametrize(("chance", "passes"), [(0.92e-3, True), (1.08e-3, False)])
+def test_a_frequency_that_was_scanned_for_had_more_chances(monkeypatch, chance, passes) -> None:
+    """400 of them."""
+    monkeypatch.setattr(decision, "unknowns", lambda current, key: (1, 2))
+    drop = float(chi2.isf(chance / 400, 3))
+    assert (complaint(drop, 1) == "") == passes
+
+
+@pytest.mark.parametrize(("delta_bic", "passes"), [(-9.4, False), (-10.6, True)])
+def test_a_likelihood_worth_its_unknowns(delta_bic, passes) -> None:
+    drop = 2.0 * np.log(1e6) - delta_bic
+    assert (complaint(float(drop), count=1e6) == "") == passes
+
+
+def of_runs(gains) -> str:
+    """The complaint on a candidate that changes the left-out runs' squares by these."""
+    gains = np.asarray(gains, dtype=float)
+    before = fitted(np.full(len(gains), 100.0), 1e4, WIDE)
+    return _complaint(before, fitted(100.0 - gains, 0.0, WIDE), "effect", 1.0, 1, later=False)
+
+
+@pytest.mark.parametrize(("worse", "passes"), [(4, True), (5, False)])
+def test_a_quarter_of_the_runs_may_get_worse(worse, passes) -> None:
+    text = of_runs([100.0] * (16 - worse) + [-20.0] * worse)
+    assert (text == "") == passes, text
+
+
+@pytest.mark.parametrize(
+    ("runs", "worse", "passes"), [(15, 2, True), (20, 3, False), (21, 3, True)]
+)
+def test_a_gain_that_one_run_brings_and_others_contradict(runs, worse, passes) -> None:
+    """Within its own scatter 15 % of the runs suffice to doubt it."""
+    text = of_runs([1000.0] + [1.0] * (runs - worse - 1) + [-60.0] * worse)
+    assert (text == "") == passes, text
+    assert passes or "within the scatter" in text, text
+
+
+@pytest.mark.parametrize(
+    ("own", "mean_gain", "held_out", "worse"),
+    [
+        (-9.3, 0.0, 1000.0, 0),
+        (-10.7, 0.0, 1000.0, 1),
+        (-9.3, 100.0, 0.0, 0),
+        (-10.7, 100.0, 0.0, 1),
+    ],
+)
+def test_a_run_loses_what_counts(own, mean_gain, held_out, worse) -> None:
+    """Beside its own squares a hundredth, beside the mean gain a tenth."""
+    others = np.full(9, (10.0 * mean_gain - own) / 9.0)
+    before = score(np.full(10, held_out))
+    assert runs_worse(np.append(others, own), before) == worse
+
+
+@pytest.mark.parametrize(
+    ("excess", "gain", "passes"),
+    [(0.0047, 0.9, False), (0.0053, 0.9, True), (0.02, 0.23, False), (0.02, 0.27, True)],
+)
+def test_a_further_effect_must_be_worth_its_place(excess, gain, passes) -> None:
+    count = 1e6
+    before = fitted([count * (1.0 + excess) / 4] * 4, 1e6, count)
+    removed = gain * max(excess, 0.005) * count
+    after = fitted([(count * (1.0 + excess) - removed) / 4] * 4, 0.0, count)
+    text = _complaint(before, after, "effect", 1.0, 1, later=True)
+    assert (text == "") == passes, text
+    assert _complaint(before, after, "effect", 1.0, 1, later=False) == ""
+
+
+def test_an_excess_counts_as_half_a_per_cent_at_least() -> None:
+    """A gain is a share of the excess; below that it would be a share of nothing."""
+    count = 1e6
+    before = fitted([count * 1.0042])
+    assert _gain(before_count(before, count), count) == pytest.approx(0.84, abs=0.01)
+    wider = fitted([count * 1.0057])
+    assert _gain(before_count(wider, count), count) == pytest.approx(1.0, abs=0.01)
+
+
+def before_count(one: SimpleNamespace, count: float) -> SimpleNamespace:
+    return SimpleNamespace(**{**vars(one), "evidence": SimpleNamespace(counts=np.array([count]))})
+
+
+def ranked(gains: dict[str, float], tried=()) -> list[str]:
+    """Who is fitted next, of candidates that promise these gains by both measures."""
+    count = 4.0
+    before = fitted([1000.0], 1000.0, count)
+    price = 2.0 * float(np.log(count))
+    linear = {name: score([1000.0 - gain], 1000.0 - gain - price) for name, gain in gains.items()}
+    return promising(before, linear, 1.0, tried)
+
+
+@pytest.mark.parametrize(("share", "chosen"), [(0.47, ["best"]), (0.53, ["best", "other"])])
+def test_at_first_those_nearly_as_good(share, chosen) -> None:
+    assert ranked({"best": 100.0, "other": 100.0 * share}) == chosen
+
+
+@pytest.mark.parametrize(("gain", "chosen"), [(9.3, []), (10.7, ["other"])])
+def test_later_all_that_promise_anything(gain, chosen) -> None:
+    assert ranked({"best": 100.0, "other": gain}, tried=("best",)) == chosen
+
+
+def test_four_at_a_time() -> None:
+    assert len(ranked({f"e{k}": 100.0 - k for k in range(8)})) == 4
+
+
+@pytest.mark.parametrize(
+    ("share", "left", "settled"),
+    [(0.72, 0.1, False), (0.78, 0.1, True), (0.5, 0.0047, True), (0.5, 0.0053, False)],
+)
+def test_whether_what_won_may_be_the_cause(share, left, settled) -> None:
+    """It explains three quarters of the excess, or reaches the noise nearly."""
+    count = 1e6
+    winner = fitted([count * (1.0 + left)], 0.0, count)
+    before = fitted([count * (1.0 + left / (1.0 - share))], 0.0, count)
+    assert settles(Decision((), winner, "effect", ("effect",)), before) == settled
+
+
+def as_good(lead: float, bic: float, colour: float = 1.0, runs=None) -> bool:
+    """Whether a fit that is behind by `lead` in left-out squares, BIC ahead, counts as good."""
+    before = fitted([1000.0] * 12, 1e4)
+    best = fitted([500.0] * 12, 100.0)
+    leads = np.full(12, lead / 12) if runs is None else np.asarray(runs, dtype=float)
+    one = fitted(500.0 + leads, 100.0 - bic)
+    return _as_good({"best": best, "one": one}, "one", "best", before, colour)
+
+
+@pytest.mark.parametrize(
+    ("lead", "bic", "good"),
+    [(11.2, -1.0, True), (12.8, -1.0, False), (560.0, 1.0, True), (640.0, 1.0, False)],
+)
+def test_leads_that_are_none(lead, bic, good) -> None:
+    """Twelve in squares; against the likelihood a tenth of what the best gained, 6000."""
+    assert as_good(lead, bic) == good
+
+
+@pytest.mark.parametrize(("against", "good"), [(3, False), (4, True)])
+def test_a_lead_that_a_third_of_the_runs_contradict(against, good) -> None:
+    runs = [900.0] + [20.0] * (11 - against) + [-100.0] * against
+    assert as_good(0.0, -1.0, runs=runs) == good
+
+
+def test_a_lead_that_three_of_ten_contradict_stands() -> None:
+    before, best = fitted([1000.0] * 10, 1e4), fitted([500.0] * 10, 100.0)
+    one = fitted(500.0 + np.array([900.0] + [20.0] * 6 + [-100.0] * 3), 101.0)
+    assert not _as_good({"best": best, "one": one}, "one", "best", before, 1.0)
+
+
+@pytest.mark.parametrize(("excess", "believed"), [(0.47, True), (0.53, False)])
+def test_the_nearest_is_not_the_cause_where_much_is_left(monkeypatch, excess, believed) -> None:
+    count = 1e4
+    monkeypatch.setattr(diagnose, "_share_explained", lambda *_: 0.5)
+    monkeypatch.setattr(diagnose, "unexplained", lambda *_: rest.Unexplained(False, ""))
+    monkeypatch.setattr(diagnose, "effect_of", lambda key: key)
+    last, first = fitted([count * (1.0 + excess)], 0.0, count), fitted([3 * count], 0.0, count)
+    last.fit = first.fit = None
+    won = SimpleNamespace(
+        decision=SimpleNamespace(winner=last, key="drag"), by_lengths=False, before=first
+    )
+    search = SimpleNamespace(rounds=[won], noise_scales=np.ones(2))
+    notes: list[str] = []
+    found, _, _ = diagnose._believed(search, last, [], True, notes)
+    assert (found is last) == believed
+    assert bool(notes) != believed, notes
+
+
+def left(monkeypatch, power: float, colour: float) -> bool:
+    """Whether residuals of this power and this low-frequency power are called unexplained."""
+    white = np.full((100, 1), np.sqrt(power))
+    spectrum = np.concatenate([np.full(50, colour), np.full(50, 0.5)])
+    monkeypatch.setattr(rest, "residuals", lambda *_: white)
+    monkeypatch.setattr(rest, "mean_log_spectrum", lambda *_: (np.linspace(0, 9.9, 100), spectrum))
+    monkeypatch.setattr(rest, "too_small", lambda *_: False)
+    monkeypatch.setattr(rest, "predicted", lambda *_: np.zeros((100, 6)))
+    monkeypatch.setattr(rest, "_follows", lambda *_: {"time": 1.0})
+    monkeypatch.setattr(rest, "_hint", lambda *_: [])
+    monkeypatch.setattr(rest, "common_frequency", lambda *_: 1.0)
+    samples = SimpleNamespace(
+        coordinates=("x",), times_s=np.arange(100), columns=[0], values=np.zeros((100, 1))
+    )
+    fit = SimpleNamespace(motions=[None], samples=[samples])
+    return rest.unexplained(fit, [], True, np.ones(2)).present
+
+
+@pytest.mark.parametrize(
+    ("power", "colour", "present"),
+    [(1.14, 3.0, False), (1.16, 3.0, True), (2.0, 1.55, False), (2.0, 1.65, True)],
+)
+def test_a_residual_that_noise_does_not_leave(monkeypatch, power, colour, present) -> None:
+    assert left(monkeypatch, power, colour) == present
+
+
+@pytest.mark.parametrize(("share", "terms"), [(0.027, 1), (0.033, 2)])
+def test_a_hint_is_worth_three_per_cent(share, terms) -> None:
+    columns = np.eye(4)[:, :2]
+    right = np.array([np.sqrt(1.0 - share), np.sqrt(share), 0.0, 0.0])
+    assert len(rest._greedy(right, columns, ["a", "b"])) == terms
+
+
+@pytest.mark.parametrize(("powers", "tempered"), [((1.0, 1.0, 3.8), 1.0), ((1.0, 1.0, 4.4), 1.05)])
+def test_a_run_that_stands_out(monkeypatch, powers, tempered) -> None:
+    """Four times the median power is what one run may weigh."""
+    monkeypatch.setattr(outstanding_runs, "residual_powers", lambda *_: np.array(powers))
+    monkeypatch.setattr(outstanding_runs, "replace", lambda one, temper: temper)
+    found = SimpleNamespace(samples=[SimpleNamespace(temper=1.0)] * 3)
+    assert outstanding_runs.tempered(found, np.ones(2))[2] == pytest.approx(tempered, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("astray", "power", "follows"),
+    [(0.23, 9.0, True), (0.27, 9.0, False), (0.9, 1.85, True), (0.9, 2.15, False)],
+)
+def test_a_start_that_follows_the_runs(monkeypatch, astray, power, follows) -> None:
+    """A quarter of the swings' size, or twice the noise's power."""
+    monkeypatch.setattr(base, "astray", lambda _: astray)
+    monkeypatch.setattr(base, "residual_powers", lambda *_: np.array([power]))
+    assert base._follows(None, np.ones(2)) == follows
+
+
+@pytest.mark.parametrize(("delta_bic", "lead", "no_worse"), [
+    (-9.0, 11.0, True), (-11.0, 11.0, False), (-9.0, 13.0, False),
+])  # fmt: skip
+def test_an_effect_that_may_leave_again(monkeypatch, delta_bic, lead, no_worse) -> None:
+    monkeypatch.setattr(removal, "colour_of", lambda *_: 1.0)
+    monkeypatch.setattr(removal, "delta_bic", lambda *_: delta_bic)
+    fewer, more = fitted([100.0 + lead]), fitted([100.0])
+    more.fit = None
+    assert removal.is_no_worse(fewer, more, "effect", np.ones(2)) == no_worse
+
+
+@pytest.mark.parametrize(("runs", "enough"), [(2, False), (3, True)])
+def test_runs_to_leave_one_out_of(runs, enough) -> None:
+    if enough:
+        base.refuse_few([None] * runs)
+    else:
+        with pytest.raises(base.DataError, match="at least 3"):
+            base.refuse_few([None] * runs)
