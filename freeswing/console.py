@@ -53,7 +53,7 @@ class Console:
     def __init__(self, *, as_json: bool = False, quiet: bool = False) -> None:
         self._summary = not as_json and not quiet
         self._json = as_json
-        self._draws = sys.stderr.isatty() and not quiet
+        self._draws = sys.stderr.isatty() and not quiet and os.environ.get("TERM") != "dumb"
         self._bar: Progress | None = None
         self._tasks: dict[str, TaskID] = {}
 

@@ -48,7 +48,9 @@ def add_arguments(parser: ArgumentParser) -> None:
         "--paper", choices=PAPERS, default=PAPERS[0], help="what tags and board are printed on"
     )
     parser.add_argument(
-        "--no-questions", action="store_true", help="take what flags do not say as usual"
+        "--no-questions",
+        action="store_true",
+        help="at a terminal too: take what flags do not say as usual (so with --kind)",
     )
 
 
@@ -109,7 +111,8 @@ def _answers(options: Namespace) -> Answers:
         rate_hz=options.rate_hz,
         tag_m=options.tag_m,
     )
-    is_asked = sys.stdin.isatty() and sys.stderr.isatty() and not options.no_questions
+    is_asked = options.kind is None and not options.no_questions
+    is_asked = is_asked and sys.stdin.isatty() and sys.stderr.isatty()
     quiet = options.json or options.quiet
     return ask(said) if is_asked and not quiet else said
 
