@@ -6,6 +6,7 @@ import argparse
 import importlib
 import os
 import sys
+import warnings
 from collections.abc import Sequence
 from types import ModuleType
 
@@ -55,6 +56,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         # Processes share the cores; small matrices only lose by threads of their own.
         os.environ.setdefault(threads, "1")
+    if (
+        arguments is None and not options.verbose
+    ):  # what Python's packages mutter is no sentence for a user
+        warnings.simplefilter("ignore")
+        os.environ.setdefault("PYTHONWARNINGS", "ignore")  # nor what they do in workers
     with Console(as_json=options.json, quiet=options.quiet) as console:
         try:
             options.run(options, console)

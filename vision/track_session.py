@@ -107,6 +107,8 @@ def track_session(
         raise InputError("no run of the session has a video; there is nothing to track")
     pairs = [(run.name, run_recordings(run, cameras)) for run in filmed]
     remarks = {name: _examined(found, frame_rate_hz) for name, found in pairs}
+    for run in filmed:
+        remarks[run.name] += unmatched(run, cameras)
     watch, said = examined_watch(watch, pairs[0][1])
     remarks[pairs[0][0]] += said
     jobs = [
@@ -154,6 +156,17 @@ def run_recordings(run: RecordedRun, cameras: Sequence[Camera]) -> list[tuple[Ca
             f"{', '.join(by_name)}: name the files as the cameras are named"
         )
     return [(by_name[name], found[name]) for name in known]
+
+
+def unmatched(run: RecordedRun, cameras: Sequence[Camera]) -> list[str]:
+    """Recordings that no camera has the name of, and cameras that have no recording in a run."""
+    known = {camera.name for camera in cameras}
+    found = {recording.name for recording in find_recordings(run.video or Path())}
+    said = [
+        f"{name}: its recording is not used, cameras.toml knows no camera of that name"
+        for name in sorted(found - known)
+    ]
+    return said + [f"{name}: has no recording in this run" for name in sorted(known - found)]
 
 
 def _examined(found: Sequence[tuple[Camera, Recording]], frame_rate_hz: float | None) -> list[str]:

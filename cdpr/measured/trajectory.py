@@ -139,8 +139,9 @@ class Trajectory:
         inside = (self.times_s >= start_s - slack) & (self.times_s <= end_s + slack)
         if not inside.any():
             raise DataError(
-                f"{self.provenance or 'trajectory'}: no sample from {start_s:g} to {end_s:g} s; "
-                f"it lasts from {self.times_s[0]:g} to {self.times_s[-1]:g} s: correct the window"
+                f"{self.provenance or 'trajectory'}: no sample from {start_s:.10g} to "
+                f"{end_s:.10g} s; it lasts from {self.times_s[0]:.10g} to "
+                f"{self.times_s[-1]:.10g} s: correct the window"
             )
         return self.take(inside)
 

@@ -64,13 +64,24 @@ def positive_whole(text: str) -> int:
     return int(text)
 
 
-def positive(text: str) -> float:
-    """A finite number above zero."""
+def finite(text: str) -> float:
+    """A number that is one."""
     try:
         value = float(text)
     except ValueError:
         value = math.nan
-    if not (math.isfinite(value) and value > 0.0):
+    if not math.isfinite(value):
+        raise ArgumentTypeError(f"{text!r}: give a finite number")
+    return value
+
+
+def positive(text: str) -> float:
+    """A finite number above zero."""
+    try:
+        value = finite(text)
+    except ArgumentTypeError:
+        value = 0.0
+    if value <= 0.0:
         raise ArgumentTypeError(f"{text!r}: give a finite number above 0")
     return value
 

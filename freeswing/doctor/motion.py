@@ -41,6 +41,8 @@ LENGTH_CHANGE_M = 0.003
 HARDLY_MOVES_M = 1e-4
 # The shortest filter needs eight.
 LEAST_SAMPLES = 8
+# Counted from a program's or a machine's start, 30 years are not reached.
+SINCE_1970_S = 1e9
 # A dropped frame doubles a step; jitter of the stamps stays below half a step.
 SKIPPED_STEPS = 1.5
 
@@ -72,6 +74,9 @@ def stamp_findings(
     subject: str, trajectory: Trajectory, rate_hz: float | None
 ) -> Iterator[Finding]:
     """Samples that are too few, that come at another rate than declared, or with jumps."""
+    if len(trajectory) and trajectory.times_s[0] > SINCE_1970_S:
+        text = f"its times begin at {trajectory.times_s[0]:.10g} s: they count from 1970"
+        yield Finding("note", subject, text, "window_s counts so too")
     if len(trajectory) < LEAST_SAMPLES:
         yield Finding(
             "error", subject, f"{len(trajectory)} samples, at least {LEAST_SAMPLES} are needed"

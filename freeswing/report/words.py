@@ -44,7 +44,7 @@ def number(value: object, digits: int = 3) -> str:
     if value != 0 and not 1e-3 <= abs(value) < 1e5:
         return f"{value:.{digits - 1}e}"
     decimals = digits - 1 - math.floor(math.log10(abs(value))) if value else digits - 1
-    return f"{value:.{max(decimals, 0)}f}"
+    return f"{value:z.{max(decimals, 0)}f}"
 
 
 def millimetres(value_m: object, digits: int = 3) -> str:
@@ -87,7 +87,7 @@ def with_decimals(value: float | None, std: float | None) -> str:
     if not std or std < 0:
         return number(value, 5)
     decimals = min(max(1 - math.floor(math.log10(std)), 0), 9)
-    return f"{value:.{decimals}f}"
+    return f"{value:z.{decimals}f}"
 
 
 def _percent(value: float | None, std: float | None) -> float | None:

@@ -13,6 +13,7 @@ from freeswing.cdpr.measured.pose_errors import PoseErrors, read_pose_errors
 from freeswing.cdpr.measured.sound_samples import check_stamps, sound_samples
 from freeswing.cdpr.measured.target import Target, read_target
 from freeswing.cdpr.measured.trajectory import Trajectory
+from freeswing.cdpr.model.equations import LARGEST_SWINGING
 from freeswing.cdpr.robot import Robot
 from freeswing.ident.runs import Payload, SwingRun
 from freeswing.results.files import read_document
@@ -22,8 +23,19 @@ from freeswing.session.session_file import Run, Session
 
 
 def load_robot(session: Session) -> Robot:
-    """The session's robot."""
-    return read_robot(session.robot)
+    """The session's robot.
+
+    Raises:
+        InputError: also where so many cables hold it that nothing can swing.
+    """
+    robot = read_robot(session.robot)
+    if robot.n_cables > LARGEST_SWINGING:
+        raise InputError(
+            f"{session.robot}: {robot.n_cables} locked cables leave the platform no free motion "
+            f"(6 - n coordinates are free): sessions of free swings take up to {LARGEST_SWINGING} "
+            "cables; lock fewer, the others off, or record a driven robot (freeswing drive)"
+        )
+    return robot
 
 
 def load_target(session: Session) -> Target | None:

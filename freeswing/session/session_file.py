@@ -36,6 +36,8 @@ BOARD_KEYS = {
 }
 OPTIONAL_BOARD_KEYS = {"charuco": ("legacy",), "chessboard": (), "aprilgrid": ("family",)}
 MOST_RUNS = 10_000
+PORTS = (f"{port}{number}" for port in ("com", "lpt") for number in range(10))
+DEVICES = frozenset(("con", "prn", "aux", "nul", *PORTS))
 
 
 @dataclass(frozen=True, slots=True)
@@ -274,7 +276,9 @@ def _read_run(reader: Reader, paths: _Paths) -> Run:
     payloads, loads = read_payloads(reader), read_placed(reader)
     reader.finish()
     if name and not _is_file_stem(name):
-        reader.add("name", f"{name[:40]!r} becomes a file name: letters, digits, . _ - only")
+        why = ": letters, digits, . _ - only"
+        why = ", which Windows keeps for a device: take another" if is_device(name) else why
+        reader.add("name", f"{name[:40]!r} becomes a file name{why}")
     if (video is None) == (trajectory is None):
         reader.add("video, trajectory", "give one of them")
     if trajectory is not None and trajectory.suffix.lower() not in TRAJECTORY_SUFFIXES:
@@ -300,7 +304,13 @@ def _read_run(reader: Reader, paths: _Paths) -> Run:
 
 def _is_file_stem(name: str) -> bool:
     plain = all(letter.isalnum() or letter in "._- " for letter in name)
-    return plain and not name.startswith(".") and len(name) <= 100 and name.strip() == name
+    tidy = not name.startswith(".") and not name.endswith(".") and name.strip() == name
+    return plain and tidy and len(name) <= 100 and not is_device(name)
+
+
+def is_device(name: str) -> bool:
+    """Whether Windows takes a file of this name, with any suffix, for a device."""
+    return name.partition(".")[0].strip().casefold() in DEVICES
 
 
 def _check_runs(reader: Reader, runs: tuple[Run, ...]) -> None:

@@ -202,7 +202,7 @@ def _windowed(run: BenchRun) -> BenchRun:
     if inside.sum() < 20:
         raise DataError(
             f"run {run.name}: {int(inside.sum())} samples in window_s {list(run.window_s)}; it "
-            f"lasts from {run.times_s[0]:g} to {run.times_s[-1]:g} s"
+            f"lasts from {run.times_s[0]:.10g} to {run.times_s[-1]:.10g} s"
         )
     return replace(
         run,

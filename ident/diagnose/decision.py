@@ -344,4 +344,6 @@ def _verdict(
         return "rejected", f"{effect_of(winner)} predicts left-out runs better", ()
     if known is not None:
         return "rejected", "its fit could not be completed", ()
+    if round(100.0 * gain, 1) <= 0.0:
+        return "rejected", "removes nothing of the excess to first order", ()
     return "rejected", f"removes at most {100 * gain:.1f} % of the excess to first order", ()

@@ -78,8 +78,8 @@ def smoother(
         raise ValueError(f"pass_hz {pass_hz} and stop_hz {stop_hz}: must be 0 < pass < stop")
     if pass_hz >= nyquist:
         raise ValueError(
-            f"pass_hz {pass_hz}: samples at {1 / period_s:.4g} Hz hold nothing above "
-            f"{nyquist:.4g} Hz; lower pass_hz or record faster"
+            f"samples at {1 / period_s:.4g} Hz hold nothing above {nyquist:.4g} Hz, the swing's "
+            f"frequencies reach {pass_hz:g} Hz: record at {4.0 * pass_hz:.3g} Hz or faster"
         )
     half = taps_for(period_s, pass_hz, stop_hz, attenuation_db) // 2
     reach: Array = np.arange(-half, half + 1) * np.float64(period_s)

@@ -6,7 +6,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from freeswing.commands.arguments import add_results
+from freeswing.commands.arguments import add_results, finite
 from freeswing.console import Console
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--method", choices=METHODS, default="hinf", help="default hinf")
     parser.add_argument(
         "--at",
-        type=float,
+        type=finite,
         nargs=6,
         default=(0.0,) * 6,
         metavar=("X", "Y", "Z", "R", "P", "YAW"),

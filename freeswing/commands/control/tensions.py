@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING
 
-from freeswing.commands.arguments import add_results
+from freeswing.commands.arguments import add_results, finite
 from freeswing.console import Console
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--method", choices=METHODS, default="nearest", help="default nearest")
     parser.add_argument(
         "--objective-N",
-        type=float,
+        type=finite,
         default=10.0,
         dest="objective",
         metavar="T",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING
 
-from freeswing.commands.arguments import add_session, open_session
+from freeswing.commands.arguments import add_session, finite, open_session
 from freeswing.console import Console
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         help="default pdf; may be repeated",
     )
     parser.add_argument(
-        "--dpi", type=float, default=600.0, help="dots per inch of png, default 600"
+        "--dpi", type=finite, default=600.0, help="dots per inch of png, default 600"
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from freeswing.commands.arguments import add_results, positive, positive_whole, whole
+from freeswing.commands.arguments import add_results, finite, positive, positive_whole, whole
 from freeswing.console import Console
 
 
@@ -20,7 +20,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--duration-s", type=positive, default=10.0, help="of a swing, default 10")
     parser.add_argument(
         "--tension-n",
-        type=float,
+        type=finite,
         nargs=2,
         default=(20.0, 200.0),
         metavar=("LOW", "HIGH"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from freeswing.commands.arguments import add_results
+from freeswing.commands.arguments import add_results, finite
 from freeswing.console import Console
 
 RATES = (0.1, 1000.0)  # rad/s, as Fig. 8 of the paper spans its resonances
@@ -17,7 +17,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("robot", metavar="ROBOT", help="robot.toml with [drive]")
     parser.add_argument(
         "--at",
-        type=float,
+        type=finite,
         nargs=6,
         default=(0.0,) * 6,
         metavar=("X", "Y", "Z", "ROLL", "PITCH", "YAW"),

@@ -111,8 +111,9 @@ def _effects(robot: Robot, options: Namespace) -> dict[str, dict[str, float]]:
     names = [name for some in own.values() for name in some]
     for name, _ in options.set:
         if name not in names:
-            there = ", ".join(names) or "none without --effect"
-            raise InputError(f"--set {name}: not one of {there}")
+            if not names:
+                raise InputError(f"--set {name}: a number of which effect? Name it by --effect")
+            raise InputError(f"--set {name}: not one of {', '.join(names)}")
     return {
         effect: {name: value for name, value in options.set if name in some}
         for effect, some in own.items()

@@ -6,7 +6,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from freeswing.commands.arguments import not_negative, positive
+from freeswing.commands.arguments import finite, not_negative, positive
 from freeswing.console import Console
 
 if TYPE_CHECKING:
@@ -25,16 +25,19 @@ def add_drive_arguments(parser: ArgumentParser) -> None:
         help="current references, or a recording (.csv) whose Iref columns are taken",
     )
     group.add_argument(
-        "--levels-a", type=float, nargs=2, default=(0.0, 1.0), metavar=("LOW", "HIGH")
+        "--levels-a", type=finite, nargs=2, default=(0.0, 1.0), metavar=("LOW", "HIGH")
     )
     group.add_argument("--band-hz", type=positive, default=1.0, help="of the PRBS, default 1")
     group.add_argument("--motor", help="the cable whose motor the ramp drives")
-    group.add_argument("--slope-a-s", type=float, default=1.0, help="of the ramp, default 1")
+    group.add_argument("--slope-a-s", type=finite, default=1.0, help="of the ramp, default 1")
     group.add_argument("--pose-rate-hz", type=positive, default=200.0, help="default 200")
     group.add_argument("--latency-s", type=not_negative, default=0.0, help="of the poses")
     group.add_argument("--encoder-step-rad", type=not_negative, default=0.0)
     group.add_argument(
-        "--elastic-n", type=float, metavar="EA", help="elastic cables of EA newton: slack is exact"
+        "--elastic-n",
+        type=positive,
+        metavar="EA",
+        help="elastic cables of EA N: slack is exact",
     )
     group.add_argument("--current-noise-a", type=not_negative, default=0.0)
 

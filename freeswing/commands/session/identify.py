@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING, Any
 
-from freeswing.commands.arguments import add_session, open_session
+from freeswing.commands.arguments import add_session, open_session, positive
 from freeswing.console import Console
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     for flag, what in (("entry", "pulley entry"), ("attachment", "platform attachment")):
         parser.add_argument(
             f"--{flag}-std-m",
-            type=float,
+            type=positive,
             metavar="STD",
             help=f"how well every coordinate of the {what} points is known: they are then "
             "estimated too, by maximum likelihood; default exactly",

@@ -57,24 +57,20 @@ def run_session(
 
     Raises:
         DataError: where a step came to no result; the report is written all the same and says so.
+        InputError: the same, where a file is wrong.
     """
-    from freeswing.cdpr.files.documents import DataError
+    from freeswing.cdpr.files.documents import DataError, InputError
     from freeswing.commands.session.report import NO_VALIDATION, write_report
     from freeswing.session.stages import DIAGNOSE, STAGES
 
-    failures: dict[str, DataError] = {}
+    failures: dict[str, DataError | InputError] = {}
     for stage in STAGES if stages is None else stages:
-        if not stage.due(session):
-            if stage is DIAGNOSE:
-                console.say(f"diagnose: left out. {NO_VALIDATION}")
-            continue
-        if stage.is_current(session):
-            console.say(f"{stage.name}: up to date")
-            continue
-        console.say(f"{stage.name}:")
         try:
-            stage.take(session, console, crew=crew)
-        except DataError as failure:
+            if stage.due(session):
+                _take(stage, session, console, crew)
+            elif stage is DIAGNOSE:
+                console.say(f"diagnose: left out. {NO_VALIDATION}")
+        except (DataError, InputError) as failure:
             failures[stage.name] = failure
             if stage.name in NEEDED:
                 break
@@ -85,4 +81,15 @@ def run_session(
     console.say(str(page))
     if failures:
         told = "\n  ".join(f"{name}: {why}" for name, why in failures.items())
+        wrong = next((one for one in failures.values() if isinstance(one, InputError)), None)
+        if wrong is not None:
+            raise InputError(told) from wrong
         raise DataError(told) from next(iter(failures.values()))
+
+
+def _take(stage: Stage, session: Session, console: Console, crew: Crew) -> None:
+    if stage.is_current(session):
+        console.say(f"{stage.name}: up to date")
+        return
+    console.say(f"{stage.name}:")
+    stage.take(session, console, crew=crew)

@@ -77,7 +77,7 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
     from freeswing.vision.track_session import track_session
 
     if not session.cameras.is_file():
-        raise DataError(f"{session.cameras}: no such file; run freeswing calibrate first")
+        raise DataError(f"{session.cameras}: no such file; {_whence(session)}")
     target = load_target(session)
     if target is None:
         raise InputError(f"{session.path}: target: missing; it says what is on the platform")
@@ -101,6 +101,17 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
         for name, trajectory in found.trajectories.items()
     ]
     return Made((("tracking.json", document),), tuple(tracks), found.refused)
+
+
+def _whence(session: Session) -> str:
+    """Where cameras come from: recordings of a board, or another program."""
+    source = session.calibration
+    if source is not None and source.recordings is not None:
+        return "run freeswing calibrate first"
+    return (
+        "the session names no recordings of a board to calibrate from ([calibration]): give them, "
+        "or bring cameras.toml from another program by freeswing convert"
+    )
 
 
 def _draw(session: Session, console: Console, *, view: bool, overlay: bool) -> None:

@@ -103,7 +103,7 @@ def _say_changes(before: Mark, now: Mark, console: Console) -> None:
 
 def _redo(session: Session, options: Namespace, console: Console) -> None:
     """What is stale, and the page; what cannot be computed is said and waited over."""
-    from freeswing.cdpr.files.documents import DataError
+    from freeswing.cdpr.files.documents import DataError, InputError
     from freeswing.commands.session.run import run_session
     from freeswing.session.stages import DIAGNOSE, STAGES
 
@@ -111,5 +111,5 @@ def _redo(session: Session, options: Namespace, console: Console) -> None:
     try:
         with crew_of(options, session) as crew:
             run_session(session, console, crew, stages, PAGE_S)
-    except DataError as failure:
+    except (DataError, InputError) as failure:
         console.complain(str(failure))
