@@ -17,7 +17,11 @@ GIMBAL_COSINE = 1e-9
 
 
 def skew(v: ArrayLike) -> Array:
-    """Matrix S of the cross product, S @ w = v x w. (..., 3) -> (..., 3, 3)."""
+    """Matrix S of the cross product, S @ w = v x w. (..., 3) -> (..., 3, 3).
+
+    Source:
+        Murray, Li, Sastry 1994, A Mathematical Introduction to Robotic Manipulation, ch. 2.
+    """
     v = np.asarray(v, dtype=np.float64)
     x, y, z = v[..., 0], v[..., 1], v[..., 2]
     zero = np.zeros_like(x)
@@ -25,7 +29,11 @@ def skew(v: ArrayLike) -> Array:
 
 
 def matrix_from_angles(angles: ArrayLike) -> Array:
-    """R = Rx(phi) Ry(theta) Rz(chi) from (phi, theta, chi) [rad]. (..., 3) -> (..., 3, 3)."""
+    """R = Rx(phi) Ry(theta) Rz(chi) from (phi, theta, chi) [rad]. (..., 3) -> (..., 3, 3).
+
+    Source:
+        Ida, Merlet, Carricato 2019, sec. 2.1: Tait-Bryan angles by the xyz convention.
+    """
     angles = np.asarray(angles, dtype=np.float64)
     (cp, ct, cc), (sp, st, sc) = (np.moveaxis(f(angles), -1, 0) for f in (np.cos, np.sin))
     return _matrix(
@@ -65,7 +73,11 @@ def angle_rate_matrix(angles: ArrayLike) -> Array:
 
 
 def matrix_from_quaternion(q_wxyz: ArrayLike) -> Array:
-    """R of a quaternion of any non-zero length. (..., 4) -> (..., 3, 3); length 0 gives NaN."""
+    """R of a quaternion of any non-zero length. (..., 4) -> (..., 3, 3); length 0 gives NaN.
+
+    Source:
+        Murray, Li, Sastry 1994, A Mathematical Introduction to Robotic Manipulation, ch. 2.
+    """
     q = np.asarray(q_wxyz, dtype=np.float64)
     norm = np.linalg.norm(q, axis=-1, keepdims=True)
     w, x, y, z = np.moveaxis(q / np.where(norm > 0.0, norm, np.nan), -1, 0)
@@ -111,7 +123,11 @@ def quaternion_from_matrix(R: ArrayLike) -> Array:
 
 
 def exp_rotation(rotvec: ArrayLike) -> Array:
-    """R = exp(skew(rotvec)), Rodrigues' formula. (..., 3) [rad] -> (..., 3, 3)."""
+    """R = exp(skew(rotvec)), Rodrigues' formula. (..., 3) [rad] -> (..., 3, 3).
+
+    Source:
+        Murray, Li, Sastry 1994, A Mathematical Introduction to Robotic Manipulation, eq. (2.14).
+    """
     v = np.asarray(rotvec, dtype=np.float64)
     half = 0.5 * np.linalg.norm(v, axis=-1, keepdims=True)
     # numpy's sinc is sin(pi x)/(pi x): exact at 0, so that no series branch is needed.
@@ -120,7 +136,11 @@ def exp_rotation(rotvec: ArrayLike) -> Array:
 
 
 def log_rotation(R: ArrayLike) -> Array:
-    """Rotation vector of length in [0, pi]. (..., 3, 3) -> (..., 3) [rad]."""
+    """Rotation vector of length in [0, pi]. (..., 3, 3) -> (..., 3) [rad].
+
+    Source:
+        Murray, Li, Sastry 1994, A Mathematical Introduction to Robotic Manipulation, prop. 2.9.
+    """
     q = quaternion_from_matrix(R)
     w, sine = q[..., :1], np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
     small = sine < SMALL_ANGLE_RAD
@@ -131,7 +151,11 @@ def log_rotation(R: ArrayLike) -> Array:
 
 
 def transform(R: ArrayLike, t: ArrayLike) -> Array:
-    """Homogeneous T with x_a = T x_b. (..., 3, 3), (..., 3) -> (..., 4, 4)."""
+    """Homogeneous T with x_a = T x_b. (..., 3, 3), (..., 3) -> (..., 4, 4).
+
+    Source:
+        Murray, Li, Sastry 1994, A Mathematical Introduction to Robotic Manipulation, ch. 2.
+    """
     R, t = np.asarray(R, dtype=np.float64), np.asarray(t, dtype=np.float64)
     batch = np.broadcast_shapes(R.shape[:-2], t.shape[:-1])
     T = np.zeros((*batch, 4, 4))
@@ -140,7 +164,11 @@ def transform(R: ArrayLike, t: ArrayLike) -> Array:
 
 
 def invert(T: ArrayLike) -> Array:
-    """Inverse of rigid transforms. (..., 4, 4) -> (..., 4, 4)."""
+    """Inverse of rigid transforms. (..., 4, 4) -> (..., 4, 4).
+
+    Source:
+        Murray, Li, Sastry 1994, A Mathematical Introduction to Robotic Manipulation, ch. 2.
+    """
     T = np.asarray(T, dtype=np.float64)
     R_transposed = np.swapaxes(T[..., :3, :3], -1, -2)
     return transform(R_transposed, -np.einsum("...ij,...j->...i", R_transposed, T[..., :3, 3]))

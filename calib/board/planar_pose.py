@@ -20,6 +20,9 @@ def homographies(plane_points: Array, images: Array) -> Array:
 
     Returns:
         NaN for views with fewer than four points.
+
+    Source:
+        Hartley, Zisserman 2004, Multiple View Geometry in Computer Vision, algorithm 4.2.
     """
     seen = np.isfinite(images[..., 0])
     board, to_board = _centred(np.broadcast_to(plane_points, images.shape), seen)
@@ -90,7 +93,11 @@ def focal_guess(matrices: Array, centre_px: Array) -> float:
 
 
 def board_poses(camera: Camera, plane_points: Array, images: Array) -> Array:
-    """T_camera_board of every view through its homography, (n, 4, 4); NaN where impossible."""
+    """T_camera_board of every view through its homography, (n, 4, 4); NaN where impossible.
+
+    Source:
+        Zhang 2000, A flexible new technique for camera calibration, sec. 3.1.
+    """
     rays = camera.normalise(images)
     matrices = homographies(plane_points, rays)
     good = np.isfinite(matrices[:, 0, 0])

@@ -119,7 +119,12 @@ def lens_point(
 
 @numba.njit(cache=True, nogil=True)
 def lens_pixels(is_fisheye: bool, full: Array, points: Array) -> Array:
-    """Pixels (n, 2) of camera-frame points (n, 3)."""
+    """Pixels (n, 2) of camera-frame points (n, 3).
+
+    Source:
+        Brown 1971, Close-range camera calibration, as OpenCV's calib3d writes it; the fisheye
+        Kannala, Brandt 2006, A generic camera model, eq. (6).
+    """
     pixels = np.empty((len(points), 2))
     d_point, d_full = np.empty((2, 3)), np.empty((2, 12))
     for k in range(len(points)):

@@ -70,14 +70,24 @@ def full_parameters(model: str, params: Array) -> Array:
 
 
 def project(model: str, points: Array, params: Array) -> Array:
-    """Pixels (..., 2) of camera-frame points (..., 3); NaN where the model cannot see them."""
+    """Pixels (..., 2) of camera-frame points (..., 3); NaN where the model cannot see them.
+
+    Source:
+        Brown 1971, Close-range camera calibration, as OpenCV's calib3d writes it; the fisheye
+        Kannala, Brandt 2006, A generic camera model, eq. (6).
+    """
     flat = _flat(points)
     pixels = lens_pixels(model == FISHEYE, full_parameters(model, params), flat)
     return pixels.reshape(*points.shape[:-1], 2)
 
 
 def project_jacobian(model: str, points: Array, params: Array) -> tuple[Array, Array, Array]:
-    """Pixels (..., 2) with their derivatives by the point (..., 2, 3) and params (..., 2, k)."""
+    """Pixels (..., 2) with their derivatives by the point (..., 2, 3) and params (..., 2, k).
+
+    Source:
+        Brown 1971, Close-range camera calibration, as OpenCV's calib3d writes it; the fisheye
+        Kannala, Brandt 2006, A generic camera model, eq. (6).
+    """
     full = full_parameters(model, params)
     pixels, d_point, d_full = lens_jacobians(model == FISHEYE, full, _flat(points))
     d_params = d_full if model == "FULL_OPENCV" else d_full @ _selection(model)

@@ -30,7 +30,11 @@ def usable(values: object, what: str) -> Array:
 
 
 def matrix(camera: Camera) -> Array:
-    """Camera matrix K, (3, 3)."""
+    """Camera matrix K, (3, 3).
+
+    Source:
+        Hartley, Zisserman 2004, Multiple View Geometry in Computer Vision, sec. 6.1.
+    """
     fx, fy = camera.focal_px
     cx, cy = camera.centre_px
     return np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])

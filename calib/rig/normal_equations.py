@@ -125,7 +125,11 @@ def _add_fixed(
 
 
 def damped_step(normal: Normal, free: np.ndarray, damping: float) -> tuple[Array, Array]:
-    """Levenberg-Marquardt step of shared unknowns (p,) and boards (n, b); NaN when singular."""
+    """Levenberg-Marquardt step of shared unknowns (p,) and boards (n, b); NaN when singular.
+
+    Source:
+        Triggs, McLauchlan, Hartley, Fitzgibbon 2000, Bundle adjustment, sec. 6.1.
+    """
     boards = normal.boards.copy()
     diagonal = np.einsum("nii->ni", boards)
     diagonal *= 1.0 + damping
@@ -158,6 +162,9 @@ def covariances(normal: Normal, free: np.ndarray) -> tuple[Array, Array, int, Ar
     """Covariances of shared unknowns (p, p) and boards (n, b, b), rank, weakest, condition.
 
     Directions without rank are left out; `weakest` is the least determined one, a unit vector.
+
+    Source:
+        Triggs, McLauchlan, Hartley, Fitzgibbon 2000, Bundle adjustment, sec. 6.1.
     """
     boards = normal.boards + 1e-12 * np.eye(normal.boards.shape[1])
     if not free.any():

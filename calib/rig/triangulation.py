@@ -22,6 +22,9 @@ def triangulate(cameras: Sequence[Camera], pixels: Array) -> Array:
     Args:
         cameras: the rig, n of them.
         pixels: where each camera sees the points, NaN where it does not, (n, ..., 2).
+
+    Source:
+        Hartley, Zisserman 2004, Multiple View Geometry in Computer Vision, ch. 12.
     """
     flat = np.reshape(pixels, (len(cameras), -1, 2))
     points = _intersect_rays(cameras, flat)

@@ -95,6 +95,9 @@ def square_map(rays: Array, side: float) -> Array:
 
     Raises:
         ValueError: when three corners lie on a line.
+
+    Source:
+        Hartley, Zisserman 2004, Multiple View Geometry in Computer Vision, sec. 4.1.
     """
     (x0, y0), (x1, y1), (x2, y2), (x3, y3) = rays
     sx, sy = x0 - x1 + x2 - x3, y0 - y1 + y2 - y3

@@ -173,7 +173,11 @@ def _between(
 
 
 def rigidly_fitted(source: Array, target: Array) -> Array:
-    """Source points turned and shifted onto the target with least squares, (n, 3)."""
+    """Source points turned and shifted onto the target with least squares, (n, 3).
+
+    Source:
+        Kabsch 1976, A solution for the best rotation to relate two sets of vectors.
+    """
     a, b = source - source.mean(axis=0), target - target.mean(axis=0)
     left, _, right = np.linalg.svd(a.T @ b)
     turn = np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))])

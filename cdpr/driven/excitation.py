@@ -22,6 +22,9 @@ def prbs(
 
     Raises:
         ValueError: for a band that the sample rate cannot hold.
+
+    Source:
+        Ljung 1999, System Identification, sec. 13.3.
     """
     hold = round(rate_hz / (2.0 * band_hz)) if band_hz > 0.0 else 0
     if hold < 1:

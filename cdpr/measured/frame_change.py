@@ -33,6 +33,9 @@ def frame_from_points(recorded_m: Array, base_m: Array) -> Array:
 
     Raises:
         InputError: for fewer than three points, points on a line, or points that do not fit.
+
+    Source:
+        Kabsch 1976, A solution for the best rotation to relate two sets of vectors.
     """
     if not (is_planar_or_better(recorded_m) and is_planar_or_better(base_m)):
         raise InputError(f"{len(base_m)} points; three or more that are not on a line are needed")

@@ -71,6 +71,9 @@ def interpolation(m: int, fractions: Array) -> tuple[Array, Array, Array]:
 
     Returns:
         Three (n, m) arrays: values, first and second integrals, of the unit segment.
+
+    Source:
+        Hairer, Norsett, Wanner 1993, Solving Ordinary Differential Equations I, sec. II.7.
     """
     spectrum = table(m).spectrum
     basis = legendre.legvander(2 * fractions - 1, m + 1)

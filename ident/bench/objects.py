@@ -27,7 +27,11 @@ def entries(matrix: Array) -> Array:
 
 
 def spread(place: Array) -> Array:
-    """Tensor of a unit point mass at a place (3,), (3, 3)."""
+    """Tensor of a unit point mass at a place (3,), (3, 3).
+
+    Source:
+        Featherstone 2008, Rigid Body Dynamics Algorithms, sec. 2.13.
+    """
     return np.asarray(place @ place * np.eye(3) - np.outer(place, place))
 
 
@@ -38,6 +42,9 @@ def moments(body: Array, turn: Array | None = None, shift_m: Array | None = None
         body: `BODY_NAMES` values in its own frame, (10,).
         turn: R_platform_body, (3, 3); None: not turned.
         shift_m: its frame's origin in the platform frame, (3,); None: at P.
+
+    Source:
+        Featherstone 2008, Rigid Body Dynamics Algorithms, sec. 2.13.
     """
     turn = np.eye(3) if turn is None else turn
     shift = np.zeros(3) if shift_m is None else shift_m
@@ -64,7 +71,11 @@ def moments_slope(body: Array, turn: Array | None = None, shift_m: Array | None 
 
 
 def specific(total: Array) -> Array:
-    """The nine specific numbers of `INERTIA_NAMES` from moments about P, (9,)."""
+    """The nine specific numbers of `INERTIA_NAMES` from moments about P, (9,).
+
+    Source:
+        Featherstone 2008, Rigid Body Dynamics Algorithms, sec. 2.13.
+    """
     return np.asarray(total[1:] / total[0])
 
 

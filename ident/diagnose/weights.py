@@ -42,6 +42,10 @@ def model_weights(densities: Sequence[Array], effects: Sequence[int]) -> Array:
     Args:
         densities: log predictive densities of the runs under each model, (r,) each.
         effects: how many effects each model has: each is improbable beforehand.
+
+    Source:
+        Yao, Vehtari, Simpson, Gelman 2018, Using stacking to average Bayesian predictive
+        distributions.
     """
     table = np.array(densities, dtype=np.float64)
     runs = table.shape[1]

@@ -246,6 +246,9 @@ def score_matrix(seen: Seen) -> Array:
     """Covariance of the gradient that counts how residuals of neighbouring rows go together.
 
     Newey and West's estimate with a triangular window of `SCORE_WINDOW_S`.
+
+    Source:
+        Newey, West 1987, A simple, positive semi-definite covariance matrix.
     """
     by_angle, by_pose = seen.slopes
     scores = np.einsum("tnk,tn->tk", by_angle, seen.angles)

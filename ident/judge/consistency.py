@@ -82,7 +82,11 @@ class Consistency:
 
 
 def pseudo_inertia(inertia: Array) -> Array:
-    """Specific pseudo-inertia about P of `INERTIA_NAMES` values (9,), (4, 4)."""
+    """Specific pseudo-inertia about P of `INERTIA_NAMES` values (9,), (4, 4).
+
+    Source:
+        Wensing, Kim, Slotine 2018, Linear matrix inequalities for rigid-body inertia, eq. (12).
+    """
     com, (xx, yy, zz, xy, xz, yz) = inertia[:3], inertia[3:]
     tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     found = np.ones((4, 4))

@@ -30,6 +30,9 @@ def jackknife_std(runs: Sequence[Array], priors: Array, free: np.ndarray, unit: 
 
     Returns:
         Zero where nothing is estimated, and throughout where there are fewer than three runs.
+
+    Source:
+        Efron, Tibshirani 1993, An Introduction to the Bootstrap, ch. 11.
     """
     found, count = np.zeros(len(free)), len(runs)
     if count < LEAST_RUNS or not free.any():

@@ -106,7 +106,11 @@ class Loads:
 
 
 def point_inertia(position_m: Array) -> Array:
-    """Specific inertia of a point mass, `INERTIA_NAMES` values, (9,)."""
+    """Specific inertia of a point mass, `INERTIA_NAMES` values, (9,).
+
+    Source:
+        Featherstone 2008, Rigid Body Dynamics Algorithms, sec. 2.13.
+    """
     tensor = position_m @ position_m * np.eye(3) - np.outer(position_m, position_m)
     return np.concatenate([position_m, tensor[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]])
 

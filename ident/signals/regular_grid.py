@@ -148,6 +148,9 @@ def white_noise_std(values: Array, orders: int = 6) -> Array:
 
     A swing of up to a few hertz vanishes in the sixth difference of samples at 50 Hz and more;
     the median keeps steps and spikes out. NaN where fewer than 20 differences are available.
+
+    Source:
+        Hall, Kay, Titterington 1990, Difference-based estimation of variance.
     """
     gain = np.linalg.norm(np.polynomial.polynomial.polypow([1.0, -1.0], orders))
     differences = np.diff(values, orders, axis=0)

@@ -88,7 +88,11 @@ def extrapolate(past: Sequence[tuple[float, Pose]], time_s: float) -> Pose | Non
 
 
 def lagrange(times: Array, time_s: float) -> Array:
-    """Weights of the polynomial through samples at `times`, read at `time_s`."""
+    """Weights of the polynomial through samples at `times`, read at `time_s`.
+
+    Source:
+        Press et al. 2007, Numerical Recipes, sec. 3.2.
+    """
     weights = np.ones(len(times))
     for i in range(len(times)):
         for j in range(len(times)):

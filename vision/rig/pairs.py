@@ -226,7 +226,11 @@ def _points(track: OwnTrack) -> Array:
 
 
 def rigid(points: Array, onto: Array) -> Array:
-    """The motion that brings points nearest to others, both (n, 3)."""
+    """The motion that brings points nearest to others, both (n, 3).
+
+    Source:
+        Kabsch 1976, A solution for the best rotation to relate two sets of vectors.
+    """
     middle, aim = points.mean(axis=0), onto.mean(axis=0)
     left, _, right = np.linalg.svd((points - middle).T @ (onto - aim))
     turn = (left @ np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))]) @ right).T
