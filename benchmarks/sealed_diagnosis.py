@@ -16,6 +16,7 @@ import subprocess
 import sys
 import time
 from collections import Counter
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -48,10 +49,10 @@ def diagnosed(case: Case, root: Path) -> dict[str, Any]:
             return {"case": case.name, "kind": case.kind, "failed": done.stderr.strip()[-300:]}
         timing.write_text(json.dumps(time.perf_counter() - start))
     document = json.loads(result.read_text())
-    return judged(case, document, json.loads(timing.read_text()))
+    return judged(case, document, json.loads(timing.read_text()), folder)
 
 
-def judged(case: Case, document: dict[str, Any], seconds: float) -> dict[str, Any]:
+def judged(case: Case, document: dict[str, Any], seconds: float, folder: Path) -> dict[str, Any]:
     """How a result compares with what was put in."""
     named = [{entry["effect"], *entry.get("confounded_with", [])} for entry in document["accepted"]]
     truth = [name for name, _ in case.effects]
@@ -69,8 +70,47 @@ def judged(case: Case, document: dict[str, Any], seconds: float) -> dict[str, An
         "unexplained": document["unexplained"]["present"],
         "before_over_floor": before["prediction_rmse_m"] / floor,
         "after_over_floor": after["prediction_rmse_m"] / floor,
+        "probabilities": [
+            [one["effect"], one["probability"], one["effect"] in truth]
+            for one in document["candidates"]
+            if one.get("probability") is not None
+        ],
+        **(of_lab_day(document, folder) if case.kind.endswith("lab") else {}),
         "seconds": seconds,
     }
+
+
+def of_lab_day(document: dict[str, Any], folder: Path) -> dict[str, Any]:
+    """How far inertia and a moved attachment are from the truth, in claimed deviations and mm."""
+    truth = json.loads((folder / "truth" / "truth.json").read_text())
+    true = [*truth["com_m"], *truth["specific_inertia_m2"]]
+    pairs = zip(document["parameters_after"], true, strict=True)
+    row: dict[str, Any] = {"inertia_z": [(p["value"] - v) / p["std"] for p, v in pairs]}
+    moved = next((e for e in truth["effects"] if e["effect"] == "attachment_offset"), None)
+    told = {
+        p["name"]: (p["value"], p["std"])
+        for entry in document["accepted"]
+        for p in entry["parameters"]
+        if entry["effect"] == "attachment_offset"
+    }
+    if moved is not None and told:
+        wanted = (f"offset_{moved['cable'] + 1}_{axis}_m" for axis in "xyz")
+        found = [told.get(name, (0.0, 0.0)) for name in wanted]
+        off = [1e3 * (v - w) for (v, _), w in zip(found, moved["true_minus_told_m"], strict=True)]
+        row |= {"attachment_off_mm": off, "attachment_std_mm": [1e3 * s for _, s in found]}
+    return row
+
+
+def reliability(rows: list[dict[str, Any]]) -> list[str]:
+    """Of effects given so much probability, how many are there, as lines."""
+    told = [(p, there) for row in rows for _, p, there in row.get("probabilities", ())]
+    lines = ["", "probability told: how many, mean told, share that is there"]
+    for low, high in pairwise((0.0, 0.01, 0.1, 0.5, 0.9, 0.99, 1.0 + 1e-9)):
+        inside = [(p, there) for p, there in told if low <= p < high]
+        if inside:
+            mean, share = (sum(one[k] for one in inside) / len(inside) for k in (0, 1))
+            lines.append(f"  {low:4.2f} to {high:4.2f}: {len(inside):4d} {mean:6.3f} {share:6.3f}")
+    return lines
 
 
 def right(row: dict[str, Any]) -> bool:
@@ -106,7 +146,7 @@ def summary(rows: list[dict[str, Any]]) -> list[str]:
     lines += [
         f"  {put:24s} -> {named:60s} {count}" for (put, named), count in sorted(pairs.items())
     ]
-    clean = [row for row in rows if row["kind"] == "clean" and "failed" not in row]
+    clean = [row for row in rows if row["kind"] in ("clean", "quiet lab") and "failed" not in row]
     alarms = sum(bool(row["accepted"]) for row in clean)
     lines.append(f"false alarms on clean sessions: {alarms} of {len(clean)}")
     sizes: dict[str, list[str]] = {}
@@ -119,11 +159,11 @@ def summary(rows: list[dict[str, Any]]) -> list[str]:
     held = [row for row in rows if row.get("effects") and row["kind"] in ("single", "pair")]
     near = sum(row["after_over_floor"] <= FLOOR_FACTOR for row in held if "failed" not in row)
     lines.append(f"prediction within {FLOOR_FACTOR} times the noise after: {near} of {len(held)}")
-    for kind in ("clean", "single", "pair", "outside"):
+    for kind in ("clean", "single", "pair", "outside", "lab", "quiet lab"):
         of_kind = [row for row in rows if row["kind"] == kind]
         if of_kind:
             lines.append(f"right answers, {kind}: {sum(map(right, of_kind))} of {len(of_kind)}")
-    return lines
+    return lines + reliability(rows)
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -37,6 +37,7 @@ class Estimate:
         calibration: amplitudes of the cameras' calibration errors that go with the values
             (`ident.likelihood.calibration_modes`), (r,); empty where none were fitted.
         extra: more numbers for the result file, JSON-ready.
+        without_run: the values without each run, by its name (FIDIM only).
     """
 
     values: Array
@@ -52,6 +53,7 @@ class Estimate:
     reduced: dict[str, Any] | None = None
     calibration: Array = field(default_factory=lambda: np.zeros(0))
     extra: dict[str, Any] = field(default_factory=dict)
+    without_run: dict[str, Array] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         freeze(self, "values", "covariance", "essential", "calibration")

@@ -12,7 +12,7 @@ from freeswing.cdpr.model.equations import Model, build_model
 from freeswing.cdpr.robot import Robot
 from freeswing.ident.estimate import Estimate
 from freeswing.ident.fidim.fidim_stage import Weighting, fidim_estimates
-from freeswing.ident.judge.comparison import ParameterComparison, compare
+from freeswing.ident.judge.comparison import ParameterComparison, between_runs, compare
 from freeswing.ident.judge.far_samples import far_from_prediction
 from freeswing.ident.judge.free_swing_law import LawlessError, fidim_complaint
 from freeswing.ident.judge.prediction import Prediction, fitted_motions
@@ -252,7 +252,11 @@ def _meaningless(
 
 def _compared(free: Estimate, full: Estimate) -> tuple[ParameterComparison, ...]:
     shown = free.essential | full.essential
-    return compare(free.values, free.std, full.values, full.std, shown)
+    between = np.zeros(9)
+    if set(free.without_run) == set(full.without_run):
+        pairs = [(free.without_run[name], full.without_run[name]) for name in free.without_run]
+        between = between_runs(np.array([after - before for before, after in pairs]))
+    return compare(free.values, free.std, full.values, full.std, shown, between)
 
 
 def _validated(

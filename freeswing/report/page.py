@@ -17,6 +17,7 @@ from freeswing.report.panels.bench import BenchPanel
 from freeswing.report.panels.cameras import Cameras
 from freeswing.report.panels.change import Change
 from freeswing.report.panels.dropped import Dropped
+from freeswing.report.panels.geometry import Geometry
 from freeswing.report.panels.ladder import EffectLadder
 from freeswing.report.panels.markers import Markers
 from freeswing.report.panels.provenance import Provenance
@@ -54,6 +55,7 @@ PANELS: tuple[Panel, ...] = (
     BenchPanel(),
     HowSure(),
     EffectLadder(),
+    Geometry(),
     Change(),
     Advice(),
     Swings(),

@@ -6,22 +6,23 @@ from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
 
 from freeswing.cdpr.effects import effect_named
 from freeswing.cdpr.robot import Array
 from freeswing.ident.diagnose.leave_one_out import Score
 from freeswing.ident.diagnose.lengths.wrong_places import WrongPlace
 from freeswing.ident.diagnose.refit import Refit, colour_of, plausible
+from freeswing.ident.diagnose.screen import BASE, value_priors
 from freeswing.ident.diagnose.spectrum import independent_numbers
-from freeswing.ident.diagnose.variants import effect_of, inside
-from freeswing.ident.diagnose.weights import log_predictive, model_weights
+from freeswing.ident.diagnose.variants import effect_of, inside, variants
+from freeswing.ident.diagnose.weights import Rival, model_probabilities
+from freeswing.ident.likelihood.joint_problem import INERTIA_UNIT
 
 REFITTED = 4
 NEARLY_AS_GOOD = 0.5
 LEAST_GAIN = 10.0
-SIGNIFICANCE = 1e-3
-LARGEST_DELTA_BIC = -10.0
+# The threshold for accepting: that an effect is there rather than nothing.
+ACCEPTED = 0.95
 # A cause helps wherever it shows; what trades small swings for large ones is a stand-in.
 MOST_WORSE = 0.25
 NO_WORSE = 0.01
@@ -35,7 +36,8 @@ LEAST_EXCESS = 0.005
 SMALL_LEAD = 0.1
 SCATTERED = 1.0 / 3.0
 CONTRADICTED = 0.15
-SCANNED_FREQUENCIES = 400
+# Inertias are anywhere within so many of their usual sizes.
+INERTIA_RANGE = 10.0
 # Effects whose best mixture explains less than this of the excess are the nearest, not the cause.
 LEAST_SHARE_EXPLAINED = 0.75
 
@@ -51,7 +53,8 @@ class Candidate:
         held_out_gain: share of the held-out excess over the noise that it removes.
         confounded_with: effects that held-out runs cannot tell from it.
         reason: a sentence.
-        probability: that it is missing, among those fitted and none of them.
+        probability: that it is what is missing, among those fitted and none of them; None where it
+            was not fitted.
     """
 
     effect: str
@@ -60,7 +63,7 @@ class Candidate:
     held_out_gain: float
     confounded_with: tuple[str, ...]
     reason: str
-    probability: float = 0.0
+    probability: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,7 +173,7 @@ def decided(
     complaints: dict[str, str] = {}
     passed: dict[str, Refit] = {}
     for name, one in tried.items():
-        complaint = _complaint(current, one, name, colour, len(ranked), later)
+        complaint = _complaint(current, one, name, noise_scales, later)
         if complaint:
             complaints[name] = complaint
         else:
@@ -185,7 +188,8 @@ def decided(
         bic = delta_bic(current, known.score if known else linear[one], one, colour)
         gain = _gain(current, held_out)
         verdict, reason, others = _verdict(one, key, group, complaints, known, passed, gain)
-        chance = chances.get(effect_of(one), 0.0)
+        mine = [p for other, p in chances.items() if effect_of(other) == effect_of(one)]
+        chance = sum(mine) if mine else None
         candidates.append(
             Candidate(effect_of(one), verdict, float(bic), gain, others, reason, chance)
         )
@@ -193,21 +197,41 @@ def decided(
 
 
 def probabilities(current: Refit, tried: dict[str, Refit], noise_scales: Array) -> dict[str, float]:
-    """Probability of each fitted effect to be what is missing, by runs left out.
+    """Probability of each fitted candidate to be what is missing, by key.
 
     What remains to one is that of none of them.
     """
-    counts, independent = (
-        current.evidence.counts,
-        independent_numbers(current.fit, noise_scales),
-    )
-    models = [current.score, *(one.score for one in tried.values())]
-    densities = [log_predictive(one.held_out, counts, independent) for one in models]
-    weights = model_weights(densities, [0, *(1 for _ in tried)])
-    found: dict[str, float] = {}
-    for key, weight in zip(tried, weights[1:], strict=True):
-        found[effect_of(key)] = found.get(effect_of(key), 0.0) + float(weight)
-    return found
+    counts = current.evidence.counts
+    independent = independent_numbers(current.fit, noise_scales)
+    rivals = [_rival(current, ""), *(_rival(one, key) for key, one in tried.items())]
+    weights = model_probabilities(rivals, counts, independent)
+    return dict(zip(tried, weights[1:].tolist(), strict=True))
+
+
+def included(fewer: Refit, more: Refit, key: str, noise_scales: Array) -> float:
+    """Probability that what a fit has beside another is there, of these two alone."""
+    return probabilities(fewer, {key: more}, noise_scales)[key]
+
+
+def _rival(one: Refit, key: str) -> Rival:
+    """A fit as a model among others; `key` is what it has beside the current one, or "".
+
+    What each run has for itself was eliminated with the run's state: it counts by its number.
+    """
+    fit = one.fit
+    columns = np.flatnonzero(fit.free)
+    linear = one.evidence.subset(columns)
+    known = value_priors(fit.model, fit.values)[:, np.append(columns, -1)]
+    body = np.zeros((BASE, known.shape[1]))
+    body[:, :BASE] = np.diag(1.0 / (INERTIA_RANGE * INERTIA_UNIT))
+    prior = np.vstack([body, known[np.abs(known[:, :-1]).sum(axis=1) > 0.0]])
+    tries = 0.0
+    if key:
+        parameters = effect_named(effect_of(key)).parameters(fit.model.robot)
+        own = sum(p.per_run for p in parameters)
+        tries = 0.5 * own * float(np.log(one.evidence.counts).sum())
+        tries += float(np.log(len(variants(fit.model.robot, effect_of(key)))))
+    return Rival(linear.triangles, prior, int(bool(key)), tries)
 
 
 def delta_bic(current: Refit, one: Score, key: str, colour: float) -> float:
@@ -232,19 +256,14 @@ def unknowns(current: Refit, key: str) -> tuple[int, int]:
     return int(inside(robot, key).sum()) - own, own * len(current.fit.samples)
 
 
-def _complaint(
-    current: Refit, one: Refit, name: str, colour: float, n_tried: int, later: bool
-) -> str:
+def _complaint(current: Refit, one: Refit, name: str, noise_scales: Array, later: bool) -> str:
     """Why a refitted candidate does not pass, or nothing."""
     outside = plausible(one, name)
     if outside:
         return "; ".join(outside)
-    shared, own = unknowns(current, name)
-    drop = (current.score.cost - one.score.cost) / colour
-    tries = n_tried * (SCANNED_FREQUENCIES if own else 1)
-    chance = min(1.0, float(chi2.sf(max(drop, 0.0), shared + own)) * tries)
-    if chance > SIGNIFICANCE or delta_bic(current, one.score, name, colour) > LARGEST_DELTA_BIC:
-        return f"not significant: p = {chance:.2g} with {n_tried} candidates tried"
+    chance = included(current, one, name, noise_scales)
+    if chance <= ACCEPTED:
+        return f"not sure: with probability {chance:.2g} it is there rather than nothing"
     gains = current.score.held_out - one.score.held_out
     worse = runs_worse(gains, current.score)
     if gains.sum() <= 0.0 or worse > MOST_WORSE * len(gains):

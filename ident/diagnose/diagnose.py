@@ -319,6 +319,7 @@ def _candidate_entry(one: Candidate) -> dict[str, Any]:
         "verdict": one.verdict,
         "delta_bic": one.delta_bic,
         "held_out_gain": one.held_out_gain,
+        "probability": one.probability,
         "confounded_with": list(one.confounded_with),
         "reason": one.reason,
     }

@@ -7,13 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from freeswing.cdpr.effects import effect_named
-from freeswing.ident.diagnose.decision import (
-    CONFOUNDED_DIFFERENCE,
-    LARGEST_DELTA_BIC,
-    delta_bic,
-)
+from freeswing.ident.diagnose.decision import ACCEPTED, CONFOUNDED_DIFFERENCE, included
 from freeswing.ident.diagnose.refit import Refit, colour_of
 from freeswing.ident.diagnose.screen import BASE
+
+# Of the BIC without an effect to second order, below which leaving it out is worth a fit.
+LARGEST_RISE = 10.0
 
 
 def superfluous(current: Refit, kept: Sequence[str]) -> str:
@@ -44,12 +43,12 @@ def superfluous(current: Refit, kept: Sequence[str]) -> str:
     if not rises:
         return ""
     least = min(rises, key=lambda name: rises[name])
-    return least if rises[least] < -LARGEST_DELTA_BIC else ""
+    return least if rises[least] < LARGEST_RISE else ""
 
 
 def is_no_worse(fewer: Refit, more: Refit, name: str, noise_scales: np.ndarray) -> bool:
     """Whether a fit without an effect is as good as the one with it, its unknowns counted."""
     colour = colour_of(more.fit, noise_scales)
-    by_likelihood = delta_bic(fewer, more.score, name, colour)
     by_held_out = (fewer.held_out - more.held_out) / colour
-    return by_likelihood > LARGEST_DELTA_BIC and by_held_out < CONFOUNDED_DIFFERENCE
+    by_evidence = included(fewer, more, name, noise_scales)
+    return by_evidence <= ACCEPTED and by_held_out < CONFOUNDED_DIFFERENCE

@@ -82,7 +82,7 @@ def screen(
         tuple(s.name for s in fit.samples),
         np.array(triangles),
         np.array(counts, dtype=np.float64),
-        np.sqrt(colour) * _priors(model, values),
+        np.sqrt(colour) * value_priors(model, values),
     )
     columns = {key: _amplitudes(model, key) for key in keys}
     return Screen(model, values, evidence, np.flatnonzero(fit.free), columns)
@@ -102,8 +102,8 @@ def _amplitudes(model: Model, key: str) -> np.ndarray:
     return BASE + where.start + np.array(offsets, dtype=np.int64)
 
 
-def _priors(model: Model, values: Array) -> Array:
-    """Each effect value is within its plausible range: a weak row each."""
+def value_priors(model: Model, values: Array) -> Array:
+    """Each effect value is within its plausible range: a weak row each, (k, 9 + k + 1)."""
     rows = np.zeros((len(values), BASE + len(values) + 1))
     whitener = prior_whitener(model)
     whitener[model.own_values] = 0.0

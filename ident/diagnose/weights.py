@@ -1,33 +1,56 @@
-"""Probabilities of rival models from how each predicts runs that it was not fitted to.
+"""Probabilities of rival models from the evidence of their runs.
 
-Pseudo-Bayesian model averaging with the Bayesian bootstrap over whole runs (Yao, Vehtari, Simpson,
-Gelman 2018): the log predictive densities of the left-out runs are summed under random weights of
-the runs, and the models' shares averaged. A lead that one run gives counts for one run alone.
+The evidence of a model is the integral of its likelihood over its unknowns, each with a prior of
+physical size, to second order about the fit (MacKay 2003, ch. 28): what an unknown could have been
+and is not counts against it, so that twelve offsets of anchors do not win by their number. What a
+run's residuals exceed the noise is a discrepancy of unknown size. Since none of this is ever quite
+true, the shares are averages over random weights of the runs (bagged posteriors: Huggins, Miller
+2023; with the Bayesian bootstrap): what one run alone says is never sure.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from freeswing.cdpr.robot import Array
 
-DRAWS = 2000
+DRAWS = 200
 SEED = 20201
 # One effect in thirty of a catalogue of twenty is there: something is missing every second time.
 CHANCE_OF_EFFECT = 1.0 / 30.0
+ROUNDS = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Rival:
+    """A model in the linear problem about its fit.
+
+    Attributes:
+        triangles: of each run over [unknowns; residual], in units of the noise, (r, q + 1, q + 1).
+        prior: rows over [unknowns; residual], each with a deviation of one, (k, q + 1); no
+            unknown is without one.
+        effects: how many it has: each is improbable beforehand.
+        tries: logarithm of how many ways of it were tried beside this one.
+    """
+
+    triangles: Array
+    prior: Array
+    effects: int
+    tries: float = 0.0
 
 
 def log_predictive(squares: Array, counts: Array, independent: Array) -> Array:
-    """Log density of left-out runs whose noise is white beside a discrepancy of unknown size, (r,).
+    """Log density of runs whose noise is white beside a discrepancy of unknown size, as `squares`.
 
     What a run's whitened squares exceed their number is a discrepancy that holds `independent`
     numbers, with whatever variance makes it likeliest. At the noise this is minus half the squares;
     far above it a factor counts, since nobody knows the size of what is missing.
 
     Args:
-        squares: of each run's whitened errors of prediction, (r,).
+        squares: of each run's whitened residuals, (..., r).
         counts: how many numbers each run measured, (r,).
         independent: how many of them the discrepancy moves independently, (r,).
     """
@@ -36,21 +59,53 @@ def log_predictive(squares: Array, counts: Array, independent: Array) -> Array:
     return above + 0.5 * np.maximum(-excess, 0.0)
 
 
-def model_weights(densities: Sequence[Array], effects: Sequence[int]) -> Array:
-    """Probability of each model, (m,).
+def log_evidence(rival: Rival, counts: Array, independent: Array, weights: Array) -> Array:
+    """Log evidence of a model under each set of weights of the runs, (d,).
 
     Args:
-        densities: log predictive densities of the runs under each model, (r,) each.
-        effects: how many effects each model has: each is improbable beforehand.
+        rival: the model.
+        counts: how many numbers each run measured, (r,).
+        independent: how many of them a discrepancy moves independently, (r,).
+        weights: of the runs, (d, r).
 
     Source:
-        Yao, Vehtari, Simpson, Gelman 2018, Using stacking to average Bayesian predictive
-        distributions.
+        MacKay 2003, Information Theory, Inference, and Learning Algorithms, chapter 28.
     """
-    table = np.array(densities, dtype=np.float64)
-    runs = table.shape[1]
+    grams = np.swapaxes(rival.triangles, 1, 2) @ rival.triangles
+    prior = rival.prior.T @ rival.prior
+    squares = np.broadcast_to(grams[:, -1, -1], weights.shape)
+    curves, change = np.zeros(0), np.zeros(0)
+    for _ in range(ROUNDS):
+        inflation = 1.0 + np.maximum(squares - counts, 0.0) / independent
+        curves = np.tensordot(weights / inflation, grams, 1) + prior
+        step = -np.linalg.solve(curves[:, :-1, :-1], curves[:, :-1, -1:])[..., 0]
+        change = np.column_stack([step, np.ones(len(step))])
+        squares = np.einsum("da,rab,db->dr", change, grams, change, optimize=True)
+    found = np.sum(weights * log_predictive(squares, counts, independent), axis=1)
+    away = np.einsum("da,ab,db->d", change, prior, change)
+    wider = np.linalg.slogdet(curves[:, :-1, :-1])[1] - np.linalg.slogdet(prior[:-1, :-1])[1]
+    return found - 0.5 * away - 0.5 * wider
+
+
+def model_probabilities(rivals: Sequence[Rival], counts: Array, independent: Array) -> Array:
+    """Probability of each of some models, of which one is right, (m,).
+
+    Args:
+        rivals: the models.
+        counts: how many numbers each run measured, (r,).
+        independent: how many of them a discrepancy moves independently, (r,).
+
+    Source:
+        Huggins, Miller 2023, Reproducible model selection using bagged posteriors.
+    """
+    runs = len(counts)
+    weights = runs * np.random.default_rng(SEED).dirichlet(np.ones(runs), DRAWS)
     odds = np.log(CHANCE_OF_EFFECT / (1.0 - CHANCE_OF_EFFECT))
-    shares = np.random.default_rng(SEED).dirichlet(np.ones(runs), DRAWS)
-    logs = runs * shares @ table.T + odds * np.asarray(effects)
-    weights = np.exp(logs - logs.max(axis=1, keepdims=True))
-    return (weights / weights.sum(axis=1, keepdims=True)).mean(axis=0)
+    logs = np.array(
+        [
+            log_evidence(one, counts, independent, weights) + odds * one.effects - one.tries
+            for one in rivals
+        ]
+    )
+    shares = np.exp(logs - logs.max(axis=0))
+    return (shares / shares.sum(axis=0)).mean(axis=1)

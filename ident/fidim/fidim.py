@@ -34,6 +34,7 @@ class FidimEstimate:
         reduced: the problem solved again with the essential parameters alone.
         n_samples: samples in the stack (each gives 6 - n equations).
         verdicts: what is wrong or worth knowing, in words; empty when nothing is.
+        without_run: all nine parameters without each run, (r, 9); NaN where the others do not do.
     """
 
     solution: TotalLeastSquares
@@ -41,6 +42,7 @@ class FidimEstimate:
     reduced: TotalLeastSquares
     n_samples: int
     verdicts: tuple[str, ...]
+    without_run: Array
 
     @property
     def values(self) -> Array:
@@ -70,7 +72,23 @@ def fidim(regressors: list[Array]) -> FidimEstimate:
     essential = essential_parameters(W)
     reduced = total_least_squares(W[:, np.concatenate([[True], essential])])
     verdicts = tuple(_verdicts(solution, essential))
-    return FidimEstimate(solution, essential, reduced, n_samples, verdicts)
+    without = _without_each([regressor.reshape(-1, 10) for regressor in regressors])
+    return FidimEstimate(solution, essential, reduced, n_samples, verdicts, without)
+
+
+def _without_each(runs: list[Array]) -> Array:
+    """The solution without each run, (r, 9): of the runs' triangular factors, which do as well."""
+    factors = [np.linalg.qr(run, mode="r") for run in runs]
+    found = np.full((len(runs), 9), np.nan)
+    for k in range(len(runs)):
+        others = factors[:k] + factors[k + 1 :]
+        rows = np.concatenate(others) if others else np.zeros((0, 10))
+        try:
+            one = total_least_squares(rows)
+        except ValueError:
+            continue
+        found[k] = np.nan if one.loses_rank else one.values
+    return found
 
 
 def essential_parameters(W: Array) -> NDArray[np.bool_]:

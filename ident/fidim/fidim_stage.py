@@ -114,7 +114,9 @@ def _completed(
     mass = _mass(model, prepared, raw, full, notes)
     share = calibration_share(model, unloaded, full, raw.essential)
     entry = fidim_entry(raw, left_out(prepared, full), tuple(notes), weighted, share)
-    return replace(entry, mass=mass)
+    names = [run.name for run in unloaded]
+    without_run = dict(zip(names, raw.without_run, strict=True)) if weighted is None else {}
+    return replace(entry, mass=mass, without_run=without_run)
 
 
 def _consistent(entry: Estimate, enforced: bool) -> Estimate:

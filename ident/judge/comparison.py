@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from freeswing.cdpr.robot import INERTIA_NAMES, Array
 
+LEAST_RUNS = 3
+
 
 @dataclass(frozen=True, slots=True)
 class ParameterComparison:
@@ -27,18 +29,41 @@ class ParameterComparison:
     z: float
 
 
+def between_runs(without: Array) -> Array:
+    """Standard deviations of differences by leaving out one run at a time (the jackknife), (9,).
+
+    The differences of the same runs hold what both ways have in common, and what a model's
+    errors, which repeat with the swings, do to them; zero where fewer than three runs tell.
+
+    Args:
+        without: the differences without each run, (r, 9).
+    """
+    count = len(without)
+    if count < LEAST_RUNS or not np.isfinite(without).all():
+        return np.zeros(9)
+    spread = without - without.mean(axis=0)
+    return np.sqrt((count - 1) / count * np.sum(spread**2, axis=0))
+
+
 def compare(
-    free: Array, free_std: Array, full: Array, full_std: Array, shown: NDArray[np.bool_]
+    free: Array,
+    free_std: Array,
+    full: Array,
+    full_std: Array,
+    shown: NDArray[np.bool_],
+    between: Array | None = None,
 ) -> tuple[ParameterComparison, ...]:
     """Compare nine parameters, (9,) each, where `shown`.
 
     The runs are the same for both, so that their errors are correlated and z is too small where
-    noise dominates; a large z says that the two models disagree, whatever the noise.
+    noise dominates; where the difference varies from run to run by more (`between`, (9,)), that
+    counts. A large z says that the two models disagree, whatever the noise.
     """
+    apart = np.zeros(9) if between is None else between
     rows = []
     for i in np.flatnonzero(shown):
         difference = float(full[i] - free[i])
-        spread = float(np.hypot(free_std[i], full_std[i]))
+        spread = max(float(np.hypot(free_std[i], full_std[i])), float(apart[i]))
         rows.append(
             ParameterComparison(
                 INERTIA_NAMES[i],

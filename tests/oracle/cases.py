@@ -7,10 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tests.oracle.effects import EFFECTS, SIZES
+from tests.oracle.lab_days import EFFECTS as OF_LAB_DAYS
+from tests.oracle.lab_days import make_lab_day
 from tests.oracle.outside import OUTSIDE
 from tests.oracle.sessions import SessionTruth, make_session
 
-TIERS = ("quick", "standard", "full")
+TIERS = ("quick", "standard", "full", "lab")
+LAB_DAYS = 8
 ROBOTS = ("bologna-4", "three-cable")
 POSE_ONLY = ("clock_offset",)
 PAIRS = (
@@ -35,7 +38,7 @@ class Case:
 
     Attributes:
         name: folder name, unique in the list.
-        kind: "clean", "single", "pair" or "outside".
+        kind: "clean", "single", "pair", "outside"; "lab" and "quiet lab" at the level of markers.
         robot: "bologna-4" or "three-cable".
         pose: full poses, or the free coordinates alone.
         effects: (name, size) of each.
@@ -46,7 +49,7 @@ class Case:
     kind: str
     robot: str
     pose: bool
-    effects: tuple[tuple[str, str], ...]
+    effects: tuple[tuple[str, object], ...]
 
     @property
     def seed(self) -> int:
@@ -56,6 +59,8 @@ class Case:
     def make(self, root: Path | str, **options: object) -> SessionTruth:
         """The session in `root/name`; options go to `make_session`."""
         folder = Path(root) / self.name
+        if self.kind.endswith("lab"):
+            return make_lab_day(folder, self.seed, self.robot, dict(self.effects), **options)
         settings = {"pose": self.pose, **options}
         return make_session(folder, self.seed, self.robot, dict(self.effects), **settings)
 
@@ -65,13 +70,16 @@ def manifest(tier: str = "standard") -> tuple[Case, ...]:
 
     quick: 8 clean, every effect once, 4 pairs, 4 outside (37 cases). standard: 40 clean, every
     effect at three sizes with robot and measurement taking turns, 12 pairs, every outside effect
-    twice (133). full: everything on both robots and with both measurements.
+    twice (133). full: everything on both robots and with both measurements. lab, by itself: marker
+    recordings with five effects at once, every fourth with none (8).
 
     Raises:
         ValueError: another tier.
     """
     if tier not in TIERS:
         raise ValueError(f"tier {tier!r} must be one of {TIERS}")
+    if tier == "lab":
+        return tuple(_lab_day(k) for k in range(LAB_DAYS))
     cases = [*_clean(tier), *_single(tier), *_pairs(tier), *_outside(tier)]
     return tuple({case.name: case for case in cases}.values())
 
@@ -85,6 +93,13 @@ def _case(kind: str, robot: str, pose: bool, effects: tuple[tuple[str, str], ...
 def _turns(count: int) -> tuple[str, bool]:
     """Robot and measurement, taking turns."""
     return ROBOTS[count % 2], count % 4 < 2
+
+
+def _lab_day(k: int) -> Case:
+    robot, quiet = ROBOTS[k % 2], k % 4 == 3
+    kind = "quiet lab" if quiet else "lab"
+    effects = () if quiet else tuple((name, size) for name, size in OF_LAB_DAYS.items())
+    return Case(f"{kind.replace(' ', '-')}-{k:02d}-{robot}", kind, robot, True, effects)
 
 
 def _clean(tier: str) -> list[Case]:

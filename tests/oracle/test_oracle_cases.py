@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import json
 from collections import Counter
 from pathlib import Path
 
 import pytest
 
+from freeswing.session.load_swings import load_target
+from freeswing.session.marker_runs import read_marker_runs
+from freeswing.session.session_file import read_session
 from tests.oracle.cases import TIERS, manifest
 from tests.oracle.effects import EFFECTS, SIZES
+from tests.oracle.lab_days import make_lab_day
 from tests.oracle.outside import OUTSIDE
 from tests.oracle.sessions import SessionTruth, make_session
 from tests.oracle.visibility import visibility
@@ -49,6 +54,26 @@ def test_a_case_makes_its_session(tmp_path: Path) -> None:
     found = [entry["effect"] for entry in truth.scene.record]
     assert found == [name for name, _ in case.effects]
     assert (tmp_path / case.name / "session.toml").exists()
+
+
+def test_a_lab_day_is_read_as_markers_and_its_spoiled_marker_is_what_the_truth_says(
+    tmp_path: Path,
+) -> None:
+    case = next(case for case in manifest("lab") if case.robot == "three-cable")
+    # Stiff cables take most of the simulator's time.
+    quick = {name: size for name, size in case.effects if name != "cable_elasticity"}
+    folder = tmp_path / case.name
+    truth = make_lab_day(folder, case.seed, case.robot, quick, n_runs=4, duration_s=3.0)
+    assert {entry["effect"] for entry in truth.scene.record} == set(quick)
+    session = read_session(folder)
+    runs = read_marker_runs(session, load_target(session)).runs
+    left_out = {
+        name: [run.examined.recording.names[k] for k in run.examined.rigidity.left_out]
+        for name, run in runs.items()
+    }
+    spoiled = json.loads((folder / "truth" / "truth.json").read_text())["spoiled"]
+    assert {name: out[0] for name, out in left_out.items() if out} == spoiled
+    assert len(spoiled) == 2
 
 
 @pytest.fixture(scope="module")

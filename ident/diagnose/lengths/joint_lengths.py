@@ -59,11 +59,11 @@ class Normal:
     rows: tuple[LengthRows, ...]
     sizes: Array
 
-    def variation_m(self, values: Array) -> float:
-        """What unknowns (p,) leave of the lengths' variation along the runs, root mean square."""
+    def variations_m(self, values: Array) -> Array:
+        """What unknowns (p,) leave of each run's lengths along it, root mean square, (r,)."""
         pairs = zip(self.rows, self.sizes, strict=True)
         left = [_left(one, _reduced(one, size), values) for one, size in pairs]
-        return float(np.sqrt(np.mean(np.concatenate([rest.reshape(-1) for rest in left]) ** 2)))
+        return np.array([np.sqrt(np.mean(rest**2)) for rest in left])
 
 
 @dataclass(frozen=True, slots=True)

@@ -114,6 +114,22 @@ class WrongPlace:
         return f"{told}; these recordings cannot tell {ways}"
 
 
+class RunLengths(NamedTuple):
+    """What the cable lengths of one run vary along it, root mean square.
+
+    Attributes:
+        run: its name.
+        before_m: by the declared geometry.
+        after_m: by the joint model.
+        slow_errors: their size over the usual one.
+    """
+
+    run: str
+    before_m: float
+    after_m: float
+    slow_errors: float
+
+
 @dataclass(frozen=True, slots=True)
 class Kinematics:
     """What lengths say.
@@ -121,24 +137,26 @@ class Kinematics:
     Attributes:
         wrong: blocks that are off, the surest first.
         probabilities: of each block to be off.
-        sizes: of each run's slow errors over their usual size, by its name.
+        runs: what each run's lengths vary along it, before and after, and how large its slow
+            errors are.
         besides: values of effects that make lengths vary, with standard deviations, by effect:
             fitted jointly, and left to the dynamics to accept.
     """
 
     wrong: tuple[WrongPlace, ...]
     probabilities: dict[str, float]
-    sizes: dict[str, float]
+    runs: tuple[RunLengths, ...]
     besides: dict[str, tuple[Array, Array]]
 
     def notes(self) -> list[str]:
         """Runs that deserve less trust, a sentence each."""
-        usual = float(np.median(list(self.sizes.values())))
+        usual = float(np.median([one.slow_errors for one in self.runs])) if self.runs else 0.0
         return [
-            f"run {run}: its cable lengths vary {size / usual:.1f} times as much as the usual "
-            "run's whatever the geometry: its poses are worse than they say, it weighs less here"
-            for run, size in self.sizes.items()
-            if size > LESS_TRUST * usual
+            f"run {one.run}: its cable lengths keep {one.slow_errors / usual:.1f} times the usual "
+            "run's variation whatever the geometry: its poses are worse than they say, and it "
+            "weighs less where lengths are judged"
+            for one in self.runs
+            if one.slow_errors > LESS_TRUST * usual
         ]
 
     def document(self) -> dict[str, Any]:
@@ -155,7 +173,7 @@ class Kinematics:
                 for one in self.wrong
             ],
             "probabilities": self.probabilities,
-            "slow_errors": self.sizes,
+            "runs": [one._asdict() for one in self.runs],
             "besides": {
                 name: {"values": values.tolist(), "std": stds.tolist()}
                 for name, (values, stds) in self.besides.items()
@@ -216,15 +234,23 @@ def kinematics(fit: LikelihoodFit, keys: Sequence[str], noise_scales: Array) -> 
             break
     normal, chances = last.normal, last.chances
     everything = mixed(normal, blocks, chances, ())
-    variation = normal.variation_m(0.0 * everything.values), normal.variation_m(everything.values)
+    runs = _runs(normal, everything.values)
+    before, after = (np.array([one[k] for one in runs]) for k in (1, 2))
+    variation = float(np.sqrt(np.mean(before**2))), float(np.sqrt(np.mean(after**2)))
     places = tuple(
         _place(model, last, blocks, group, variation)
         for group in groups(chances, _shown(chances, keys))
     )
     singles = {key: probability(chances, [key]) for key in blocks.columns}
-    sizes = {row.run: float(size) for row, size in zip(normal.rows, normal.sizes, strict=True)}
     rest = {name: _told(blocks.columns[name], everything) for name in patterns[0]}
-    return Kinematics(places, singles, sizes, rest)
+    return Kinematics(places, singles, runs, rest)
+
+
+def _runs(normal: Normal, values: Array) -> tuple[RunLengths, ...]:
+    before, after = normal.variations_m(0.0 * values), normal.variations_m(values)
+    names = [one.run for one in normal.rows]
+    columns = before.tolist(), after.tolist(), normal.sizes.tolist()
+    return tuple(RunLengths(*one) for one in zip(names, *columns, strict=True))
 
 
 def _shown(chances: Chances, keys: Sequence[str]) -> list[str]:

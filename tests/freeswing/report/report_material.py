@@ -178,6 +178,27 @@ def _diagnosis() -> dict[str, Any]:
             "signature": f"chi swings by 0.4 mrad at 7.3 Hz {HOSTILE}",
             "evidence": {"frequency_hz": 7.3, "coordinate": "chi"},
         },
+        "lengths": _lengths(),
+    }
+
+
+def _lengths() -> dict[str, Any]:
+    place = {"values": [2.3e-3, -5.4e-3, -4e-3], "std": [1.9e-3, 3e-3, 1.7e-3]}
+    return {
+        "wrong": [
+            {
+                "part": "attachment_offset:2",
+                "probability": 0.997,
+                **place,
+                "rivals": [{"part": "anchor_offset:2", "probability": 0.1, **place}],
+            }
+        ],
+        "probabilities": {"attachment_offset:2": 0.92, "anchor_offset:2": 0.1, HOSTILE: 0.01},
+        "runs": [
+            {"run": f"swing-{k}", "before_m": 1e-4, "after_m": 2e-5, "slow_errors": 1.0 + 8.0 * k}
+            for k in range(2)
+        ],
+        "besides": {"cable_elasticity": {"values": [1e-4], "std": [3e-5]}},
     }
 
 

@@ -1,40 +1,105 @@
-"""Probabilities of rival models: noise, leads of one run, discrepancies of unknown size."""
+"""Probabilities of rival models: noise, many unknowns, leads of one run, unknown discrepancies."""
 
 import numpy as np
 import pytest
 
-from freeswing.ident.diagnose.weights import CHANCE_OF_EFFECT, log_predictive, model_weights
+from freeswing.ident.diagnose.weights import (
+    CHANCE_OF_EFFECT,
+    Rival,
+    log_evidence,
+    log_predictive,
+    model_probabilities,
+)
 
-COUNTS = np.full(7, 6000.0)
-FEW = np.full(7, 40.0)
-
-
-def test_models_that_predict_alike_keep_their_odds():
-    same = np.linspace(-3.0, 2.0, 7)
-    none, one = model_weights([same, same], [0, 1])
-    assert none + one == pytest.approx(1.0)
-    assert one == pytest.approx(CHANCE_OF_EFFECT, rel=1e-6)
-
-
-def test_a_lead_that_all_runs_share_is_believed_and_one_run_s_is_not():
-    nothing = np.zeros(7)
-    shared, of_one = np.full(7, 3.0), np.array([21.0, *np.full(6, -1.5)])
-    assert model_weights([nothing, shared], [0, 1])[1] > 0.99
-    believed = model_weights([nothing, of_one], [0, 1])[1]
-    assert 0.05 < believed < 0.9, believed
+RUNS, SAMPLES = 7, 300
+COUNTS = np.full(RUNS, float(SAMPLES))
+MANY, FEW = np.full(RUNS, 200.0), np.full(RUNS, 20.0)
 
 
-def test_two_causes_that_take_turns_are_both_possible():
-    turns = np.array([4.0, -4.0, 3.0, -3.0, 2.0, -2.0, 0.0])
-    weights = model_weights([np.full(7, -50.0), turns, -turns], [0, 1, 1])
-    assert weights[0] < 1e-6
-    assert weights[1:] == pytest.approx([0.5, 0.5], abs=0.15)
+def rivals(seed, columns, truth, share=None):
+    """No effect, and one effect with some unknowns in each place of `columns`.
+
+    Args:
+        seed: of the noise.
+        columns: how many unknowns each model has, of a prior of one each.
+        truth: value of all unknowns of the first model, in each run (RUNS,) or in all.
+        share: how much of the first model's column the second one's holds.
+    """
+    rng = np.random.default_rng(seed)
+    seen = [rng.normal(size=(RUNS, SAMPLES, n)) / np.sqrt(SAMPLES) * 30.0 for n in columns]
+    if share is not None:
+        seen[1] = share * seen[0] + np.sqrt(1.0 - share**2) * seen[1]
+    size = np.broadcast_to(truth, RUNS)[:, None]
+    right = rng.normal(size=(RUNS, SAMPLES)) - size * seen[0].sum(axis=2)
+    found = []
+    for values in (np.zeros((RUNS, SAMPLES, 0)), *seen):
+        together = np.concatenate([values, right[..., None]], axis=2)
+        n = values.shape[2]
+        prior = np.column_stack([np.eye(n), np.zeros(n)])
+        found.append(Rival(np.linalg.qr(together, mode="r"), prior, int(n > 0)))
+    return found
+
+
+def test_what_no_run_shows_keeps_its_odds():
+    none, one = rivals(1, (3,), 0.0)
+    blind = Rival(one.triangles * np.array([0.0, 0.0, 0.0, 1.0]), one.prior, 1)
+    shares = model_probabilities([none, blind], COUNTS, MANY)
+    assert shares.sum() == pytest.approx(1.0)
+    assert shares[1] == pytest.approx(CHANCE_OF_EFFECT, rel=0.02)
+
+
+def test_twelve_unknowns_do_not_win_by_their_number():
+    worst = max(
+        model_probabilities(rivals(seed, (12, 1), 0.0), COUNTS, MANY)[1:].max()
+        for seed in range(12)
+    )
+    assert worst < 0.2, worst
+
+
+def test_what_all_runs_show_is_sure_and_what_one_shows_is_not():
+    shared = model_probabilities(rivals(2, (1,), 0.12), COUNTS, MANY)
+    assert shared[1] > 0.99, shared
+    one_run = np.where(np.arange(RUNS) == 3, 0.6, 0.0)
+    of_one = model_probabilities(rivals(2, (1,), one_run), COUNTS, MANY)
+    assert 0.05 < of_one[1] < 0.95, of_one
+
+
+def test_two_causes_that_look_alike_share_and_one_that_does_not_is_told_apart():
+    alike = model_probabilities(rivals(3, (1, 1), 0.2, share=0.999), COUNTS, MANY)
+    assert alike[0] < 1e-3
+    assert alike[1:].min() > 0.1, alike
+    apart = model_probabilities(rivals(3, (1, 1), 0.2, share=0.5), COUNTS, MANY)
+    assert apart[1] > 0.99, apart
+
+
+def test_ways_that_were_tried_beside_it_count_against_a_model():
+    none, one = rivals(4, (1,), 0.1)
+    tried = Rival(one.triangles, one.prior, 1, np.log(400.0))
+    every = np.ones((1, RUNS))
+    lead = log_evidence(one, COUNTS, MANY, every) - log_evidence(none, COUNTS, MANY, every)
+    fewer, more = (model_probabilities([none, m], COUNTS, MANY)[1] for m in (tried, one))
+    assert fewer < more, lead
+
+
+def test_evidence_is_the_integral_over_the_unknown():
+    _, one = rivals(5, (1,), 0.05)
+    weights = np.ones((1, RUNS))
+    grid = np.linspace(-1.0, 1.0, 4001)
+    rows = np.column_stack([grid, np.ones(len(grid))])
+    squares = np.einsum("ga,rka,rkb,gb->gr", rows, one.triangles, one.triangles, rows)
+    counts = squares.min(axis=0) + 50.0  # below the noise, where the density is exactly Gaussian
+    density = log_predictive(squares, counts, MANY).sum(axis=1) - 0.5 * grid**2
+    density[(squares > counts).any(axis=1)] = -np.inf
+    top = density.max()
+    whole = top + np.log(np.exp(density - top).sum() * (grid[1] - grid[0]) / np.sqrt(2 * np.pi))
+    found = log_evidence(one, counts, MANY, weights)[0]
+    assert found == pytest.approx(whole, abs=0.05)
 
 
 def test_at_the_noise_half_the_squares_count_and_above_it_their_ratio():
-    at_noise = log_predictive(COUNTS + 2.0, COUNTS, FEW) - log_predictive(COUNTS, COUNTS, FEW)
-    assert at_noise == pytest.approx(np.full(7, -1.0), rel=0.03)
+    at_noise = log_predictive(COUNTS + 0.2, COUNTS, FEW) - log_predictive(COUNTS, COUNTS, FEW)
+    assert at_noise == pytest.approx(np.full(RUNS, -0.1), rel=0.03)
     below = log_predictive(COUNTS - 8.0, COUNTS, FEW) - log_predictive(COUNTS, COUNTS, FEW)
-    assert below == pytest.approx(np.full(7, 4.0))
+    assert below == pytest.approx(np.full(RUNS, 4.0))
     far = log_predictive(200 * COUNTS, COUNTS, FEW) - log_predictive(100 * COUNTS, COUNTS, FEW)
-    assert far == pytest.approx(np.full(7, -20.0 * np.log(2.0)), rel=0.02)
+    assert far == pytest.approx(np.full(RUNS, -10.0 * np.log(2.0)), rel=0.02)

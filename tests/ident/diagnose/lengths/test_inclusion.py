@@ -11,7 +11,7 @@ from freeswing.ident.diagnose.lengths.inclusion import (
     set_probabilities,
 )
 from freeswing.ident.diagnose.lengths.joint_lengths import Blocks, Normal, solved, total
-from freeswing.ident.diagnose.lengths.wrong_places import Kinematics, Way, WrongPlace
+from freeswing.ident.diagnose.lengths.wrong_places import Kinematics, RunLengths, Way, WrongPlace
 
 BLOCKS = Blocks(
     {"first": np.array([0, 1]), "second": np.array([2]), "third": np.array([3])},
@@ -91,7 +91,8 @@ def test_blocks_that_replace_each_other_are_one_group_and_the_mean_holds_both_wa
 
 def test_runs_that_deserve_less_trust_are_named_and_both_places_are_told():
     sizes = {"run-1": 1.0, "run-2": 1.0, "run-3": 2.1, "run-4": 1.9}
-    told = Kinematics((), {}, sizes | {"run-5": 1.0}, {})
+    runs = tuple(RunLengths(name, 1e-4, 5e-5, size) for name, size in sizes.items())
+    told = Kinematics((), {}, (*runs, RunLengths("run-5", 1e-4, 5e-5, 1.0)), {})
     (note,) = told.notes()
     assert "run-3" in note
     ways = (

@@ -1,0 +1,45 @@
+"""Free against full: differences that vary from run to run count as such."""
+
+import numpy as np
+import pytest
+
+from freeswing.ident.fidim.fidim import fidim
+from freeswing.ident.judge.comparison import between_runs, compare
+
+ALL = np.ones(9, dtype=bool)
+
+
+def test_a_difference_that_one_run_brings_is_no_disagreement_of_the_models():
+    rng = np.random.default_rng(3)
+    each = 0.1 * rng.normal(size=(10, 9))
+    each[4, 5] += 30.0
+    whole = each.mean(axis=0)
+    without = np.array([np.delete(each, k, axis=0).mean(axis=0) for k in range(10)])
+    between = between_runs(without)
+    assert between == pytest.approx(each.std(axis=0, ddof=1) / np.sqrt(10))
+    free, std = np.ones(9), np.full(9, 0.05)
+    before = compare(free, std, free + whole, std, ALL)
+    after = compare(free, std, free + whole, std, ALL, between)
+    assert before[5].z > 30.0
+    assert after[5].z == pytest.approx(1.0, abs=0.1)
+    assert [row.z for row in after[:5]] == pytest.approx([row.z for row in before[:5]])
+
+
+def test_too_few_runs_or_runs_that_do_not_do_alone_say_nothing():
+    assert not between_runs(np.ones((2, 9))).any()
+    assert not between_runs(np.full((5, 9), np.nan)).any()
+
+
+def test_fidim_without_each_run_is_fidim_of_the_others():
+    rng = np.random.default_rng(4)
+    chi = np.concatenate([[1.0], rng.normal(size=9)])
+    runs = []
+    for _ in range(4):
+        W = rng.normal(size=(40, 2, 10))
+        W -= (W @ chi)[..., None] * chi / (chi @ chi)
+        runs.append(W + 1e-3 * rng.normal(size=W.shape))
+    found = fidim(runs)
+    for k in range(4):
+        rest = fidim(runs[:k] + runs[k + 1 :])
+        assert found.without_run[k] == pytest.approx(rest.values, rel=1e-9)
+    assert np.isnan(fidim(runs[:1]).without_run).all()
