@@ -18,10 +18,10 @@ from freeswing.calib.rig.reprojection import (
     Scene,
     camera_slices,
     fixed_jacobians,
-    kernel_board,
-    kernel_cameras,
+    kernel_estimate,
+    kernel_views,
 )
-from freeswing.calib.rig.reprojection_kernels import add_views
+from freeswing.calib.rig.view_equations import Normal, view_equations
 from freeswing.calib.rig.views import FixedPoints, Views
 
 # share of normal errors within Huber's knee; for single corners the knee is at 3 sigma
@@ -46,18 +46,6 @@ class Problem:
     free: np.ndarray
 
 
-@dataclass(frozen=True, slots=True)
-class Normal:
-    """Blocks of the normal equations, J'WJ and J'Wr of shared unknowns and boards; and the cost."""
-
-    shared: Array  # (p, p)
-    cross: Array  # (n_pieces, p, b)
-    boards: Array  # (n_pieces, b, b)
-    shared_slope: Array  # (p,)
-    board_slopes: Array  # (n_pieces, b)
-    cost: float
-
-
 @cache
 def length_with_share(share: float, size: int) -> float:
     """Length that a share of `size` unit normal numbers stays within."""
@@ -69,32 +57,23 @@ def length_with_share(share: float, size: int) -> float:
 def normal_equations(scene: Scene, problem: Problem, sigma: Array) -> Normal:
     """Normal equations at `scene`, robust weights included; `sigma` is each camera's noise, px."""
     end = camera_slices(scene.cameras)[-1].stop
-    p, n, b = len(problem.free), len(scene.T_base_boards), scene.board_unknowns
     views = problem.views
-    blocks = (np.zeros((p, p)), np.zeros((n, p, b)), np.zeros((n, b, b)))
-    slopes = (np.zeros(p), np.zeros((n, b)))
-    cost = add_views(
-        views.camera,
-        views.piece,
-        views.pixels,
-        views.lag_s,
-        views.whitening,
+    found = view_equations(
+        kernel_views(views),
+        kernel_estimate(scene, problem.board_points_m),
         sigma,
         length_with_share(WITHIN_KNEE, 2 * views.group_size),
-        *kernel_cameras(scene.cameras),
-        *kernel_board(scene, problem.board_points_m),
         end,
-        (*blocks, *slopes),
+        len(problem.free),
     )
-    if problem.fixed is not None:
-        cost += _add_fixed(scene, problem.fixed, sigma, blocks[0], slopes[0])
-    return Normal(*blocks, *slopes, cost)
+    if problem.fixed is None:
+        return found
+    return _with_fixed(found, scene, problem.fixed, sigma)
 
 
-def _add_fixed(
-    scene: Scene, fixed: FixedPoints, sigma: Array, shared: Array, slope: Array
-) -> float:
-    """Add the fixed points' sightings and their survey to the shared block; their cost."""
+def _with_fixed(found: Normal, scene: Scene, fixed: FixedPoints, sigma: Array) -> Normal:
+    """The equations with the fixed points' sightings and their survey added to what is shared."""
+    shared, slope = found.shared.copy(), found.shared_slope.copy()
     slices = camera_slices(scene.cameras)
     first = slices[-1].stop + WARP
     knee = length_with_share(WITHIN_KNEE, 2)
@@ -121,7 +100,8 @@ def _add_fixed(
     diagonal = first + np.arange(information.size)
     shared[diagonal, diagonal] += information
     slope[diagonal] += information * change
-    return cost + 0.5 * float(np.sum(information * change**2))
+    cost += 0.5 * float(np.sum(information * change**2))
+    return found._replace(shared=shared, shared_slope=slope, cost=found.cost + cost)
 
 
 def damped_step(normal: Normal, free: np.ndarray, damping: float) -> tuple[Array, Array]:

@@ -16,6 +16,7 @@ import numpy as np
 
 from freeswing.calib.camera.camera import Camera
 from freeswing.calib.camera.lens_models import FISHEYE, Array, full_parameters, parameter_columns
+from freeswing.calib.rig.kernel_inputs import Boards, Estimate, Lenses, Places, Shape, ViewArrays
 from freeswing.calib.rig.reprojection_kernels import CLOCK, POSE, WARP, all_residuals
 from freeswing.calib.rig.views import FixedPoints, Views
 from freeswing.cdpr.rotation import exp_rotation
@@ -96,9 +97,10 @@ def warped(board_points_m: Array, warp_m: Array) -> Array:
     return board_points_m + shape_modes(board_points_m) @ warp_m
 
 
-def kernel_cameras(cameras: tuple[Camera, ...]) -> tuple[tuple, tuple]:
-    """Lenses and places of the rig as `calib.rig.reprojection_kernels` takes them."""
-    lenses = (
+def kernel_estimate(scene: Scene, board_points_m: Array) -> Estimate:
+    """The scene as the kernels take it."""
+    cameras = scene.cameras
+    lenses = Lenses(
         np.array([camera.model == FISHEYE for camera in cameras]),
         np.array([full_parameters(camera.model, camera.params) for camera in cameras]),
         np.array([parameter_columns(camera.model) for camera in cameras]),
@@ -106,34 +108,28 @@ def kernel_cameras(cameras: tuple[Camera, ...]) -> tuple[tuple, tuple]:
         np.array([own.start for own in camera_slices(cameras)]),
     )
     poses = np.stack([camera.T_camera_base for camera in cameras])
-    places = (
+    places = Places(
         np.ascontiguousarray(poses[:, :3, :3]),
         np.ascontiguousarray(poses[:, :3, 3]),
         np.array([[camera.clock_offset_s, camera.line_time_s] for camera in cameras]),
     )
-    return lenses, places
-
-
-def kernel_board(scene: Scene, board_points_m: Array) -> tuple[tuple, tuple]:
-    """Motions and shape of the board as `calib.rig.reprojection_kernels` takes them."""
-    boards = (
+    boards = Boards(
         np.ascontiguousarray(scene.T_base_boards),
         np.ascontiguousarray(scene.motion),
         scene.motion_scale_s,
     )
-    return boards, (warped(board_points_m, scene.warp_m), shape_modes(board_points_m))
+    shape = Shape(warped(board_points_m, scene.warp_m), shape_modes(board_points_m))
+    return Estimate(lenses, places, boards, shape)
+
+
+def kernel_views(views: Views) -> ViewArrays:
+    """The views as the kernels take them."""
+    return ViewArrays(views.camera, views.piece, views.pixels, views.lag_s, views.whitening)
 
 
 def board_residuals(scene: Scene, board_points_m: Array, views: Views) -> Array:
     """Residuals of all views in pixels, (n, n_points, 2), NaN where unseen."""
-    return all_residuals(
-        views.camera,
-        views.piece,
-        views.pixels,
-        views.lag_s,
-        *kernel_cameras(scene.cameras),
-        *kernel_board(scene, board_points_m),
-    )
+    return all_residuals(kernel_views(views), kernel_estimate(scene, board_points_m))
 
 
 def fixed_residuals(scene: Scene, fixed: FixedPoints) -> Array:

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.vision.fuse.blocks import blocks
-from freeswing.vision.fuse.linearised_block import camera_matrices, lags, linearised_at
-from freeswing.vision.fuse.pose_kernels import solve_block
+from freeswing.vision.fuse.linearised_block import block_poses, lags, seen_by
+from freeswing.vision.fuse.pose_kernels import Linear, Solved, linearise_block, solve_block
 from freeswing.vision.fuse.poses import Poses, motion_of_poses, unknown_poses
 from freeswing.vision.fuse.run_views import Block, CameraViews
 from freeswing.vision.look.single_pose import whitening
@@ -90,16 +90,15 @@ def fuse(
                 block, positions[span], rotations[span], poses.motions[span]
             )
             noise = floors / np.array([v.camera.focal_px.mean() for v in views])
-            own = np.full((len(can), 6, 6), np.nan)
-            _solve(
-                block, views, instants_s[span], poses.motions[span], noise, start_position,
-                start_rotation, can, own, account, free_of(watch),
-            )  # fmt: skip
+            start = block_poses(start_rotation, start_position, can, poses.motions[span])
+            seen = seen_by(block, views, lags(block, instants_s[span]))
+            found = solve_block(seen, whitened(block, noise), start, free_of(watch), _ROBUST_LIMIT)
+            account.add(block, views, found, linearise_block(seen, found.poses(start.motions)))
             if kept:
-                own[~can] = np.nan
-                covariances[span] = own
-            positions[span] = np.where(can[:, None], start_position, np.nan)
-            rotations[span] = np.where(can[:, None, None], start_rotation, np.nan)
+                covariances[span] = found.covariances
+            can = found.known
+            positions[span] = np.where(can[:, None], found.positions, np.nan)
+            rotations[span] = np.where(can[:, None, None], found.rotations, np.nan)
             known[span] = can
         poses = Poses(
             instants_s,
@@ -138,7 +137,7 @@ def _starts(
             if block.starts[k + 1] > block.starts[k]:
                 near = have[np.argmin(np.abs(have - k))]
                 position[k], rotation[k], can[k] = position[near], rotation[near], True
-    return np.ascontiguousarray(position), np.ascontiguousarray(rotation), can
+    return position, rotation, can
 
 
 def whitened(block: Block, noise: Array) -> Array:
@@ -153,31 +152,6 @@ def whitened(block: Block, noise: Array) -> Array:
     ]] = 1.0  # fmt: skip
     covariances[:, diagonal, diagonal] += (noise[block.camera_of] ** 2)[:, None]
     return whitening(covariances)
-
-
-def _solve(
-    block: Block,
-    views: Sequence[CameraViews],
-    instants_s: Array,
-    motions: Array,
-    noise: Array,
-    positions: Array,
-    rotations: Array,
-    known: Mask,
-    covariances: Array,
-    account: _Account,
-    free: int,
-) -> None:
-    late, steady = lags(block, instants_s), np.ascontiguousarray(motions)
-    scores = np.full(len(block.things), -1.0)
-    solve_block(
-        block.starts, rotations, positions, known, steady, free, camera_matrices(views),
-        block.camera_of, block.points, block.rays, whitened(block, noise), late, block.counts,
-        _ROBUST_LIMIT, covariances, scores,
-    )  # fmt: skip
-    found = linearised_at(block, views, rotations, positions, known, steady, late)
-    instant = np.repeat(np.arange(len(instants_s)), np.diff(block.starts))
-    account.add(block, views, scores, known[instant], found.residuals, found.places)
 
 
 class _Account:
@@ -195,11 +169,11 @@ class _Account:
         self,
         block: Block,
         views: Sequence[CameraViews],
-        scores: Array,
-        known: Mask,
-        residuals: Array,
-        places: Array,
+        solved: Solved,
+        linear: Linear,
     ) -> None:
+        scores, residuals = solved.scores, linear.residuals
+        known = np.repeat(solved.known, np.diff(block.starts))
         good = known & (scores >= 0.0) & (scores < _REJECT)
         bad = known & ~good
         focal = np.array([v.camera.focal_px.mean() for v in views])[block.camera_of]
@@ -214,7 +188,7 @@ class _Account:
         np.add.at(self.used, block.camera_of[good], 1)
         self.total += float((scores[good] * two[good]).sum())
         self.count += int(two[good].sum())
-        self._add_misses(block, good, residuals, places)
+        self._add_misses(block, good, residuals, linear.places)
         for camera in range(len(views)):
             mine = known & (scores >= 0.0) & (block.camera_of == camera)
             excess = (squares[mine] - noise[mine]) / two[mine]

@@ -12,6 +12,7 @@ small rotation dr in the base frame, R <- exp(dr) R.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -19,11 +20,126 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+
+# As np.int64 where they are arguments: a literal would be compiled for once more.
+MOST_PASSES = 12
+
+
+class Seen(NamedTuple):
+    """Sightings of some instants, those of instant k at starts[k] ... starts[k + 1].
+
+    Attributes:
+        starts: (n_k + 1,).
+        cameras: T_camera_base, (n_c, 4, 4).
+        camera_of: (n_o,).
+        points: platform coordinates, (n_o, 4, 3).
+        rays: measured x/z, y/z, (n_o, 8).
+        lags: time of each point after its instant, (n_o, 4).
+        counts: points in use, (n_o,).
+    """
+
+    starts: Ints
+    cameras: Array
+    camera_of: Ints
+    points: Array
+    rays: Array
+    lags: Array
+    counts: Ints
+
+
+class MovingPoses(NamedTuple):
+    """Poses of instants as they are believed to be.
+
+    Attributes:
+        rotations: R_base_platform, (n_k, 3, 3).
+        positions: (n_k, 3).
+        known: where there is one, (n_k,).
+        motions: v, w, a, al in the base frame, (n_k, 12).
+    """
+
+    rotations: Array
+    positions: Array
+    known: Mask
+    motions: Array
+
+
+class MovingPose(NamedTuple):
+    """One of them: (3, 3), (3,) and (12,)."""
+
+    rotation: Array
+    position: Array
+    motion: Array
+
+
+class Linear(NamedTuple):
+    """Sightings about their poses, rows of markers filled as far as they go.
+
+    Attributes:
+        residuals: measured minus predicted rays, (n_o, 8).
+        jacobians: of the prediction by position and small rotation, (n_o, 8, 6).
+        rates: of the prediction by time, (n_o, 8).
+        places: points in the camera's frame, (n_o, 4, 3).
+    """
+
+    residuals: Array
+    jacobians: Array
+    rates: Array
+    places: Array
+
+
+class Solved(NamedTuple):
+    """A block's poses.
+
+    Attributes:
+        rotations: (n_k, 3, 3).
+        positions: (n_k, 3).
+        known: where a pose was found, (n_k,).
+        covariances: of position and small rotation, NaN where there is no pose, (n_k, 6, 6).
+        scores: mean squared whitened residual of each sighting at the solution, -1 where it is
+            behind the camera, (n_o,).
+    """
+
+    rotations: Array
+    positions: Array
+    known: Mask
+    covariances: Array
+    scores: Array
+
+    def poses(self, motions: Array) -> MovingPoses:
+        """The poses that were found, with the motions they were found with, (n_k, 12)."""
+        return MovingPoses(self.rotations, self.positions, self.known, motions)
+
+
+class SolvedPose(NamedTuple):
+    """One instant's pose.
+
+    Attributes:
+        rotation: (3, 3).
+        position: (3,).
+        covariance: of position and small rotation, zero where not free, (6, 6).
+        scores: as in `Solved`, of the instant's sightings.
+        condition: smallest eigenvalue of the balanced normal matrix; 0 where it has no solution.
+    """
+
+    rotation: Array
+    position: Array
+    covariance: Array
+    scores: Array
+    condition: float
+
+
+class _Spare(NamedTuple):
+    """Scratch for one sighting: it about its pose, W residual (8,) and W jacobian (8, 6)."""
+
+    found: Linear
+    r: Array
+    j: Array
 
 
 @numba.njit(cache=True, nogil=True)
-def small_rotation(r: Array, out: Array) -> None:
-    """exp(skew(r)) into `out` (3, 3)."""
+def small_rotation(r: Array, out: Array) -> Array:
+    """exp(skew(r)) in `out` (3, 3), which is given back."""
     angle2 = r[0] * r[0] + r[1] * r[1] + r[2] * r[2]
     angle = math.sqrt(angle2)
     if angle < 1e-6:
@@ -37,6 +153,7 @@ def small_rotation(r: Array, out: Array) -> None:
     out[0, 1], out[1, 0] = b * x * y - a * z, b * x * y + a * z
     out[0, 2], out[2, 0] = b * x * z + a * y, b * x * z - a * y
     out[1, 2], out[2, 1] = b * y * z - a * x, b * y * z + a * x
+    return out
 
 
 @numba.njit(cache=True, nogil=True)
@@ -66,40 +183,16 @@ def carried_on(
 
 
 @numba.njit(cache=True, nogil=True)
-def observe(
-    rotation: Array,
-    position: Array,
-    motion: Array,
-    T_camera_base: Array,
-    points: Array,
-    rays: Array,
-    lags: Array,
-    count: int,
-    residual: Array,
-    jacobian: Array,
-    rates: Array,
-    places: Array,
-) -> bool:
-    """Residuals (measured - predicted) of one observation; False when a point is behind.
-
-    Args:
-        rotation: R_base_platform, (3, 3).
-        position: (3,).
-        motion: v, w, a, al in the base frame, (12,).
-        T_camera_base: (4, 4).
-        points: platform coordinates, (4, 3).
-        rays: measured x/z, y/z, (8,).
-        lags: time of each point after the instant, (4,).
-        count: points in use.
-        residual: out, (8,).
-        jacobian: out, of the prediction by dp, dr, (8, 6).
-        rates: out, of the prediction by time, (8,).
-        places: out, points in the camera frame, (4, 3).
-    """
+def _observe(seen: Seen, o: int, pose: MovingPose, into: Linear, at: int) -> bool:
+    """Row `at` of `into` from sighting o at a pose; False when a point is behind the camera."""
+    residual, jacobian = into.residuals[at], into.jacobians[at]
+    rates, places = into.rates[at], into.places[at]
+    rotation, position, motion = pose
+    points, rays, lags = seen.points[o], seen.rays[o], seen.lags[o]
+    camera = seen.cameras[seen.camera_of[o]]
     turn = np.empty((3, 3))
     step = np.empty(3)
-    camera = T_camera_base
-    for k in range(count):
+    for k in range(seen.counts[o]):
         dt = lags[k]
         for i in range(3):
             step[i] = motion[3 + i] * dt + 0.5 * motion[9 + i] * dt * dt
@@ -146,11 +239,10 @@ def observe(
     return True
 
 
-@numba.njit(cache=True, nogil=True)
-def _whiten(
-    white: Array, residual: Array, jacobian: Array, m: int, free: int, r: Array, j: Array
-) -> None:
-    """Gives W residual and W jacobian over the first m rows; W is lower triangular."""
+@numba.njit(cache=True, nogil=True, forceinline=True)
+def _whiten(white: Array, found: Linear, m: int, free: int, r: Array, j: Array) -> None:
+    """W residual into r and W jacobian into j over the first m rows; W is lower triangular."""
+    residual, jacobian = found.residuals[0], found.jacobians[0]
     for i in range(m):
         r[i] = 0.0
         j[i] = 0.0
@@ -161,181 +253,118 @@ def _whiten(
 
 
 @numba.njit(cache=True, nogil=True)
-def solve_instant(
-    rotation: Array,
-    position: Array,
-    motion: Array,
-    free: int,
-    cameras: Array,
-    camera_of: Ints,
-    points: Array,
-    rays: Array,
-    whitening: Array,
-    lags: Array,
-    counts: Ints,
-    limit: float,
-    passes: int,
-    covariance: Array,
-    scores: Array,
-) -> float:
-    """Robust pose of one instant, in place; `free` is 6, or 3 for the position alone.
+def _unlinearised(count: int) -> Linear:
+    """Zeros, and points one metre away."""
+    return Linear(
+        np.zeros((count, 8)), np.zeros((count, 8, 6)), np.zeros((count, 8)), np.ones((count, 4, 3))
+    )
 
-    An observation whose mean squared whitened residual exceeds `limit` is weighed down by the
-    square of the excess. Returns the smallest eigenvalue of the
-    balanced normal matrix; 0 when it cannot be solved. `scores` (n,) takes each
-    observation's mean squared whitened residual at the solution, -1 where behind the camera.
+
+@numba.njit(cache=True, nogil=True, forceinline=True)
+def _equations(
+    seen: Seen, whitening: Array, k: int, pose: MovingPose, bound: float, free: int, spare: _Spare
+) -> tuple[Array, Array, Array]:
+    """Normal matrix (free, free), right side (free,) and scores of an instant's sightings.
+
+    A sighting whose score exceeds `bound` is weighed down by the square of the excess.
     """
-    n = len(camera_of)
-    residual, rates = np.zeros(8), np.zeros(8)
-    jacobian, places = np.zeros((8, 6)), np.zeros((4, 3))
-    turn, step = np.empty((3, 3)), np.zeros(6)
-    condition = 0.0
-    r, j = np.empty(8), np.empty((8, 6))
+    first, last = seen.starts[k], seen.starts[k + 1]
     normal, right = np.zeros((free, free)), np.zeros(free)
+    scores = np.full(last - first, -1.0)
+    found, r, j = spare
+    for o in range(first, last):
+        if not _observe(seen, o, pose, found, np.int64(0)):
+            continue
+        m = 2 * seen.counts[o]
+        _whiten(whitening[o], found, m, free, r, j)
+        score = 0.0
+        for i in range(m):
+            score += r[i] * r[i] / m
+        scores[o - first] = score
+        weight = 1.0 if score <= bound else (bound / score) ** 2
+        for i in range(m):
+            for a in range(free):
+                right[a] += weight * j[i, a] * r[i]
+                for b in range(free):
+                    normal[a, b] += weight * j[i, a] * j[i, b]
+    return normal, right, scores
+
+
+@numba.njit(cache=True, nogil=True)
+def solve_instant(
+    seen: Seen, whitening: Array, k: int, start: MovingPose, free: int, limit: float, passes: int
+) -> SolvedPose:
+    """Robust pose of instant k; `free` is 6, or 3 for the position alone.
+
+    A sighting whose mean squared whitened residual exceeds `limit` is weighed down, only beyond a
+    hundred times that in the first pass. `whitening` (n_o, 8, 8) has a W for each sighting.
+    """
+    rotation, position = start.rotation.copy(), start.position.copy()
+    turn, step = np.empty((3, 3)), np.zeros(6)
+    covariance = np.zeros((6, 6))
+    normal, scores, condition = np.zeros((free, free)), np.zeros(0), 0.0
+    spare = _Spare(_unlinearised(1), np.empty(8), np.empty((8, 6)))
     for iteration in range(passes):
-        normal[:] = 0.0
-        right[:] = 0.0
-        for o in range(n):
-            m = 2 * counts[o]
-            scores[o] = -1.0
-            seen = observe(
-                rotation,
-                position,
-                motion,
-                cameras[camera_of[o]],
-                points[o],
-                rays[o],
-                lags[o],
-                counts[o],
-                residual,
-                jacobian,
-                rates,
-                places,
-            )
-            if not seen:
-                continue
-            _whiten(whitening[o], residual, jacobian, m, free, r, j)
-            score = 0.0
-            for i in range(m):
-                score += r[i] * r[i] / m
-            scores[o] = score
-            bound = limit * 100.0 if iteration == 0 else limit
-            weight = 1.0 if score <= bound else (bound / score) ** 2
-            for i in range(m):
-                for a in range(free):
-                    right[a] += weight * j[i, a] * r[i]
-                    for b in range(free):
-                        normal[a, b] += weight * j[i, a] * j[i, b]
+        bound = limit * 100.0 if iteration == 0 else limit
+        pose = MovingPose(rotation, position, start.motion)
+        normal, right, scores = _equations(seen, whitening, k, pose, bound, free, spare)
         scale = np.sqrt(np.diag(normal)) + 1e-300
         balanced = normal / np.outer(scale, scale)
         condition = float(np.linalg.eigvalsh(balanced)[0])
         if not condition > 1e-9:
-            return 0.0
+            return SolvedPose(rotation, position, covariance, scores, 0.0)
         step[:free] = np.linalg.solve(normal, right)
         position += step[:3]
         largest = np.abs(step[:free]).max()
         if free == 6:
-            small_rotation(step[3:], turn)
-            rotation[:] = turn @ rotation
+            rotation[:] = small_rotation(step[3:], turn) @ rotation
         if largest < 1e-8 and iteration > 1:
             break
-    covariance[:] = 0.0
     covariance[:free, :free] = np.linalg.inv(normal)
-    return condition
+    return SolvedPose(rotation, position, covariance, scores, condition)
 
 
 @numba.njit(cache=True, nogil=True)
 def solve_block(
-    starts: Ints,
-    rotations: Array,
-    positions: Array,
-    known: NDArray[np.bool_],
-    motions: Array,
-    free: int,
-    cameras: Array,
-    camera_of: Ints,
-    points: Array,
-    rays: Array,
-    whitening: Array,
-    lags: Array,
-    counts: Ints,
-    limit: float,
-    covariances: Array,
-    scores: Array,
-) -> None:
-    """`solve_instant` for each instant k of a block, observations starts[k] ... starts[k + 1]."""
-    for k in range(len(starts) - 1):
-        a, b = starts[k], starts[k + 1]
-        if not known[k]:
+    seen: Seen, whitening: Array, start: MovingPoses, free: int, limit: float
+) -> Solved:
+    """`solve_instant` for each instant of a block that has a start and points enough."""
+    n = len(seen.starts) - 1
+    found = Solved(
+        start.rotations.copy(),
+        start.positions.copy(),
+        np.zeros(n, np.bool_),
+        np.full((n, 6, 6), np.nan),
+        np.full(len(seen.counts), -1.0),
+    )
+    for k in range(n):
+        first, last = seen.starts[k], seen.starts[k + 1]
+        points = 0
+        for o in range(first, last):
+            points += seen.counts[o]
+        if not start.known[k] or points < (3 if free == 6 else 2):
             continue
-        points_seen = 0
-        for o in range(a, b):
-            points_seen += counts[o]
-        if points_seen < (3 if free == 6 else 2):
-            known[k] = False
-            continue
-        condition = solve_instant(
-            rotations[k],
-            positions[k],
-            motions[k],
-            free,
-            cameras,
-            camera_of[a:b],
-            points[a:b],
-            rays[a:b],
-            whitening[a:b],
-            lags[a:b],
-            counts[a:b],
-            limit,
-            np.int64(12),  # not a literal, for which it would be compiled once more
-            covariances[k],
-            scores[a:b],
-        )
-        if condition == 0.0:
-            known[k] = False
+        pose = MovingPose(start.rotations[k], start.positions[k], start.motions[k])
+        one = solve_instant(seen, whitening, k, pose, free, limit, np.int64(MOST_PASSES))
+        found.scores[first:last] = one.scores
+        if one.condition > 0.0:
+            found.known[k] = True
+            found.rotations[k], found.positions[k] = one.rotation, one.position
+            found.covariances[k] = one.covariance
+    return found
 
 
 @numba.njit(cache=True, nogil=True)
-def linearise_block(
-    starts: Ints,
-    rotations: Array,
-    positions: Array,
-    known: NDArray[np.bool_],
-    motions: Array,
-    cameras: Array,
-    camera_of: Ints,
-    points: Array,
-    rays: Array,
-    lags: Array,
-    counts: Ints,
-    residuals: Array,
-    jacobians: Array,
-    rates: Array,
-    places: Array,
-) -> None:
-    """`observe` for every observation of a block at its pose; zeros where there is none.
-
-    Fills residuals (n, 8), jacobians (n, 8, 6), rates (n, 8) and places (n, 4, 3).
-    """
-    for k in range(len(starts) - 1):
-        if not known[k]:
+def linearise_block(seen: Seen, poses: MovingPoses) -> Linear:
+    """Every sighting of a block about its pose; zeros where there is none."""
+    found = _unlinearised(len(seen.counts))
+    for k in range(len(seen.starts) - 1):
+        if not poses.known[k]:
             continue
-        for o in range(starts[k], starts[k + 1]):
-            seen = observe(
-                rotations[k],
-                positions[k],
-                motions[k],
-                cameras[camera_of[o]],
-                points[o],
-                rays[o],
-                lags[o],
-                counts[o],
-                residuals[o],
-                jacobians[o],
-                rates[o],
-                places[o],
-            )
-            if not seen:
-                residuals[o] = 0.0
-                jacobians[o] = 0.0
-                rates[o] = 0.0
+        pose = MovingPose(poses.rotations[k], poses.positions[k], poses.motions[k])
+        for o in range(seen.starts[k], seen.starts[k + 1]):
+            if not _observe(seen, o, pose, found, o):
+                found.residuals[o] = 0.0
+                found.jacobians[o] = 0.0
+                found.rates[o] = 0.0
+    return found

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.cdpr.rotation import exp_rotation
-from freeswing.vision.fuse.pose_kernels import carried_on, solve_instant
+from freeswing.vision.fuse.pose_kernels import MovingPose, Seen, carried_on, solve_instant
 
 Array = NDArray[np.float64]
 Pose = tuple[Array, Array]
@@ -17,6 +17,7 @@ Pose = tuple[Array, Array]
 
 _HOME = np.eye(4)[None]
 _ROBUST_LIMIT = 25.0
+_PASSES = 10
 
 
 def start_pose(points: Array, rays: Array) -> Pose | None:
@@ -52,27 +53,20 @@ def whitening(covariances: Array) -> Array:
 def refine_pose(start: Pose, points: Array, rays: Array, covariances: Array) -> Pose | None:
     """Least squares over all tags of one image; None when it does not determine a pose."""
     n = len(points)
-    rotation, position = start[0].copy(), start[1].copy()
-    condition = solve_instant(
-        rotation,
-        position,
-        np.zeros(12),
-        6,
+    seen = Seen(
+        np.array([0, n]),
         _HOME,
         np.zeros(n, dtype=np.int64),
         np.ascontiguousarray(points),
         np.ascontiguousarray(rays),
-        whitening(covariances),
         np.zeros((n, 4)),
         np.full(n, 4, dtype=np.int64),
-        _ROBUST_LIMIT,
-        10,
-        np.zeros((6, 6)),
-        np.zeros(n),
     )
-    if condition == 0.0 or not np.isfinite(position).all():
+    pose = MovingPose(start[0], start[1], np.zeros(12))
+    found = solve_instant(seen, whitening(covariances), 0, pose, 6, _ROBUST_LIMIT, _PASSES)
+    if found.condition == 0.0 or not np.isfinite(found.position).all():
         return None
-    return rotation, position
+    return found.rotation, found.position
 
 
 def extrapolate(past: Sequence[tuple[float, Pose]], time_s: float) -> Pose | None:

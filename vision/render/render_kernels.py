@@ -9,6 +9,7 @@ pixels. Light and coverage are filtered alike, so that layers are composited exa
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -32,49 +33,139 @@ def gathering_weights(psf_px: float, subpixels: int) -> NDArray[np.float32]:
     return (weights / weights.sum()).astype(np.float32)
 
 
-@numba.njit(cache=True, nogil=True)
-def sample_plane(
-    light: Array,
-    cover: Array,
-    cells_from_ray: Array,
-    rays: Array,
-    left: int,
-    top: int,
-    subpixels: int,
-    out: NDArray[np.float32],
-) -> None:
-    """Adds one plane to the sub-pixel buffer `out` (2, rows * s, columns * s).
+class Buffer(NamedTuple):
+    """Sub-pixels of a part of the image.
 
-    `light` and `cover` (R + 2, C + 2) hold the cells with a rim that is not covered;
-    `cells_from_ray` (rows, 3, 3) maps a ray (x, y, 1) to (column, row, 1) up to scale, for each
-    image row of the buffer; `rays` (h, w, 2) are the whole image's undistorted pixels.
+    Attributes:
+        samples: light and coverage, (2, rows * s, columns * s).
+        left: image column of the first pixel.
+        top: image row of the first pixel.
+        subpixels: s, of a pixel's side.
     """
-    rows = out.shape[1] // subpixels
-    columns = out.shape[2] // subpixels
+
+    samples: NDArray[np.float32]
+    left: int
+    top: int
+    subpixels: int
+
+
+class Plane(NamedTuple):
+    """A plane of cells, with a rim that is not covered.
+
+    Attributes:
+        light: (R + 2, C + 2).
+        cover: likewise.
+        cells_from_ray: maps a ray (x, y, 1) to (column, row, 1) up to scale, for each image row of
+            the buffer, (rows, 3, 3).
+    """
+
+    light: Array
+    cover: Array
+    cells_from_ray: Array
+
+
+class _Ray(NamedTuple):
+    """A pixel's ray, and how it changes to the next column (u) and row (v)."""
+
+    x: float
+    y: float
+    xu: float
+    yu: float
+    xv: float
+    yv: float
+
+
+class _Place(NamedTuple):
+    """Where a ray meets the cells, and half the side of a pixel there, in cells."""
+
+    c: float
+    r: float
+    foot_c: float
+    foot_r: float
+
+
+@numba.njit(cache=True, nogil=True, forceinline=True)
+def _ray_of(rays: Array, column: int, row: int) -> _Ray:
+    """The ray of a pixel, continued beyond the image's edge."""
     height, width = rays.shape[0], rays.shape[1]
+    v = min(max(row, 0), height - 1)
+    v0, v1 = max(v - 1, 0), min(v + 1, height - 1)
+    u = min(max(column, 0), width - 1)
+    u0, u1 = max(u - 1, 0), min(u + 1, width - 1)
+    xu = (rays[v, u1, 0] - rays[v, u0, 0]) / (u1 - u0)
+    yu = (rays[v, u1, 1] - rays[v, u0, 1]) / (u1 - u0)
+    xv = (rays[v1, u, 0] - rays[v0, u, 0]) / (v1 - v0)
+    yv = (rays[v1, u, 1] - rays[v0, u, 1]) / (v1 - v0)
+    x = rays[v, u, 0] + (column - u) * xu + (row - v) * xv
+    y = rays[v, u, 1] + (column - u) * yu + (row - v) * yv
+    return _Ray(x, y, xu, yu, xv, yv)
+
+
+@numba.njit(cache=True, nogil=True, forceinline=True)
+def _place_of(h: Array, ray: _Ray, depth: float) -> _Place:
+    """Where a ray of that depth meets the cells, by the map h (3, 3)."""
+    x, y, xu, yu, xv, yv = ray
+    c = (h[0, 0] * x + h[0, 1] * y + h[0, 2]) / depth
+    r = (h[1, 0] * x + h[1, 1] * y + h[1, 2]) / depth
+    cx, cy = (h[0, 0] - c * h[2, 0]) / depth, (h[0, 1] - c * h[2, 1]) / depth
+    rx, ry = (h[1, 0] - r * h[2, 0]) / depth, (h[1, 1] - r * h[2, 1]) / depth
+    foot_c = abs(cx * xu + cy * yu) + abs(cx * xv + cy * yv)
+    foot_r = abs(rx * xu + ry * yu) + abs(rx * xv + ry * yv)
+    return _Place(c, r, foot_c, foot_r)
+
+
+@numba.njit(cache=True, nogil=True, forceinline=True)
+def _cell_of(plane: Plane, place: _Place, subpixels: int) -> tuple[int, int]:
+    """Row and column of the one cell that the whole pixel lies within; (-1, -1): there is none."""
+    last_row, last_column = plane.light.shape[0] - 1, plane.light.shape[1] - 1
+    c, r, foot_c, foot_r = place
+    reach = 0.5 + 0.6 / subpixels
+    k, m = math.floor(c - reach * foot_c), math.floor(r - reach * foot_r)
+    if (
+        math.floor(c + reach * foot_c) == k
+        and math.floor(r + reach * foot_r) == m
+        and 0 <= k < last_column - 1
+        and 0 <= m < last_row - 1
+    ):
+        return m + 1, k + 1
+    return -1, -1
+
+
+@numba.njit(cache=True, nogil=True, forceinline=True)
+def _sampled(plane: Plane, c: float, r: float, foot_c: float, foot_r: float) -> tuple[float, float]:
+    """Light and coverage about a point, each cell edge a ramp as wide as the sub-pixel's foot."""
+    light, cover = plane.light, plane.cover
     last_row, last_column = light.shape[0] - 1, light.shape[1] - 1
-    for i in range(rows):
-        h = cells_from_ray[i]
-        v = min(max(top + i, 0), height - 1)
-        v0, v1 = max(v - 1, 0), min(v + 1, height - 1)
-        for j in range(columns):
-            u = min(max(left + j, 0), width - 1)
-            u0, u1 = max(u - 1, 0), min(u + 1, width - 1)
-            xu = (rays[v, u1, 0] - rays[v, u0, 0]) / (u1 - u0)
-            yu = (rays[v, u1, 1] - rays[v, u0, 1]) / (u1 - u0)
-            xv = (rays[v1, u, 0] - rays[v0, u, 0]) / (v1 - v0)
-            yv = (rays[v1, u, 1] - rays[v0, u, 1]) / (v1 - v0)
-            x = rays[v, u, 0] + (left + j - u) * xu + (top + i - v) * xv
-            y = rays[v, u, 1] + (left + j - u) * yu + (top + i - v) * yv
-            depth = h[2, 0] * x + h[2, 1] * y + h[2, 2]
+    k, m = math.floor(c + 0.5), math.floor(r + 0.5)
+    fc = min(max(0.5 + (c - k) / foot_c, 0.0), 1.0)
+    fr = min(max(0.5 + (r - m) / foot_r, 0.0), 1.0)
+    k0, k1 = min(max(k, 0), last_column), min(max(k + 1, 0), last_column)
+    m0, m1 = min(max(m, 0), last_row), min(max(m + 1, 0), last_row)
+    w00, w01 = (1.0 - fr) * (1.0 - fc), (1.0 - fr) * fc
+    w10, w11 = fr * (1.0 - fc), fr * fc
+    return (
+        w00 * light[m0, k0] + w01 * light[m0, k1] + w10 * light[m1, k0] + w11 * light[m1, k1],
+        w00 * cover[m0, k0] + w01 * cover[m0, k1] + w10 * cover[m1, k0] + w11 * cover[m1, k1],
+    )
+
+
+@numba.njit(cache=True, nogil=True)
+def sample_plane(plane: Plane, rays: Array, buffer: Buffer) -> Buffer:
+    """The buffer with one plane added to its samples (in place).
+
+    `rays` (h, w, 2) are the whole image's undistorted pixels.
+    """
+    out, left, top, subpixels = buffer
+    last_row, last_column = plane.light.shape[0] - 1, plane.light.shape[1] - 1
+    for i in range(out.shape[1] // subpixels):
+        h = plane.cells_from_ray[i]
+        for j in range(out.shape[2] // subpixels):
+            ray = _ray_of(rays, left + j, top + i)
+            depth = h[2, 0] * ray.x + h[2, 1] * ray.y + h[2, 2]
             if not depth > 0.0:
                 continue
-            c = (h[0, 0] * x + h[0, 1] * y + h[0, 2]) / depth
-            r = (h[1, 0] * x + h[1, 1] * y + h[1, 2]) / depth
-            cx, cy = (h[0, 0] - c * h[2, 0]) / depth, (h[0, 1] - c * h[2, 1]) / depth
-            rx, ry = (h[1, 0] - r * h[2, 0]) / depth, (h[1, 1] - r * h[2, 1]) / depth
-            foot_c = abs(cx * xu + cy * yu) + abs(cx * xv + cy * yv)
-            foot_r = abs(rx * xu + ry * yu) + abs(rx * xv + ry * yv)
+            place = _place_of(h, ray, depth)
+            c, r, foot_c, foot_r = place
             if (
                 c < -foot_c
                 or r < -foot_r
@@ -82,17 +173,11 @@ def sample_plane(
                 or r > last_row - 1 + foot_r
             ):
                 continue
-            reach = 0.5 + 0.6 / subpixels
-            k, m = math.floor(c - reach * foot_c), math.floor(r - reach * foot_r)
-            if (
-                math.floor(c + reach * foot_c) == k
-                and math.floor(r + reach * foot_r) == m
-                and 0 <= k < last_column - 1
-                and 0 <= m < last_row - 1
-            ):  # the whole pixel lies within one cell
+            m, k = _cell_of(plane, place, subpixels)
+            if m >= 0:
                 p, q = i * subpixels, j * subpixels
-                out[0, p : p + subpixels, q : q + subpixels] += light[m + 1, k + 1]
-                out[1, p : p + subpixels, q : q + subpixels] += cover[m + 1, k + 1]
+                out[0, p : p + subpixels, q : q + subpixels] += plane.light[m, k]
+                out[1, p : p + subpixels, q : q + subpixels] += plane.cover[m, k]
                 continue
             foot_c /= subpixels
             foot_r /= subpixels
@@ -100,44 +185,23 @@ def sample_plane(
                 dv = (a + 0.5) / subpixels - 0.5
                 for b in range(subpixels):
                     du = (b + 0.5) / subpixels - 0.5
-                    xs, ys = x + du * xu + dv * xv, y + du * yu + dv * yv
-                    scale = 1.0 / (h[2, 0] * xs + h[2, 1] * ys + h[2, 2])
-                    cs = (h[0, 0] * xs + h[0, 1] * ys + h[0, 2]) * scale
-                    rs = (h[1, 0] * xs + h[1, 1] * ys + h[1, 2]) * scale
-                    k, m = math.floor(cs + 0.5), math.floor(rs + 0.5)
-                    fc = min(max(0.5 + (cs - k) / foot_c, 0.0), 1.0)
-                    fr = min(max(0.5 + (rs - m) / foot_r, 0.0), 1.0)
-                    k0, k1 = min(max(k, 0), last_column), min(max(k + 1, 0), last_column)
-                    m0, m1 = min(max(m, 0), last_row), min(max(m + 1, 0), last_row)
-                    w00, w01 = (1.0 - fr) * (1.0 - fc), (1.0 - fr) * fc
-                    w10, w11 = fr * (1.0 - fc), fr * fc
-                    p, q = i * subpixels + a, j * subpixels + b
-                    out[0, p, q] += (
-                        w00 * light[m0, k0]
-                        + w01 * light[m0, k1]
-                        + w10 * light[m1, k0]
-                        + w11 * light[m1, k1]
-                    )
-                    out[1, p, q] += (
-                        w00 * cover[m0, k0]
-                        + w01 * cover[m0, k1]
-                        + w10 * cover[m1, k0]
-                        + w11 * cover[m1, k1]
-                    )
+                    x = ray.x + du * ray.xu + dv * ray.xv
+                    y = ray.y + du * ray.yu + dv * ray.yv
+                    scale = 1.0 / (h[2, 0] * x + h[2, 1] * y + h[2, 2])
+                    c = (h[0, 0] * x + h[0, 1] * y + h[0, 2]) * scale
+                    r = (h[1, 0] * x + h[1, 1] * y + h[1, 2]) * scale
+                    light, cover = _sampled(plane, c, r, foot_c, foot_r)
+                    out[0, i * subpixels + a, j * subpixels + b] += light
+                    out[1, i * subpixels + a, j * subpixels + b] += cover
+    return buffer
 
 
 @numba.njit(cache=True, nogil=True)
 def sample_sphere(
-    grey: float,
-    centres: Array,
-    radius_m: float,
-    rays: Array,
-    left: int,
-    top: int,
-    subpixels: int,
-    out: NDArray[np.float32],
-) -> None:
-    """Adds a bright sphere to the sub-pixel buffer; `centres` (rows, 3) in the camera frame."""
+    grey: float, centres: Array, radius_m: float, rays: Array, buffer: Buffer
+) -> Buffer:
+    """The buffer with a bright sphere added (in place); `centres` (rows, 3) in the camera frame."""
+    out, left, top, subpixels = buffer
     rows = out.shape[1] // subpixels
     columns = out.shape[2] // subpixels
     height, width = rays.shape[0], rays.shape[1]
@@ -169,23 +233,19 @@ def sample_sphere(
                     part = min(max(0.5 + (limit - angle) / foot, 0.0), 1.0)
                     out[0, i * subpixels + a, j * subpixels + b] += grey * part
                     out[1, i * subpixels + a, j * subpixels + b] += part
+    return buffer
 
 
 @numba.njit(cache=True, nogil=True, fastmath={"reassoc", "contract"})
 def composite(
-    samples: NDArray[np.float32],
-    weights: NDArray[np.float32],
-    subpixels: int,
-    left: int,
-    top: int,
-    share: float,
-    image: NDArray[np.float32],
-) -> None:
-    """Gathers sub-pixels into pixels and lays them over `image` (h, w).
+    buffer: Buffer, weights: NDArray[np.float32], share: float, image: NDArray[np.float32]
+) -> NDArray[np.float32]:
+    """The image (h, w) with the buffer's pixels laid over it (in place).
 
-    The buffer starts at pixel (left, top); its outer pixels are only the filter's margin.
-    `share` scales light and coverage (one of several exposure samples: 1 / count).
+    The buffer's outer pixels are only the filter's margin. `share` scales light and coverage (one
+    of several exposure samples: 1 / count).
     """
+    samples, left, top, subpixels = buffer
     taps = weights.shape[0]
     margin = (taps // subpixels - 1) // 2
     rows, columns = samples.shape[1] // subpixels, samples.shape[2] // subpixels
@@ -213,6 +273,7 @@ def composite(
                 light += weights[k] * down[0, j * subpixels + k]
                 cover += weights[k] * down[1, j * subpixels + k]
             image[v, u] += share * (light - cover * image[v, u])
+    return image
 
 
 @numba.njit(cache=True, nogil=True)

@@ -19,6 +19,8 @@ from numpy.typing import NDArray
 from freeswing.calib.camera.camera import Camera
 from freeswing.vision.render.patterns import Patch, Sphere
 from freeswing.vision.render.render_kernels import (
+    Buffer,
+    Plane,
     composite,
     expose,
     gathering_weights,
@@ -221,7 +223,7 @@ class Renderer:
         if columns <= 2 * margin or rows <= 2 * margin:
             return
         s = self.look.subpixels
-        samples = np.zeros((2, rows * s, columns * s), dtype=np.float32)
+        buffer = Buffer(np.zeros((2, rows * s, columns * s), dtype=np.float32), left, top, s)
         span = self.look.white - self.look.black
         light = np.pad(self.look.black + span * patch.cells, 1)
         cover = np.pad(np.ones(patch.cells.shape), 1)
@@ -234,8 +236,8 @@ class Renderer:
             inverse = _per_row(
                 np.asarray(np.linalg.inv(_cells_to_camera(poses, patch)), float), rows
             )
-            sample_plane(light, cover, inverse, self._rays, left, top, s, samples)
-        composite(samples, self._weights, s, left, top, 1.0 / len(exposures), image)
+            buffer = sample_plane(Plane(light, cover, inverse), self._rays, buffer)
+        composite(buffer, self._weights, 1.0 / len(exposures), image)
 
     def _draw_sphere(self, image: NDArray[np.float32], sphere: Sphere, time_s: float) -> None:
         around = sphere.position_m + sphere.diameter_m * 0.75 * np.vstack([np.eye(3), -np.eye(3)])
@@ -244,7 +246,7 @@ class Renderer:
         if columns <= 2 * margin or rows <= 2 * margin:
             return
         s = self.look.subpixels
-        samples = np.zeros((2, rows * s, columns * s), dtype=np.float32)
+        buffer = Buffer(np.zeros((2, rows * s, columns * s), dtype=np.float32), left, top, s)
         span = self.look.white - self.look.black
         grey = self.look.black + span * sphere.reflectance
         exposures = self._exposures(moves=sphere.parent == "platform")
@@ -252,8 +254,8 @@ class Renderer:
             times = self._row_times(time_s, top, rows, exposure)
             poses = self._parents_in_camera(sphere.parent, times)
             centres = _per_row(poses[:, :3, :3] @ sphere.position_m + poses[:, :3, 3], rows)
-            sample_sphere(grey, centres, sphere.diameter_m / 2, self._rays, left, top, s, samples)
-        composite(samples, self._weights, s, left, top, 1.0 / len(exposures), image)
+            buffer = sample_sphere(grey, centres, sphere.diameter_m / 2, self._rays, buffer)
+        composite(buffer, self._weights, 1.0 / len(exposures), image)
 
 
 def _per_row(values: Array, rows: int) -> Array:

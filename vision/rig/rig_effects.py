@@ -21,7 +21,15 @@ from freeswing.vision.fuse.linearised_block import linearised
 from freeswing.vision.fuse.poses import Poses
 from freeswing.vision.fuse.run_views import CameraViews
 from freeswing.vision.look.watched_target import Watch
-from freeswing.vision.rig.rig_kernels import CLOCK, LINE, PER_CAMERA, POSE, add_rig_equations
+from freeswing.vision.rig.rig_kernels import (
+    CLOCK,
+    LINE,
+    PER_CAMERA,
+    POSE,
+    RigEquations,
+    RigSightings,
+    add_rig_equations,
+)
 from freeswing.vision.settings import SURVEY_STD_M
 
 Array = NDArray[np.float64]
@@ -159,7 +167,7 @@ def rig_step(
     """Solves for the rig's numbers marked in `free` (n_c, 8), the poses eliminated."""
     n_c = len(views)
     size = PER_CAMERA * n_c
-    normal, right = np.zeros((size, size)), np.zeros(size)
+    sums = RigEquations(np.zeros((size, size)), np.zeros(size))
     focal = np.array([v.camera.focal_px.mean() for v in views])
     offsets = np.array([v.camera.T_camera_base[:3, 3] for v in views])
     for block in blocks(views, watch, poses.times_s, poses):
@@ -172,11 +180,11 @@ def rig_step(
             2 * block.counts
         )
         weights = np.where(known[instant], 1.0 / np.maximum(1.0, scores / _KEEP_SCORE) ** 2, 0.0)
-        add_rig_equations(
-            block.starts, known, block.camera_of, block.counts, linear.residuals,
-            linear.jacobians, linear.rates, linear.places, offsets, block.rows_px, white, weights,
-            normal, right,
-        )  # fmt: skip
+        seen = RigSightings(
+            block.starts, known, block.camera_of, block.counts, block.rows_px, white, weights
+        )
+        sums = add_rig_equations(sums, seen, linear, offsets)
+    normal, right = sums
     for index, view in enumerate(views):
         more, also = base_equations(view, watch, survey_std_m)
         span = slice(PER_CAMERA * index + POSE, PER_CAMERA * (index + 1))

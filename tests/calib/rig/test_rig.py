@@ -15,11 +15,11 @@ from freeswing.calib.rig.reprojection import (
     Scene,
     board_residuals,
     camera_slices,
-    kernel_board,
-    kernel_cameras,
+    kernel_estimate,
+    kernel_views,
     moved,
 )
-from freeswing.calib.rig.reprojection_kernels import CLOCK, POSE, WARP, view_rows
+from freeswing.calib.rig.reprojection_kernels import WARP, local_rows
 from freeswing.calib.rig.solve_rig import free_unknowns, solve_rig, start_cameras, tie_to_base
 from freeswing.calib.rig.triangulation import triangulate
 from freeswing.calib.rig.views import FixedPoints
@@ -45,23 +45,7 @@ def edges_of(points):
 
 def rows_of(scene, points, views, index):
     """Derivatives of the projection in one view by its local unknowns, (2 n_points, n)."""
-    lenses, places = kernel_cameras(scene.cameras)
-    (poses, motion, scale), shape = kernel_board(scene, points)
-    c, piece = views.camera[index], views.piece[index]
-    columns = lenses[3][c] + POSE + CLOCK + WARP + scene.board_unknowns
-    rows, residuals = np.zeros((2 * len(points), columns)), np.zeros(2 * len(points))
-    view_rows(
-        views.pixels[index],
-        views.lag_s[index],
-        tuple(part[c] for part in lenses[:4]),
-        tuple(part[c] for part in places),
-        (poses[piece], motion[piece], scale),
-        shape,
-        True,
-        rows,
-        residuals,
-    )
-    return rows
+    return local_rows(kernel_views(views), kernel_estimate(scene, points), index)
 
 
 @pytest.mark.parametrize("degree", [0, 3])

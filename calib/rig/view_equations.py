@@ -1,0 +1,159 @@
+"""Normal equations of all views of a board: whitened, weighted rows, summed view by view."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numba
+import numpy as np
+
+from freeswing.calib.rig.kernel_inputs import Array, Estimate, Ints, ViewArrays
+from freeswing.calib.rig.reprojection_kernels import (
+    CLOCK,
+    POSE,
+    WARP,
+    new_spare,
+    view_of,
+    view_rows,
+)
+
+
+class Normal(NamedTuple):
+    """Blocks of the normal equations, J'WJ and J'Wr of shared unknowns and boards; and the cost.
+
+    Attributes:
+        shared: (p, p).
+        cross: (n_pieces, p, b).
+        boards: (n_pieces, b, b).
+        shared_slope: (p,).
+        board_slopes: (n_pieces, b).
+        cost: half the sum of squares, robust.
+    """
+
+    shared: Array
+    cross: Array
+    boards: Array
+    shared_slope: Array
+    board_slopes: Array
+    cost: float
+
+
+@numba.njit(cache=True, nogil=True)
+def _whiten(factor: Array, block: Array, spare: Array) -> None:
+    """Block <- factor @ block, for a lower triangle."""
+    size = len(factor)
+    for i in range(size - 1, -1, -1):
+        spare[:] = 0.0
+        for j in range(i + 1):
+            f = factor[i, j]
+            if f != 0.0:
+                for c in range(block.shape[1]):
+                    spare[c] += f * block[j, c]
+        block[i] = spare
+
+
+@numba.njit(cache=True, nogil=True, forceinline=True)
+def _weighted(
+    views: ViewArrays, v: int, rows: Array, spare: Array, sigma: float, knee: float, cost: float
+) -> tuple[int, float]:
+    """Whitens and weights the groups of corners seen in view v, at the front of `rows`, in place.
+
+    The residuals stand in the last column. Gives the number of rows in use and the cost with
+    theirs, infinite where a corner cannot be seen from where the estimate puts it.
+    """
+    whitening = views.whitening[v]
+    n_groups, size = whitening.shape[0], whitening.shape[1]
+    last = rows.shape[1] - 1
+    used = 0
+    for group in range(n_groups):
+        first = group * size
+        if not math.isfinite(views.pixels[v, first // 2, 0]):
+            continue
+        block = rows[used : used + size]
+        if used != first:
+            block[:] = rows[first : first + size]
+        _whiten(whitening[group], block, spare)
+        square = 0.0
+        for i in range(size):
+            square += block[i, last] ** 2
+        error = math.sqrt(square) / sigma
+        if not math.isfinite(error):
+            return used, math.inf
+        weight = 1.0 / sigma
+        if error > knee:
+            cost += knee * error - 0.5 * knee * knee
+            weight *= math.sqrt(knee / error)
+        else:
+            cost += 0.5 * error * error
+        block *= weight
+        used += size
+    return used, cost
+
+
+@numba.njit(cache=True, nogil=True, forceinline=True)
+def _targets(first: int, own: int, warp_at: int) -> Ints:
+    """Where a view's columns before the board's stand among the shared unknowns."""
+    target = np.empty(own + WARP, dtype=np.int64)
+    for j in range(own):
+        target[j] = first + j
+    for j in range(WARP):
+        target[own + j] = warp_at + j
+    return target
+
+
+@numba.njit(cache=True, nogil=True, forceinline=True)
+def _add_gram(gram: Array, target: Ints, piece: int, into: Normal) -> None:
+    """Adds one view's rows' products to the blocks they belong to."""
+    n_shared, last = len(target), len(gram) - 1
+    width = last - n_shared
+    for i in range(n_shared):
+        a = target[i]
+        into.shared_slope[a] += gram[i, last]
+        for j in range(n_shared):
+            into.shared[a, target[j]] += gram[i, j]
+        for j in range(width):
+            into.cross[piece, a, j] += gram[i, n_shared + j]
+    for i in range(width):
+        into.board_slopes[piece, i] += gram[n_shared + i, last]
+        for j in range(width):
+            into.boards[piece, i, j] += gram[n_shared + i, n_shared + j]
+
+
+@numba.njit(cache=True, nogil=True)
+def view_equations(
+    views: ViewArrays, estimate: Estimate, sigma: Array, knee: float, warp_at: int, unknowns: int
+) -> Normal:
+    """Normal equations of all views, their cost infinite where one cannot be seen.
+
+    Args:
+        views: the board's.
+        estimate: where everything is believed to be.
+        sigma: each camera's noise, px, (n_c,).
+        knee: of Huber's loss, for the length of a group's whitened residual over sigma.
+        warp_at: first column of the warp among the shared unknowns.
+        unknowns: p, how many shared ones there are.
+    """
+    n, width = len(estimate.boards.poses), 6 * (1 + estimate.boards.motions.shape[1])
+    n_points = views.pixels.shape[1]
+    shared, cross = np.zeros((unknowns, unknowns)), np.zeros((n, unknowns, width))
+    boards, slope = np.zeros((n, width, width)), np.zeros(unknowns)
+    found = Normal(shared, cross, boards, slope, np.zeros((n, width)), 0.0)
+    residuals = np.zeros(2 * n_points)
+    rows, spare, scratch = np.zeros((1, 1)), np.zeros(1), new_spare()
+    cost = 0.0
+    for v in range(len(views.camera)):
+        c = views.camera[v]
+        own = estimate.lenses.counts[c] + POSE + CLOCK
+        wide = own + WARP + width + 1
+        if wide != rows.shape[1]:
+            rows, spare = np.zeros((2 * n_points, wide)), np.zeros(wide)
+        view_rows(view_of(views, estimate, v), True, rows, residuals, scratch)
+        rows[:, wide - 1] = residuals
+        used, cost = _weighted(views, v, rows, spare, float(sigma[c]), knee, cost)
+        if not math.isfinite(cost):
+            break
+        some = rows[:used]
+        target = _targets(estimate.lenses.first[c], own, warp_at)
+        _add_gram(np.dot(some.T, some), target, views.piece[v], found)
+    return Normal(shared, cross, boards, slope, found.board_slopes, cost)
