@@ -61,6 +61,19 @@ class CalibrationResult:
     refused: str | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class PlumbLine:
+    """Hanging strings, and the gravity that is held against them.
+
+    Attributes:
+        path: points clicked along them, see `calib.verdict.plumb_line_file`.
+        gravity_m_s2: as declared, in the base frame, (3,).
+    """
+
+    path: Path | str
+    gravity_m_s2: Sequence[float] | Array = (0.0, 0.0, -STANDARD_GRAVITY_M_S2)
+
+
 def calibrate_session(
     recordings: Path | str,
     board: Board | Mapping[str, object],
@@ -70,8 +83,7 @@ def calibrate_session(
     kept_boards: Path | str | None = None,
     model: str = DEFAULT_MODEL,
     survey_std_m: float | None = None,
-    plumb_line: Path | str | None = None,
-    gravity_m_s2: Sequence[float] | Array = (0.0, 0.0, -STANDARD_GRAVITY_M_S2),
+    plumb_line: PlumbLine | None = None,
     progress: Progress | None = None,
 ) -> CalibrationResult:
     """Calibrate cameras, clocks and base frame from recordings of a board.
@@ -93,9 +105,7 @@ def calibrate_session(
             goes on; None for none.
         model: lens model of every camera.
         survey_std_m: standard deviation of a surveyed coordinate; measured from the fit when None.
-        plumb_line: points clicked along hanging strings, see `calib.verdict.plumb_line_file`, or
-            None.
-        gravity_m_s2: declared gravity in the base frame, which they are held against, (3,).
+        plumb_line: hanging strings, or None.
         progress: told a label and the fraction done.
 
     Raises:
@@ -108,7 +118,7 @@ def calibrate_session(
     told("finding the board", 0.0)
     found = find_recordings(recordings)
     names = [recording.name for recording in found]
-    strings = () if plumb_line is None else read_plumb_line(plumb_line, names)
+    strings = () if plumb_line is None else read_plumb_line(plumb_line.path, names)
     sightings = see_boards(
         found,
         board,
@@ -125,12 +135,8 @@ def calibrate_session(
     survey: SurveyCheck | None = None
     if base_tags:
         told("base tags", 0.8)
-        stills = [camera.still_frames for camera in sightings]
-        seen = find_base_tags(rig.cameras, stills, base_tags, rig.adjustment.sigma_px, std)
-        warnings += _moved_warnings(seen.moved)
-        survey = check_survey(rig.cameras, seen.fixed)
-        if not survey.reasons:
-            rig = tie_to_base(rig, seen.fixed, estimate_survey=survey_std_m is None)
+        rig, survey, moved = _tied(rig, sightings, base_tags, std, measured=survey_std_m is None)
+        warnings += moved
     else:
         warnings.append(_no_base_warning(rig.cameras[rig.reference].name))
     told("checking against truth", 0.9)
@@ -139,13 +145,10 @@ def calibrate_session(
     warnings += [*_group_warnings(rig), *clock_warnings(rig), *lens_warnings(rig.cameras, lenses)]
     verdict = replace(verdict, warnings=(*warnings, *verdict.warnings))
     vertical: dict[str, Any] = {}
-    if strings and verdict.usable:
-        vertical = _vertical(rig, strings, np.asarray(gravity_m_s2, dtype=np.float64))
-        if vertical["verdict"] != "agrees":
-            verdict = replace(verdict, warnings=(*verdict.warnings, vertical["sentence"]))
-    document = _document(rig, board, sightings, verdict)
-    if vertical:
-        document["vertical"] = vertical
+    if plumb_line is not None and strings and verdict.usable:
+        gravity = np.asarray(plumb_line.gravity_m_s2, dtype=np.float64)
+        verdict, vertical = _with_vertical(verdict, rig, strings, gravity)
+    document = {**_document(rig, board, sightings, verdict), **vertical}
     for entry, choice in zip(document["cameras"], lenses, strict=True):
         entry["lens_models_held_out_px"] = choice.held_out_px
     told("calibrated", 1.0)
@@ -153,9 +156,32 @@ def calibrate_session(
     return CalibrationResult(rig.cameras, document, rig, None if verdict.usable else why)
 
 
-def _vertical(rig: Rig, strings: tuple[StringView, ...], gravity_m_s2: Array) -> dict[str, Any]:
-    vertical = find_vertical(rig.cameras, strings, camera_covariance(rig))
-    return vertical_entry(vertical, strings, gravity_m_s2)
+def _tied(
+    rig: Rig,
+    sightings: tuple[Sightings, ...],
+    base_tags: Sequence[SurveyedTag],
+    std_m: float,
+    *,
+    measured: bool,
+) -> tuple[Rig, SurveyCheck, list[str]]:
+    """The rig in the base tags' frame where their survey makes sense; and who moved."""
+    stills = [camera.still_frames for camera in sightings]
+    seen = find_base_tags(rig.cameras, stills, base_tags, rig.adjustment.sigma_px, std_m)
+    survey = check_survey(rig.cameras, seen.fixed)
+    if not survey.reasons:
+        rig = tie_to_base(rig, seen.fixed, estimate_survey=measured)
+    return rig, survey, _moved_warnings(seen.moved)
+
+
+def _with_vertical(
+    verdict: Verdict, rig: Rig, strings: tuple[StringView, ...], gravity_m_s2: Array
+) -> tuple[Verdict, dict[str, Any]]:
+    """The verdict with what the strings say against the gravity, and `vertical` of the document."""
+    found = find_vertical(rig.cameras, strings, camera_covariance(rig))
+    vertical = vertical_entry(found, strings, gravity_m_s2)
+    if vertical["verdict"] != "agrees":
+        verdict = replace(verdict, warnings=(*verdict.warnings, vertical["sentence"]))
+    return verdict, {"vertical": vertical}
 
 
 def rig_from_sightings(

@@ -39,20 +39,19 @@ def run(options: Namespace, console: Console) -> None:
 
 def make(session: Session, console: Console, settings: dict[str, Any], crew: Crew) -> Made:
     """calibration.json as a document, and cameras.toml where it may be used."""
-    from freeswing.calib.calibrate import KEPT_BOARDS, calibrate_session
+    from freeswing.calib.calibrate import KEPT_BOARDS, PlumbLine, calibrate_session
     from freeswing.calib.camera.cameras_file import cameras_text
     from freeswing.cdpr.files.documents import InputError
     from freeswing.cdpr.files.robot_file import read_robot
-    from freeswing.cdpr.robot import STANDARD_GRAVITY_M_S2
     from freeswing.results.calibration import Calibration
     from freeswing.session.made import Made
 
     source = session.calibration
     if source is None or source.recordings is None or source.board is None:
         raise InputError(f"{session.path}: [calibration] names no recordings and no board")
-    gravity_m_s2 = (0.0, 0.0, -STANDARD_GRAVITY_M_S2)
+    plumb_line = None
     if source.plumb_line is not None:
-        gravity_m_s2 = read_robot(session.robot).gravity_m_s2
+        plumb_line = PlumbLine(source.plumb_line, read_robot(session.robot).gravity_m_s2)
     found = calibrate_session(
         source.recordings,
         source.board,
@@ -60,8 +59,7 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
         frame_rate_hz=session.frame_rate_hz,
         kept_boards=session.results / KEPT_BOARDS,
         model=settings["model"],
-        plumb_line=source.plumb_line,
-        gravity_m_s2=gravity_m_s2,
+        plumb_line=plumb_line,
         progress=console.progress,
     )
     if found.refused is not None:
