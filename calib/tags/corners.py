@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.calib.camera.camera import Camera
-from freeswing.calib.tags.corner_kernels import fit_pattern
+from freeswing.calib.tags.corner_kernels import TagImage
 from freeswing.calib.tags.gaussian_tables import TABLES
+from freeswing.calib.tags.pattern_fit import Search, fit_pattern
 from freeswing.calib.tags.tag_map import corners_of_map
 from freeswing.calib.tags.tag_patterns import tag_cells
 
@@ -166,25 +167,20 @@ def fit_tag(
         start = square_map(corner_rays, float(n))
     except (ValueError, np.linalg.LinAlgError):
         return None
-    pattern_from_ray, covariance, state, figures = fit_pattern(
-        image,
-        rays,
+    box = np.array([left, top, right, bottom], dtype=np.int64)
+    guess = np.array([before[0], before[1], before[3]]) if before else _NO_GUESS
+    fitted = fit_pattern(
+        TagImage(image, rays, ray_step, cells, box, *TABLES),
         start,
-        ray_step,
-        cells,
-        np.array(blurs_px),
-        np.array([left, top, right, bottom], dtype=np.int64),
-        noise,
-        float(most_pixels),
-        np.array([before[0], before[1], before[3]]) if before else _NO_GUESS,
-        TABLES,
+        Search(np.array(blurs_px), noise, float(most_pixels), guess),
     )
-    if figures[1] < _LEAST_EXPLAINED or state[1] < _LEAST_CONTRAST:
+    black, contrast, blur_px = (float(number) for number in fitted.state)
+    if fitted.explained < _LEAST_EXPLAINED or contrast < _LEAST_CONTRAST:
         return None
-    found, spread, narrowest = corners_of_map(pattern_from_ray, covariance, n)
+    found, spread, narrowest = corners_of_map(fitted.pattern_from_ray, fitted.covariance, n)
     area = ray_step[0, 0] * ray_step[1, 1] - ray_step[0, 1] * ray_step[1, 0]
     pixel_ray = float(np.sqrt(abs(area)))
-    crowded = _CROWDED_CELLS - narrowest / pixel_ray / n / float(state[2])
+    crowded = _CROWDED_CELLS - narrowest / pixel_ray / n / blur_px
     if crowded > _TOO_CROWDED:
         return None
     if crowded > 0.0:
@@ -192,12 +188,12 @@ def fit_tag(
     return TagFit(
         found,
         spread,
-        float(state[0]),
-        float(state[1]),
-        float(state[2]),
-        float(figures[0]),
-        float(figures[1]),
-        int(figures[2]),
+        black,
+        contrast,
+        blur_px,
+        fitted.noise,
+        fitted.explained,
+        int(fitted.pixels),
     )
 
 
