@@ -16,6 +16,7 @@ from freeswing.report.panels.answer import Answer
 from freeswing.report.panels.bench import BenchPanel
 from freeswing.report.panels.cameras import Cameras
 from freeswing.report.panels.change import Change
+from freeswing.report.panels.decay import SwingDecay
 from freeswing.report.panels.dropped import Dropped
 from freeswing.report.panels.geometry import Geometry
 from freeswing.report.panels.ladder import EffectLadder
@@ -57,6 +58,7 @@ PANELS: tuple[Panel, ...] = (
     EffectLadder(),
     Geometry(),
     Change(),
+    SwingDecay(),
     Advice(),
     Swings(),
     Cameras(),

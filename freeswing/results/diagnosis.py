@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from freeswing.results.codec import Document, Entry, absent, empty, entry
+from freeswing.results.codec import Document, Entry, Numbers, absent, empty, entry
 from freeswing.results.common import FoundEffect, Parameter
 
 
@@ -82,6 +82,25 @@ class Unexplained(Entry):
 
 
 @entry
+class Decay(Entry):
+    """How one swing dies away: root mean square speeds in parts of the run, m/s.
+
+    Attributes:
+        run: its name.
+        times_s: middles of the parts, from the start of the swing.
+        measured_m_s: of a point mass of the measured kinetic energy.
+        before_m_s: of the declared model.
+        after_m_s: of the one that was found.
+    """
+
+    run: str
+    times_s: Numbers = ()
+    measured_m_s: Numbers = ()
+    before_m_s: Numbers = ()
+    after_m_s: Numbers = ()
+
+
+@entry
 class Diagnosis(Document):
     """What `freeswing diagnose` found.
 
@@ -96,6 +115,7 @@ class Diagnosis(Document):
         parameters_moved_percent: by name.
         ladder: the models in between.
         unexplained: what remains.
+        decay: how each fitted swing dies away.
         lengths: what the constancy of cable lengths says without any dynamics.
         notes: sentences about the session.
     """
@@ -112,5 +132,6 @@ class Diagnosis(Document):
     parameters_moved_percent: Mapping[str, float | None] = empty(default_factory=dict)
     ladder: tuple[HeldOut, ...] = ()
     unexplained: Unexplained | None = None
+    decay: tuple[Decay, ...] = absent(default=())
     lengths: Any = absent(default=None)
     notes: tuple[str, ...] = ()

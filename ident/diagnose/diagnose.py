@@ -13,6 +13,7 @@ from freeswing.cdpr.effects import Recorded, catalogue, effect_named
 from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.model.equations import build_model
 from freeswing.cdpr.robot import INERTIA_NAMES, POSE_COORDINATES, Array, Robot
+from freeswing.ident.diagnose.answer.decay import swing_decay
 from freeswing.ident.diagnose.answer.deviations import directions, honest_covariance
 from freeswing.ident.diagnose.base import base_fit, refuse_few
 from freeswing.ident.diagnose.decision import LEAST_SHARE_EXPLAINED, Candidate, excess_of
@@ -97,6 +98,7 @@ class Diagnosis:
                 "signature": self.unexplained.signature,
                 "evidence": self.unexplained.evidence,
             },
+            "decay": swing_decay(self.first, self.final),
             **({} if self.kinematics is None else {"lengths": self.kinematics.document()}),
             "notes": list(self.notes),
         }

@@ -179,6 +179,16 @@ def _diagnosis() -> dict[str, Any]:
             "evidence": {"frequency_hz": 7.3, "coordinate": "chi"},
         },
         "lengths": _lengths(),
+        "decay": [
+            {
+                "run": f"swing-{k}",
+                "times_s": [1.0, 3.0, 5.0],
+                "measured_m_s": [0.1 * (k + 1), 0.08 * (k + 1), 0.07 * (k + 1)],
+                "before_m_s": [0.1 * (k + 1)] * 3,
+                "after_m_s": [0.1 * (k + 1), 0.081 * (k + 1), None],
+            }
+            for k in range(8)
+        ],
     }
 
 

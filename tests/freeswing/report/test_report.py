@@ -28,8 +28,8 @@ FLAGS = (
     "--enable-logging=stderr",
     "--v=0",
 )
-FIGURES = 17
-DRAWINGS = 59  # the small ones that wrap on a phone
+FIGURES = 18
+DRAWINGS = 60  # the small ones that wrap on a phone
 VOID = {"meta", "link", "br", "img", "hr", "input"}
 
 
@@ -81,7 +81,7 @@ def test_sections_stand_in_reading_order(page: str) -> None:
     places = [page.index(f'<section id="{name}">') for name in shown]
     assert places == sorted(places)
     assert "The bench" not in page, "neither the section nor its link where nothing is for it"
-    order = "answer bench sure ladder geometry change next swings cameras markers dropped"
+    order = "answer bench sure ladder geometry change decay next swings cameras markers dropped"
     assert [panel.name for panel in PANELS] == [*order.split(), "provenance"]
 
 
@@ -227,3 +227,9 @@ def test_places_that_are_off_stand_with_what_replaces_them_and_runs_with_their_t
     assert "2.30 ± 3.72; -5.40 ± 5.88; -4.00 ± 3.33" in page
     assert "or anchor offset of 2" in page
     assert ">9.0</td>" in page
+
+
+def test_what_each_run_loses_stands_beside_what_the_models_lose(page: str) -> None:
+    assert "How the swings die away" in page
+    row = page[page.index(">swing-7</td>") :]
+    assert row.index(">30</td>") < row.index(">0.0</td>")
