@@ -80,8 +80,12 @@ def _estimate(found: Estimate) -> dict[str, Any]:
     std = np.where(found.determined, np.sqrt(np.maximum(np.diag(found.covariance), 0.0)), np.inf)
     safe = np.where(np.isfinite(found.covariance), found.covariance, 0.0)
     size = np.where(np.isfinite(std) & (std > 0.0), std, 1.0)
+    parameters = _parameters(found.asked.names, found.values, std, found.on_bound)
+    for one, group in zip(parameters, found.asked.groups, strict=True):
+        if len(group.members) > 1:
+            one["tied"] = list(group.members[1:])
     return {
-        "parameters": _parameters(found.asked.names, found.values, std, found.on_bound),
+        "parameters": parameters,
         "correlation": safe / np.outer(size, size),
         "condition": found.found.condition,
         "iterations": found.found.iterations,

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from freeswing.servo.design.mpc import Predictor
 from freeswing.servo.design.plant import CONTROL_RATE_HZ, Plant
 from freeswing.servo.synthesis.discretise import zero_order_hold
 from freeswing.servo.synthesis.loop import Loop, examine
@@ -20,7 +21,7 @@ class Controller:
     """From the pose error [x y z roll pitch yaw] to the change of the wrench F_ev.
 
     Attributes:
-        method: "hinf", "pid", "lqg" or "joint-pid" (its error is the motors', not the pose's).
+        method: one of `family.METHODS`; the error of "joint-pid" is the motors', not the pose's.
         system: continuous.
         sampled: the same at the control rate.
         at: the pose that it was designed about, (6,).
@@ -30,6 +31,8 @@ class Controller:
         delay_s: mean age of poses plus half a hold of the wrench.
         facts: what its method has to say, such as gamma.
         warnings: sentences.
+        carried: designed for poses that the encoders carry on to now.
+        predictor: of a predictive controller, else None.
     """
 
     method: str
@@ -42,6 +45,8 @@ class Controller:
     delay_s: float
     facts: dict[str, float] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
+    carried: bool = False
+    predictor: Predictor | None = None
 
 
 def finished(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,17 +26,23 @@ class Order:
         at: [x y z roll pitch yaw] to design about.
         states: of the reduced H-infinity controller; None keeps all.
         noise_std: of the poses: position, angle.
+        by_encoders: the loop carries poses on to now by the encoders: they are noisy, not late.
     """
 
     goals: Goals
     at: tuple[float, ...] = (0.0,) * 6
     states: int | None = None
     noise_std: tuple[float, float] = (POSITION_STD_M, ANGLE_STD_RAD)
+    by_encoders: bool = False
+
+    @property
+    def delay_s(self) -> float:
+        """How old poses are on average; the paper's camera where none is given."""
+        return 0.0 if self.by_encoders else (self.goals.camera or USUAL_CAMERA).delay_s
 
     def plant(self, model: DrivenModel, theta: Array | None = None) -> Plant:
-        """The robot about the pose, with the camera's delay (the paper's where none is given)."""
-        camera = self.goals.camera or USUAL_CAMERA
-        return plant_at(model, np.array(self.at), camera.delay_s, theta)
+        """The robot about the pose, with the poses' delay."""
+        return plant_at(model, np.array(self.at), self.delay_s, theta)
 
 
 def offer(model: DrivenModel, method: str, order: Order) -> Controller:
@@ -49,12 +55,13 @@ def offer(model: DrivenModel, method: str, order: Order) -> Controller:
     gear = -survey.here(np.array(order.at)).wrench_matrix.T / survey.motors.torque_N_m_A[:, None]
     camera = order.goals.camera or USUAL_CAMERA
     noise = Noise(np.repeat(order.noise_std, 3), camera.period_s)
-    return design(
+    found = design(
         method,
         order.plant(model),
         order.goals.weights,
         noise,
         gear,
-        with_delay=order.goals.camera is not None,
+        with_delay=order.goals.camera is not None and not order.by_encoders,
         order=order.states,
     )
+    return replace(found, carried=order.by_encoders and method != "joint-pid")

@@ -1,6 +1,7 @@
 """One rule for all controllers: as fast as margins and noise allow.
 
-Each of the other controllers has two speeds, of positions and of orientations. Each is made as
+Each controller has two speeds, of positions and of orientations; those of H-infinity are the
+rates of its weights, as shares of those given. Each is made as
 large as it can be while, with the poses as old as they are and white noise on them, the modulus
 margin of its half stays above `LEAST_MARGIN` and the wrench that the noise alone commands stays
 below `MOST_NOISE`.
@@ -71,6 +72,7 @@ def fastest(
     noise: Noise,
     *,
     tied: bool = False,
+    grid: Array = SPEEDS_RAD_S,
 ) -> Array:
     """The speeds of the rule, (6,): the largest that keep it, looked for from above.
 
@@ -80,6 +82,7 @@ def fastest(
         late: age of poses when they are used.
         noise: of the poses.
         tied: positions and orientations have one speed.
+        grid: speeds to choose from, rising; in rad/s, or as shares of a design's own.
 
     Raises:
         ValueError: where none keeps the rule.
@@ -87,18 +90,18 @@ def fastest(
     response = plant.system.at(RATES_RAD_S)
 
     def keeps(position: int, orientation: int) -> bool:
-        speeds = SPEEDS_RAD_S[[position] * 3 + [orientation] * 3]
+        speeds = grid[[position] * 3 + [orientation] * 3]
         seen = look(plant, response, make(speeds), late, noise)
         small = np.array(seen.noise) <= MOST_NOISE
         return seen.stable and min(seen.margins) >= LEAST_MARGIN and bool(small.all())
 
-    falling = range(len(SPEEDS_RAD_S) - 1, -1, -1)
+    falling = range(len(grid) - 1, -1, -1)
     position = next((i for i in falling if keeps(i, i if tied else 0)), None)
     if position is None:
         raise ValueError(
-            f"no speed from {SPEEDS_RAD_S[0]:g} to {SPEEDS_RAD_S[-1]:g} rad/s keeps a modulus "
+            f"no speed from {grid[0]:g} to {grid[-1]:g} keeps a modulus "
             f"margin of {LEAST_MARGIN} at {1e3 * late:.1f} ms with a noise-borne wrench below "
             f"{MOST_NOISE[0]:g} N and {MOST_NOISE[1]:g} N m"
         )
     orientation = position if tied else next(i for i in falling if keeps(position, i))
-    return SPEEDS_RAD_S[[position] * 3 + [orientation] * 3]
+    return grid[[position] * 3 + [orientation] * 3]

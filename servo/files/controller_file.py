@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import io
 import json
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ import numpy as np
 from freeswing.cdpr.files.documents import read_text
 from freeswing.cdpr.files.problems import InputError
 from freeswing.servo.design.controller import Controller
+from freeswing.servo.design.mpc import Predictor
 from freeswing.servo.synthesis.loop import Loop
 from freeswing.servo.synthesis.state_space import Array, StateSpace
 
@@ -52,6 +54,11 @@ def to_document(found: Controller) -> dict[str, Any]:
         },
         "warnings": list(found.warnings),
     }
+    if found.carried:
+        document["carried_by_encoders"] = True
+    if found.predictor is not None:
+        parts = {one.name: getattr(found.predictor, one.name) for one in fields(Predictor)}
+        document["predictor"] = {name: matrix.tolist() for name, matrix in parts.items()}
     document |= {key: value for key, value in found.facts.items() if key != "gamma"}
     return document
 
@@ -65,12 +72,25 @@ def _pair(loop: Loop, key: str) -> dict[str, float]:
 
 @dataclass(frozen=True, slots=True)
 class Stored:
-    """A controller as a file gives it."""
+    """A controller as a file gives it.
+
+    Attributes:
+        method: its name.
+        system: sampled, pose error to wrench.
+        wrench: F_ev that holds the pose of the design, (6,).
+        joint: it works on the motors' angles instead of the pose.
+        carried: it was designed for poses that the encoders carry on to now.
+        at: the pose of the design, (6,).
+        predictor: of a predictive controller, else None.
+    """
 
     method: str
     system: StateSpace
     wrench: Array
-    by_encoders: bool
+    joint: bool = False
+    carried: bool = False
+    at: Array = field(default_factory=lambda: np.zeros(6))
+    predictor: Predictor | None = None
 
 
 def read_controller(path: Path | str) -> Stored:
@@ -94,14 +114,41 @@ def read_controller(path: Path | str) -> Stored:
         order = int(table["order"])
         shapes = ((order, order), (order, 6), (6, order), (6, 6))
         A, B, C, D = (m.reshape(s) for m, s in zip(matrices, shapes, strict=True))
-        wrench = np.array(table["operating_point"]["wrench"], dtype=np.float64).reshape(6)
+        point = table["operating_point"]
+        wrench = np.array(point["wrench"], dtype=np.float64).reshape(6)
+        at = np.array([*point["position_m"], *point["angles_rad"]], dtype=np.float64).reshape(6)
         system = StateSpace(A, B, C, D, 1.0 / rate)
         method = str(table.get("method", "hinf"))
+        predictor = _predictor(table.get("predictor"), order)
     except (KeyError, TypeError, ValueError, ZeroDivisionError) as error:
         raise InputError(
             f"{path}: not a controller of 6 errors and 6 wrenches: {error!r}"
         ) from error
-    return Stored(method, system, wrench, method == "joint-pid")
+    carried = table.get("carried_by_encoders") is True
+    return Stored(method, system, wrench, method == "joint-pid", carried, at, predictor)
+
+
+def _predictor(table: Mapping[str, Any] | None, order: int) -> Predictor | None:
+    """The matrices of a predictive controller.
+
+    Raises:
+        KeyError, TypeError, ValueError: where one is missing or of another shape.
+    """
+    if table is None:
+        return None
+    m, n = 12, order
+    shapes = {
+        "A": (n, n), "B": (n, 6), "C": (6, n), "observer": (n, 6), "step_A": (m, m),
+        "step_B": (m, 6), "gain": (6, m), "state_cost": (m, m), "wrench_cost": (6, 6),
+        "end_cost": (m, m), "by_pose": (m + 6, 6), "by_outside": (m + 6, 6),
+    }  # fmt: skip
+    parts = {}
+    for name, shape in shapes.items():
+        matrix = np.array(table[name], dtype=np.float64)
+        if matrix.shape != shape or not np.isfinite(matrix).all():
+            raise ValueError(f"predictor.{name} must be {shape[0]} by {shape[1]} finite numbers")
+        parts[name] = matrix
+    return Predictor(**parts)
 
 
 def npz_bytes(found: Controller) -> bytes:

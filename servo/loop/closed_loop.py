@@ -10,6 +10,7 @@ from freeswing.cdpr.driven.model import DrivenModel
 from freeswing.cdpr.driven.motion import Stepper
 from freeswing.cdpr.model.batch import evaluate
 from freeswing.servo.design.plant import CONTROL_RATE_HZ
+from freeswing.servo.design.schedule import Schedule
 from freeswing.servo.files.task_file import Task
 from freeswing.servo.loop.camera import CameraFeed, Sighting
 from freeswing.servo.loop.friction import FrictionFeed
@@ -38,6 +39,7 @@ class Loop:
         friction: fed forward, or None.
         by_encoders: carry each pose on to now by what the encoders have turned since.
         joint: the regulator works on motor angles turned into a pose error by the encoders alone.
+        schedule: turns the regulator's wrench into that of each place, or None.
         seed: of the camera's noise.
     """
 
@@ -49,6 +51,7 @@ class Loop:
     friction: FrictionFeed | None = None
     by_encoders: bool = False
     joint: bool = False
+    schedule: Schedule | None = None
     seed: int = 0
 
 
@@ -162,6 +165,7 @@ class _Brain:
         self._here = self._survey.here(start)
         self._zero_lengths = self._here.lengths_m
         self._inverse = self._pose_from_angles()
+        self._turn = self._scheduled(start)
         self._angles, self._rates = np.zeros(n), np.zeros(n)
         self._asked, self._asked_angles = start, np.zeros(n)
 
@@ -171,7 +175,11 @@ class _Brain:
         """The wrench commanded and the currents for it."""
         new = self._feed.look(time_s, pose, angles)
         if new:
-            self._here = self._survey.here(self._feed.latest.pose)
+            # Tensions that balance each other at an old pose push at the new one: where the
+            # encoders know the new one, it is taken.
+            known = self._known_pose(angles)
+            self._here = self._survey.here(known)
+            self._turn = self._scheduled(known)
             if self._loop.by_encoders:
                 self._inverse = self._pose_from_angles()
         if not np.array_equal(asked, self._asked):
@@ -179,19 +187,29 @@ class _Brain:
             lengths = self._survey.lengths_m(pose7(asked))
             self._asked_angles = (self._zero_lengths - lengths) / self._motors.drum_m
         self._follow(angles)
-        change = self._loop.regulator.wrench(self._error(asked, angles), new)
-        wrench = self._loop.rest_wrench + change
+        rest, turn = self._loop.rest_wrench, self._turn
+        change = self._loop.regulator.wrench(self._error(asked, angles), asked, new)
+        wrench = rest + (change if turn is None else turn @ change)
         answer = _distributed(self._here, self._motors, wrench)
-        self._loop.regulator.applied(answer.scale * wrench - self._loop.rest_wrench)
+        given = answer.scale * wrench - rest
+        self._loop.regulator.applied(given if turn is None else np.linalg.solve(turn, given))
         return wrench, self._with_friction(answer, angles)
 
     def _error(self, asked: Array, angles: Array) -> Array:
         if self._loop.joint:
             return self._inverse @ (self._asked_angles - angles)
+        return asked - self._known_pose(angles)
+
+    def _known_pose(self, angles: Array) -> Array:
+        """The latest pose, carried on to now by the encoders where they serve."""
         seen = self._feed.latest
         if self._loop.by_encoders:
-            return asked - seen.pose - self._inverse @ (angles - seen.angles_rad)
-        return asked - seen.pose
+            return seen.pose + self._inverse @ (angles - seen.angles_rad)
+        return seen.pose
+
+    def _scheduled(self, pose: Array) -> Array | None:
+        schedule = self._loop.schedule
+        return None if schedule is None else schedule.factor(pose)
 
     def _follow(self, angles: Array) -> None:
         share = 1.0 - np.exp(-1.0 / (CONTROL_RATE_HZ * RATE_FILTER_S))
@@ -212,7 +230,8 @@ class _Brain:
         return answer._replace(x=np.clip(answer.x + more, low, high))
 
 
-def _distributed(at: Here, motors: Motors, wrench: Array) -> Currents:
+def current_bounds(at: Here, motors: Motors) -> tuple[Array, Array, Array]:
+    """Least, greatest and wished currents at a pose, by currents' and tensions' limits, (n,)."""
     per_A = motors.tension_per_A
     low = np.maximum(
         motors.current_limits_A[:, 0], (motors.tension_limits_N[:, 0] - at.springs_N) / per_A
@@ -220,7 +239,11 @@ def _distributed(at: Here, motors: Motors, wrench: Array) -> Currents:
     high = np.minimum(
         motors.current_limits_A[:, 1], (motors.tension_limits_N[:, 1] - at.springs_N) / per_A
     )
-    wish = (OBJECTIVE_N - at.springs_N) / per_A
+    return low, high, (OBJECTIVE_N - at.springs_N) / per_A
+
+
+def _distributed(at: Here, motors: Motors, wrench: Array) -> Currents:
+    low, high, wish = current_bounds(at, motors)
     answer = distribute(at.wrench_matrix, wrench, np.zeros(6), low, high, wish, NEAREST)
     if np.isnan(answer.scale):
         # Nothing is feasible here: pull as hard as the objective does, and say so by scale 0.

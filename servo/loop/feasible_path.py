@@ -5,13 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from freeswing.cdpr.driven.model import DrivenModel
-from freeswing.cdpr.driven.statics import holding_wrench
-from freeswing.cdpr.rotation import matrix_from_quaternion
 from freeswing.servo.files.task_file import Task
-from freeswing.servo.robot_now import pose7
 from freeswing.servo.synthesis.state_space import Array
-from freeswing.servo.tensions.methods import distribute_all
-from freeswing.servo.tensions.robot_wrenches import demands_at_rest
+from freeswing.servo.tensions.robot_wrenches import held_at_rest
 
 # Places looked at on each way: a step of a metre is seen every 2 cm.
 PLACES = 51
@@ -24,6 +20,7 @@ def leaves_workspace(model: DrivenModel, task: Task) -> str | None:
         model: the driven robot.
         task: steps; the way between two is taken as straight, at the second one's time.
     """
+    names = [cable.name for cable in model.robot.cables]
     entries = np.abs(model.robot.entries_m).max(axis=0)
     for i, (time, goal) in enumerate(zip(task.times_s, task.poses, strict=True)):
         before = task.poses[max(i - 1, 0)]
@@ -31,27 +28,17 @@ def leaves_workspace(model: DrivenModel, task: Task) -> str | None:
         outside = np.flatnonzero((np.abs(ways[:, :3]) >= entries).any(axis=1))
         if len(outside):
             return f"at {time:g} s it leaves the frame at {_shown(ways[outside[0]])}"
-        statuses, stops = _held(model, ways)
-        for k, status in enumerate(statuses):
+        shares = held_at_rest(model, ways)
+        for k, status in enumerate(shares.status):
             if status != "feasible":
-                why = "" if stops[k] is None else f" (cable {stops[k]} at its limit)"
+                stop = shares.stops[k]
+                why = "" if stop is None else f" (cable {names[stop[0]]} {stop[1]} at its limit)"
                 return (
                     f"at {time:g} s it leaves the feasible workspace at {_shown(ways[k])}{why}: "
                     "no tensions between the limits hold the platform there; keep nearer to the "
                     "centre"
                 )
     return None
-
-
-def _held(model: DrivenModel, poses: Array) -> tuple[tuple[str, ...], list[str | None]]:
-    places = np.array([pose7(pose) for pose in poses])
-    wrenches = np.array([holding_wrench(model, place) for place in places])
-    turns = matrix_from_quaternion(places[:, 3:])
-    wrenches[:, 3:] = np.einsum("kij,kj->ki", turns, wrenches[:, 3:])
-    demands, _, _ = demands_at_rest(model, places, wrenches, of_motors=True)
-    shares = distribute_all(demands)
-    names = [cable.name for cable in model.robot.cables]
-    return shares.status, [None if s is None else f"{names[s[0]]} {s[1]}" for s in shares.stops]
 
 
 def _shown(pose: Array) -> str:

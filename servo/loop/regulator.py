@@ -17,8 +17,14 @@ OUTPUT_NOISE = 1.0
 class Regulator(Protocol):
     """What the loop asks of a controller."""
 
-    def wrench(self, error: Array, new: bool) -> Array:
-        """The change of wrench for an error (6,); `new` tells whether it was measured just now."""
+    def wrench(self, error: Array, asked: Array, new: bool) -> Array:
+        """The change of wrench, (6,).
+
+        Args:
+            error: pose asked for minus pose, (6,).
+            asked: the pose asked for, (6,).
+            new: whether the error was measured just now.
+        """
         ...
 
     def applied(self, wrench: Array) -> None:
@@ -45,7 +51,7 @@ class LinearRegulator:
         self._asked = np.zeros(system.n_outputs)
         self._catch = _catching_gain(system)
 
-    def wrench(self, error: Array, new: bool) -> Array:
+    def wrench(self, error: Array, asked: Array, new: bool) -> Array:
         """One sample."""
         k = self._system
         self._asked = k.C @ self._state + k.D @ error

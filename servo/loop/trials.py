@@ -6,14 +6,16 @@ from dataclasses import dataclass, replace
 
 from freeswing.cdpr.driven.drive import Drive
 from freeswing.cdpr.driven.model import DrivenModel, build_driven
+from freeswing.servo.design.schedule import Schedule
 from freeswing.servo.files.controller_file import Stored
 from freeswing.servo.files.task_file import Task
 from freeswing.servo.files.weights_file import Camera
-from freeswing.servo.loop.closed_loop import Loop, Run, run_loop
+from freeswing.servo.loop.closed_loop import Loop, Run, current_bounds, run_loop
 from freeswing.servo.loop.friction import FrictionFeed
 from freeswing.servo.loop.judge import Judgement, judge
-from freeswing.servo.loop.regulator import LinearRegulator
-from freeswing.servo.robot_now import motors_of
+from freeswing.servo.loop.predictive import Bounds, PredictiveRegulator
+from freeswing.servo.loop.regulator import LinearRegulator, Regulator
+from freeswing.servo.robot_now import Survey, motors_of
 from freeswing.servo.synthesis.state_space import Array
 
 # What the controller must bear, as the project's goals state it.
@@ -32,6 +34,7 @@ class Trial:
         model: the model whose numbers those are; its declared ones are the controller's.
         feed: whether friction is fed forward.
         by_encoders: whether poses are carried on by the encoders.
+        schedule: whether the wrench is scheduled by the pose.
         seed: of the noise.
     """
 
@@ -41,6 +44,7 @@ class Trial:
     model: DrivenModel
     feed: bool = False
     by_encoders: bool = False
+    schedule: bool = False
     seed: int = 0
 
 
@@ -62,12 +66,13 @@ def carry_out(trial: Trial, controller: Stored) -> Outcome:
     loop = Loop(
         model,
         trial.truth,
-        LinearRegulator(controller.system),
+        regulator_of(controller, model),
         controller.wrench,
         trial.task,
         feed,
-        trial.by_encoders or controller.by_encoders,
-        controller.by_encoders,
+        trial.by_encoders or controller.carried,
+        controller.joint,
+        Schedule(model, controller.at) if trial.schedule else None,
         trial.seed,
     )
     run = run_loop(loop)
@@ -75,6 +80,17 @@ def carry_out(trial: Trial, controller: Stored) -> Outcome:
     return Outcome(
         trial, controller.method, run, judge(run, trial.task, names, motors.tension_limits_N)
     )
+
+
+def regulator_of(controller: Stored, model: DrivenModel) -> Regulator:
+    """What the loop steps."""
+    if controller.predictor is None:
+        return LinearRegulator(controller.system)
+    survey = Survey(model)
+    here = survey.here(controller.at)
+    ends = current_bounds(here, survey.motors)
+    bounds = Bounds(controller.at, controller.wrench, here.wrench_matrix, *ends)
+    return PredictiveRegulator(controller.predictor, bounds)
 
 
 def without_coulomb(model: DrivenModel) -> Array:

@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from freeswing.cdpr.driven.model import DrivenModel
-from freeswing.servo.robot_now import Survey
+from freeswing.cdpr.driven.statics import holding_wrench
+from freeswing.cdpr.rotation import matrix_from_quaternion
+from freeswing.servo.robot_now import Survey, pose7
 from freeswing.servo.synthesis.state_space import Array
-from freeswing.servo.tensions.methods import Demands
+from freeswing.servo.tensions.methods import Demands, Shares, distribute_all
 
 OBJECTIVE_N = 10.0  # T_obj of the paper's section 5.3
 
@@ -48,3 +50,17 @@ def demands_at_rest(
     if not of_motors:
         offset = np.einsum("kij,kj->ki", A / per_A, springs)
     return Demands(A, wrenches, offset, lower, upper, wish), springs, per_A
+
+
+def held_at_rest(model: DrivenModel, poses: Array) -> Shares:
+    """Whether tensions between their limits hold the platform at rest.
+
+    Args:
+        model: the driven robot.
+        poses: [x y z roll pitch yaw], (k, 6).
+    """
+    places = np.array([pose7(pose) for pose in poses])
+    wrenches = np.array([holding_wrench(model, place) for place in places])
+    turns = matrix_from_quaternion(places[:, 3:])
+    wrenches[:, 3:] = np.einsum("kij,kj->ki", turns, wrenches[:, 3:])
+    return distribute_all(demands_at_rest(model, places, wrenches, of_motors=True)[0])

@@ -12,10 +12,10 @@ from freeswing.console import Console
 if TYPE_CHECKING:
     from freeswing.cdpr.driven.model import DrivenModel
     from freeswing.servo.design.controller import Controller
+    from freeswing.servo.design.draws import Cloud
     from freeswing.servo.design.offer import Order
-    from freeswing.servo.files.weights_file import Goals
 
-METHODS = ("hinf", "lqg", "pid", "joint-pid", "all")
+METHODS = ("hinf", "hinf-fastest", "lqg", "pid", "joint-pid", "mpc", "all")
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -26,7 +26,18 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--weights", metavar="FILE", help="weights.toml; without it the paper's, as corrected"
     )
-    parser.add_argument("--method", choices=METHODS, default="hinf", help="default hinf")
+    parser.add_argument(
+        "--method",
+        choices=METHODS,
+        default="hinf",
+        help="default hinf: the weights as they are; hinf-fastest: their rates by the rule of "
+        "the others (docs/servo.md)",
+    )
+    parser.add_argument(
+        "--encoders",
+        action="store_true",
+        help="for a loop that carries each pose on to now by the encoders: not late, only noisy",
+    )
     parser.add_argument(
         "--at",
         type=finite,
@@ -42,6 +53,11 @@ def add_arguments(parser: ArgumentParser) -> None:
         "--robustness",
         action="store_true",
         help="also the margins over the workspace and over 200 draws of the robot's numbers",
+    )
+    parser.add_argument(
+        "--identified",
+        metavar="FILE",
+        help="drive.json: with --robustness draw from its covariance (the paper's deviations)",
     )
     add_results(parser, "ROBOT's folder/results")
 
@@ -60,9 +76,12 @@ def run(options: Namespace, console: Console) -> None:
     goals = Goals(USUAL, None) if options.weights is None else read_weights(options.weights)
     if options.order is not None and options.order < 1:
         raise InputError(f"--order {options.order}: at least 1 state")
+    if options.identified is not None and not options.robustness:
+        raise InputError("--identified: says nothing without --robustness")
+    cloud = _cloud(model, options.identified) if options.robustness else None
     folder = results_folder(path.parent, options.results)
     wanted = FAMILY if options.method == "all" else (options.method,)
-    order = Order(goals, tuple(options.at), options.order)
+    order = Order(goals, tuple(options.at), options.order, by_encoders=options.encoders)
     documents, first = {}, None
     for k, method in enumerate(wanted):
         console.progress("design", k / len(wanted))
@@ -74,14 +93,14 @@ def run(options: Namespace, console: Console) -> None:
             raise DataError(f"{path}: {method}: {error}") from error
         first = first or found
         documents[method] = _write(folder, found, method == wanted[0])
-        _say(console, found, goals)
+        _say(console, found, order)
     result = folder / "controller.json"
-    if options.robustness:
-        _robustness(console, model, order, folder)
     if options.method == "all":
         write_json(folder / "controllers.json", _table(documents))
     if first is not None:
-        _figures(folder, model, goals, order, first)
+        _figures(folder, model, order, first)
+        if cloud is not None:
+            _robustness(console, model, first, order, cloud, folder)
     console.say(str(result))
     console.show_file(result)
 
@@ -105,7 +124,16 @@ def _table(documents: dict) -> dict:
     return {"format": "freeswing-controllers/1", "controllers": rows}
 
 
-def _say(console: Console, found: Controller, goals: Goals) -> None:
+def _cloud(model: DrivenModel, identified: str | None) -> Cloud:
+    from freeswing.servo.design.draws import by_identified, by_table_1
+    from freeswing.servo.files.identified_file import read_identified
+
+    if identified is None:
+        return by_table_1(model)
+    return by_identified(read_identified(identified, model), f"the covariance of {identified}")
+
+
+def _say(console: Console, found: Controller, order: Order) -> None:
     loop, late = found.undelayed, found.delayed
     if "gamma" in found.facts:
         console.say(
@@ -113,6 +141,8 @@ def _say(console: Console, found: Controller, goals: Goals) -> None:
             f"{found.facts['gamma_backed_off']:.4f} asked for, {found.facts['norm']:.4f} reached; "
             f"order {found.sampled.order}"
         )
+        if "share" in found.facts:
+            console.say(f"the rates of its weights times {found.facts['share']:.3g}")
     else:
         speeds = ", ".join(f"{value:.2f}" for value in found.facts.values())
         console.say(f"{found.method}: speeds {speeds} rad/s; order {found.sampled.order}")
@@ -122,7 +152,11 @@ def _say(console: Console, found: Controller, goals: Goals) -> None:
         f"{loop.position.modulus_margin:.3f}, {loop.orientation.modulus_margin:.3f}; at rest "
         f"{100 * loop.position.static_error:.3g}, {100 * loop.orientation.static_error:.3g} % left"
     )
-    known = "designed in" if goals.camera or found.method != "hinf" else "not in the design"
+    known = "designed in"
+    if found.carried:
+        known = "poses carried on by the encoders"
+    elif order.goals.camera is None and found.method.startswith("hinf"):
+        known = "not in the design"
     console.say(
         f"delay margin {1e3 * loop.delay_margin_s:.1f} ms; at {1e3 * found.delay_s:.1f} ms "
         f"({known}) margins {late.position.modulus_margin:.3f}, "
@@ -132,25 +166,31 @@ def _say(console: Console, found: Controller, goals: Goals) -> None:
         console.complain(f"warning: {found.method}: {warning}")
 
 
-def _robustness(console: Console, model: DrivenModel, order: Order, folder: Path) -> None:
+def _robustness(
+    console: Console,
+    model: DrivenModel,
+    found: Controller,
+    order: Order,
+    cloud: Cloud,
+    folder: Path,
+) -> None:
     from freeswing.cdpr.files.documents import write_json
     from freeswing.servo.design.robustness import survey_document
 
-    document = survey_document(model, order, console.progress)
+    document = survey_document(model, found, order, cloud, console.progress)
     write_json(folder / "robustness.json", document)
     for line in document["sentences"]:
         console.say(line)
 
 
-def _figures(
-    folder: Path, model: DrivenModel, goals: Goals, order: Order, found: Controller
-) -> None:
+def _figures(folder: Path, model: DrivenModel, order: Order, found: Controller) -> None:
     """Figs. 12 and 13 of the first controller."""
     from freeswing.cdpr.files.documents import replace_file
     from freeswing.report.servo_figures import controller_gains, templates
 
+    goals = order.goals.weights.faster(found.facts.get("share", 1.0))
     for name, svg in (
         ("controller-gains.svg", controller_gains(found)),
-        ("controller-templates.svg", templates(found, order.plant(model), goals.weights)),
+        ("controller-templates.svg", templates(found, order.plant(model), goals)),
     ):
         replace_file(folder / name, svg.encode())

@@ -40,6 +40,11 @@ def add_arguments(parser: ArgumentParser) -> None:
         help="carry each pose on to now by what the encoders have turned since it was taken",
     )
     parser.add_argument(
+        "--schedule",
+        action="store_true",
+        help="turn the controller's wrench into that of each place (gain scheduling by M_o)",
+    )
+    parser.add_argument(
         "--survive",
         action="store_true",
         help="also with 15 ms latency, mass x 1.3, inertia x 3, one spring 20 %% weak",
@@ -85,9 +90,12 @@ def run(options: Namespace, console: Console) -> None:
 
 
 def _trials(model: DrivenModel, task: Task, options: Namespace, controller: Stored) -> list[Trial]:
+    from dataclasses import replace
+
     from freeswing.servo.loop.trials import Trial, hardships, without_coulomb
 
     common = {"by_encoders": options.encoders, "seed": options.seed}
+    common["schedule"] = options.schedule
     trials = [
         Trial("no Coulomb friction", task, without_coulomb(model), model, **common),
         Trial("Coulomb friction", task, model.declared, model, **common),
@@ -97,7 +105,9 @@ def _trials(model: DrivenModel, task: Task, options: Namespace, controller: Stor
             Trial("friction fed forward", task, model.declared, model, feed=True, **common)
         )
     if options.survive:
-        trials += hardships(model, task, feed=options.friction_feed, seed=options.seed)
+        hard = hardships(model, task, feed=options.friction_feed, seed=options.seed)
+        carried = {"by_encoders": options.encoders, "schedule": options.schedule}
+        trials += [replace(trial, **carried) for trial in hard]
     return trials
 
 
@@ -121,6 +131,7 @@ def _entry(outcome: Outcome) -> dict[str, Any]:
         "trial": outcome.trial.name,
         "friction_feed": outcome.trial.feed,
         "encoders": outcome.trial.by_encoders,
+        "schedule": outcome.trial.schedule,
         "seed": outcome.trial.seed,
         **asdict(outcome.judgement),
     }

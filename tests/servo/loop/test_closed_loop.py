@@ -1,13 +1,16 @@
 """The whole loop on the sample's robot: short tasks, seen by their numbers."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from freeswing.cdpr.files.problems import InputError
 from freeswing.servo.design.offer import Order, offer
+from freeswing.servo.design.schedule import Schedule
 from freeswing.servo.driven_file import read_driven
-from freeswing.servo.files.controller_file import Stored
+from freeswing.servo.files.controller_file import Stored, read_controller, to_document
 from freeswing.servo.files.task_file import Task, Watch
 from freeswing.servo.files.weights_file import USUAL, Camera, Goals
 from freeswing.servo.loop.closed_loop import Loop, run_loop
@@ -96,7 +99,7 @@ def test_the_camera_is_late_by_its_latency(model):
         def __init__(self):
             self.errors = []
 
-        def wrench(self, error, new):
+        def wrench(self, error, asked, new):
             self.errors.append((error[0], new))
             return np.zeros(6)
 
@@ -128,12 +131,12 @@ def test_a_regulator_that_asks_in_vain_does_not_wind_up():
     integrator = StateSpace(np.eye(6), 0.01 * np.eye(6), np.eye(6), np.zeros((6, 6)), 1e-3)
     regulator = LinearRegulator(integrator)
     for _ in range(5000):
-        asked = regulator.wrench(np.ones(6), True)
+        asked = regulator.wrench(np.ones(6), np.zeros(6), True)
         regulator.applied(np.minimum(asked, 1.0))
     assert np.abs(asked).max() < 1.5, asked
     free = LinearRegulator(integrator)
     for _ in range(5000):
-        asked = free.wrench(np.ones(6), True)
+        asked = free.wrench(np.ones(6), np.zeros(6), True)
         free.applied(asked)
     assert asked[0] == pytest.approx(49.99)
 
@@ -162,7 +165,7 @@ def test_hardships_are_other_robots_than_the_controllers(model):
 
 def test_a_platform_that_is_pulled_away_is_lost(model):
     class Pull:
-        def wrench(self, error, new):
+        def wrench(self, error, asked, new):
             return np.array([-30.0, 0, 0, 0, 0, 0])
 
         def applied(self, wrench):
@@ -174,3 +177,60 @@ def test_a_platform_that_is_pulled_away_is_lost(model):
     found = judge(run, task, names, motors_of(model).tension_limits_N)
     assert not found.held
     assert found.scaled > 0.5
+
+
+def test_a_predictive_controller_reaches_its_place_through_a_file(model, tmp_path):
+    found = offer(model, "mpc", Order(Goals(USUAL, Camera(0.005, 0.0107))))
+    path = tmp_path / "controller.json"
+    path.write_text(json.dumps(to_document(found)))
+    stored = read_controller(path)
+    assert stored.predictor is not None
+    np.testing.assert_array_equal(stored.predictor.gain, found.predictor.gain)
+    outcome = carry_out(Trial("", step_to(0.1), without_coulomb(model), model), stored)
+    assert outcome.judgement.held, outcome.judgement.why
+    assert abs(outcome.run.poses[-1, 0] - 0.1) < 2e-3, outcome.run.poses[-1]
+    document = to_document(found)
+    document["predictor"]["gain"] = [[1.0]]
+    path.write_text(json.dumps(document))
+    with pytest.raises(InputError, match=r"predictor\.gain must be 6 by 12"):
+        read_controller(path)
+
+
+def test_a_scheduled_loop_turns_the_wrench_and_tells_the_regulator_what_came_of_it(model):
+    class Recorder:
+        def __init__(self):
+            self.told = []
+
+        def wrench(self, error, asked, new):
+            return np.array([0.1, 0.0, 0.0, 0.0, 0.001, 0.0])
+
+        def applied(self, wrench):
+            self.told.append(wrench)
+
+    recorder = Recorder()
+    place = np.array([0.05, 0.3, -0.1, 0.0, 0.0, 0.05])
+    rest = offer(model, "hinf", Order(Goals(USUAL, None))).wrench
+    task = Task(np.zeros(1), place[None], 0.02, QUIET)
+    run = run_loop(
+        Loop(model, model.declared, recorder, rest, task, schedule=Schedule(model, np.zeros(6)))
+    )
+    factor = Schedule(model, np.zeros(6)).factor(place)
+    np.testing.assert_allclose(run.wrenches[0] - rest, factor[:, 0] * 0.1 + factor[:, 4] * 0.001)
+    np.testing.assert_allclose(recorder.told[0], [0.1, 0, 0, 0, 0.001, 0], atol=1e-12)
+
+
+def test_a_controller_designed_for_the_encoders_brings_them_along(model):
+    order = Order(Goals(USUAL, Camera(0.005, 0.0107)), by_encoders=True)
+    found = offer(model, "hinf", order)
+    assert found.delay_s == pytest.approx(0.0005)
+    assert to_document(found)["carried_by_encoders"] is True
+    late = replace(QUIET, camera=Camera(0.005, 0.05))
+    stored = Stored("hinf", found.sampled, found.wrench, carried=True)
+    trials = [
+        carry_out(Trial("", step_to(0.1, late, 2.6), without_coulomb(model), model), one)
+        for one in (stored, replace(stored, carried=False))
+    ]
+    # 52.5 ms are more than its delay margin; by the encoders they are no delay at all.
+    jitter = [outcome.judgement.steps[-1].jitter_m for outcome in trials]
+    assert jitter[0] < 1e-3, jitter
+    assert jitter[1] > 5 * jitter[0], jitter
