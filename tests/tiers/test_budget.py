@@ -40,6 +40,7 @@ def test_without_a_budget_all_are_run_and_a_failure_is_a_failure(tmp_path) -> No
     assert "left no time for: 0" in done.stdout, done.stdout
 
 
+@pytest.mark.slow
 def test_processes_side_by_side_share_the_budget_and_say_what_they_left(tmp_path) -> None:
     pytest.importorskip("xdist", reason="pytest-xdist is not installed")
     done = run(tmp_path, "--minutes", "0", "-n", "2")
