@@ -148,6 +148,15 @@ HELD = (
         ("LEAST_RUNS", "SMALL_BESIDE_SWINGS", "AT_THE_NOISE"),
         DECISION,
     ),
+    Held(
+        "cdpr/measured/sound_samples.py",
+        (
+            "FEWEST_HELD", "ABOVE_RESOLUTION", "DOUBLED_SHARE", "LONGEST_DOUBLE",
+            "WILD_DEVIATIONS", "HALF_WITHIN", "STEP_DEVIATIONS", "BACK_WITHIN",
+            "LONGEST_WILD_S", "LONGEST_STEP_S",
+        ),
+        "tests/cdpr/measured/test_sound_samples.py",
+    ),
     Held("ident/bench/solve.py", ("LEAST_FOR_SCATTER", "CONTRADICTED"), BENCH),
     Held("ident/bench/noise.py", ("BAND", "LEAST_SHARE", "SIGNIFICANT"), BENCH),
     Held("ident/bench/classic.py", ("LEAST_PERIODS", "LEANING_PERCENT"), BENCH),
@@ -194,6 +203,11 @@ HELD = (
             "MOST_TURN_RAD", "MOST_SHIFT_M", "MOST_APART_M", "MOST_FLOOR_PX", "MOST_REJECTED",
             "_SAME_TURN_RAD", "_SAME_SIZE",
         ),
+        RIG,
+    ),
+    Held(
+        "vision/rig/pairs.py",
+        ("MOST_LAG_S", "LEAST_OVERLAP_S", "OVERLAP_SHARE", "_NEARLY_BEST"),
         RIG,
     ),
     Held("vision/rig/kept_clocks.py", ("MOST_APART_S",), RIG),

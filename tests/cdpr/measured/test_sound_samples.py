@@ -2,7 +2,14 @@ import numpy as np
 import pytest
 
 from freeswing.cdpr.files.problems import InputError
-from freeswing.cdpr.measured.sound_samples import check_stamps, sound_samples
+from freeswing.cdpr.measured.sound_samples import (
+    NORMAL_BY_MAD,
+    _doubled,
+    _is_finer,
+    _single,
+    check_stamps,
+    sound_samples,
+)
 from freeswing.cdpr.measured.trajectory import Trajectory
 
 TIMES = np.arange(400) / 100.0
@@ -163,3 +170,57 @@ def test_times_in_another_unit_are_named(factor, unit):
         check_stamps(Trajectory(factor * TIMES, ("x", "y"), swing()), "a.csv")
     check_stamps(Trajectory(1.7e9 + TIMES, ("x", "y"), swing()), "a.csv")
     check_stamps(Trajectory(50.0 * TIMES, ("x", "y"), swing()), "a.csv")
+
+
+@pytest.mark.parametrize(("typical", "finer"), [(4.6, False), (5.5, True)])
+def test_numbers_written_finer_than_neighbours_differ(typical, finer):
+    """The least step is the print's; the median one that many of it."""
+    values = np.cumsum([0.0, 1.0] + [typical] * 12)[:, None]
+    assert _is_finer(values, np.zeros(13, bool)) == finer
+
+
+@pytest.mark.parametrize(("share", "doubled"), [(0.37, False), (0.44, True)])
+def test_so_many_samples_repeated_are_a_rate_written_twice(share, doubled):
+    values = swing()
+    for k in range(1, round(share * 399) + 1):
+        values[2 * k - 1] = values[2 * k - 2]
+    assert (_doubled(Trajectory(TIMES, ("x", "y"), values)) is not None) == doubled
+
+
+@pytest.mark.parametrize(("times_each", "doubled"), [(4, True), (5, False)])
+def test_written_more_often_it_is_a_stall(times_each, doubled):
+    values = np.repeat(swing(), times_each, axis=0)
+    made = Trajectory(np.arange(len(values)) / 100.0, ("x", "y"), values)
+    assert (_doubled(made) is not None) == doubled
+
+
+def with_spike(deviations: float, lopsided: float = 0.0) -> np.ndarray:
+    """A wild sample of so many deviations; a neighbour is off by a share of it besides."""
+    column = swing()[:, 0]
+    off = column[1:-1] - 0.5 * (column[2:] + column[:-2])
+    usual = NORMAL_BY_MAD * np.median(np.abs(off))
+    size = deviations * usual
+    column[250] += size - off[249]
+    column[249] += lopsided * size
+    return column[:, None]
+
+
+@pytest.mark.parametrize(("deviations", "wild"), [(45.0, False), (56.0, True)])
+def test_a_sample_is_wild_beyond_fifty_deviations(deviations, wild):
+    assert bool(_single(with_spike(deviations))[250]) == wild
+
+
+@pytest.mark.parametrize(("lopsided", "wild"), [(0.21, True), (0.26, False)])
+def test_a_wild_sample_pulls_both_neighbours_by_half(lopsided, wild):
+    """What moves a neighbour too is a motion: here/after keep half, before is that far from it."""
+    assert bool(_single(with_spike(1000.0, lopsided))[250]) == wild
+
+
+@pytest.mark.parametrize(("step_s", "followed"), [(0.9, True), (1.1, False)])
+def test_steps_at_which_no_swing_is_followed(step_s, followed):
+    made = Trajectory(step_s * np.arange(50.0), ("x", "y"), swing()[:50])
+    if followed:
+        check_stamps(made, "a.csv")
+    else:
+        with pytest.raises(InputError, match="times are in seconds"):
+            check_stamps(made, "a.csv")

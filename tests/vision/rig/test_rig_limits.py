@@ -23,6 +23,7 @@ from freeswing.vision.rig.gross_faults import (
     refuse_gross,
 )
 from freeswing.vision.rig.kept_clocks import with_kept_clocks
+from freeswing.vision.rig.pairs import OwnTrack, _candidates, _correlations, _fitted
 from freeswing.vision.rig.rig_effects import LEAST_CLOCK_S, LEAST_LINE_S, Finding, was_moved
 from tests.vision.scenes import camera
 
@@ -155,3 +156,44 @@ def test_other_starts_that_are_tried_in_earnest(miss_m, tried) -> None:
 
     _chosen(pair, view, view, misfit)
     assert len(asked) == tried
+
+
+def speeds_of(times_s: np.ndarray) -> np.ndarray:
+    turn = np.sin(3.1 * times_s) + 0.6 * np.sin(5.7 * times_s + 1.0)
+    return np.stack([2.0 + turn, 2.0 - turn**2], axis=1)
+
+
+@pytest.mark.parametrize(("lag_s", "looked_at"), [(9.2, True), (10.8, False)])
+def test_cameras_are_started_within_ten_seconds(lag_s, looked_at) -> None:
+    whole = np.arange(0.0, 30.0, 0.1)
+    part = np.arange(13.0, 17.0, 0.1) - lag_s
+    lags, _ = _correlations((whole, speeds_of(whole)), (part, speeds_of(part + lag_s)), 0.1)
+    assert bool((np.abs(lags - lag_s) < 0.06).any()) == looked_at
+
+
+@pytest.mark.parametrize(("overlap_s", "enough"), [(0.9, False), (1.1, True)])
+def test_records_share_a_second(overlap_s, enough) -> None:
+    """At 100 Hz, seen at the lag of zero."""
+    first, second = np.arange(0.0, 5.0, 0.01), np.arange(5.0 - overlap_s, 9.0, 0.01)
+    lags, _ = _correlations((first, speeds_of(first)), (second, speeds_of(second)), 0.01)
+    assert bool((np.abs(lags) < 1e-6).any()) == enough
+
+
+@pytest.mark.parametrize(("below", "kept"), [(0.22, 2), (0.28, 1)])
+def test_lags_that_correlate_nearly_as_well(below, kept) -> None:
+    scores = np.array([0.0, 0.9, 0.1, 0.9 - below, 0.0])
+    assert len(_candidates(np.arange(5.0), scores)) == kept
+
+
+@pytest.mark.parametrize(("share", "enough"), [(0.46, False), (0.56, True)])
+def test_records_share_half_of_the_shorter(share, enough) -> None:
+    """A platform that turns and shifts, seen from one place by two cameras."""
+
+    def track(times_s):
+        turns = exp_rotation(np.outer(np.sin(times_s), [0.3, 0.1, 0.2]))
+        places = np.stack([np.sin(times_s), np.cos(times_s), 0.1 * times_s], axis=1)
+        return OwnTrack(times_s, turns, places)
+
+    first = track(np.arange(0.0, 10.0, 0.05))
+    second = track(np.arange(10.0 - 10.0 * share, 20.0 - 10.0 * share, 0.05))
+    assert (_fitted(first, second, 0.0, np.eye(4)) is not None) == enough
