@@ -82,7 +82,7 @@ def render_page(material: Material) -> str:
         lstrip_blocks=True,
     )
     sections = [_section(environment, panel, material) for panel in PANELS]
-    sections = [one for one in sections if one["body"] is not None or one["name"] in MADE_OF]
+    sections = [one for one in sections if _is_shown(one, material)]
     style = (files("freeswing.report") / "templates" / "page.css").read_text(encoding="utf-8")
     page = environment.get_template("page.html")
     return page.render(
@@ -99,6 +99,17 @@ def write_page(path: Path, material: Material) -> None:
     for name, rows in csv_tables(material).items():
         replace_file(path.with_name(name), rows.encode("utf-8"))
     replace_file(path, render_page(material).encode("utf-8"))
+
+
+def _is_shown(section: dict[str, Any], material: Material) -> bool:
+    """Whether there is something to show, or a reason to say why not.
+
+    An identification without tracked films came from other recordings: no cameras belong to it.
+    """
+    if section["body"] is not None or section["why"]:
+        return True
+    needs_cameras = section["name"] == "cameras"
+    return section["name"] in MADE_OF and not (needs_cameras and material.identification)
 
 
 def _section(environment: Environment, panel: Panel, material: Material) -> dict[str, Any]:

@@ -21,6 +21,8 @@ from freeswing.results.motion import RunMotion
 ELEVATION_RAD = np.deg2rad(22.0)
 AZIMUTHS_RAD = (np.deg2rad(-62.0), np.deg2rad(-28.0))
 MOST_PATHS = 6
+ENLARGED = (1.0, 2.0, 5.0, 10.0, 20.0)
+SEEN_SHARE = 0.2  # of the robot's width: large enough to see a path's shape
 PATH_POINTS = 160
 PLACE = ("x", "y", "z")
 
@@ -35,6 +37,7 @@ class InSpace:
         point_m: P as it hung, (3,).
         up: against gravity, unit vector, (3,).
         paths: of P by run: whether it was fitted, and places, (n_t, 3).
+        enlarged: how many times larger than they are, each about its middle.
     """
 
     entries_m: Array
@@ -42,6 +45,7 @@ class InSpace:
     point_m: Array
     up: Array
     paths: tuple[tuple[bool, Array], ...]
+    enlarged: float
 
 
 def in_space(
@@ -53,19 +57,33 @@ def in_space(
         return Markup()
     place = np.array(hung.position_m, dtype=np.float64)
     turn = matrix_from_angles(np.array(hung.angles_rad, dtype=np.float64))
+    paths = tuple(_paths(motions))
+    enlarged = enlargement([path for _, path in paths], robot.entries_m)
     drawn = InSpace(
         robot.entries_m,
         place + robot.attachments_m @ turn.T,
         place,
         -robot.gravity_m_s2 / np.linalg.norm(robot.gravity_m_s2),
-        tuple(_paths(motions)),
+        paths,
+        enlarged,
     )
+    larger = f", {enlarged:g} times larger than they are" if enlarged > 1.0 else ""
     caption = (
         "The robot in space, from two sides: pulleys (triangles), cables, the platform's "
-        "attachments as it hung in the first run (filled), and the paths of P: solid where they "
-        "were fitted, dashed where they were kept apart. The bar is 0.5 m long."
+        f"attachments as it hung in the first run (filled), and the paths of P{larger}: solid "
+        "where they were fitted, dashed where they were kept apart. The bar is 0.5 m long."
     )
     return figures([_view(drawn, azimuth) for azimuth in AZIMUTHS_RAD], 3.0, caption)
+
+
+def enlargement(paths: Sequence[Array], entries_m: Array) -> float:
+    """By how much paths are drawn larger so that they can be seen beside the robot."""
+    if not paths:
+        return 1.0
+    size = max(float(np.nanmax(np.nanmax(path, 0) - np.nanmin(path, 0))) for path in paths)
+    room = SEEN_SHARE * float(np.ptp(entries_m, axis=0).max())
+    fitting = [factor for factor in ENLARGED if factor * size <= room]
+    return fitting[-1] if fitting else ENLARGED[0]
 
 
 def _paths(motions: Sequence[RunMotion]) -> list[tuple[bool, Array]]:
@@ -106,7 +124,9 @@ def _view(drawn: InSpace, azimuth_rad: float) -> Draw:
             for part in (drawn.entries_m, drawn.ends_m, drawn.point_m)
         )
         for is_fitted, path in drawn.paths:
-            seen = projected(path, azimuth_rad, drawn.up)
+            middle = np.nanmean(path, axis=0)
+            shown = middle + drawn.enlarged * (path - middle)
+            seen = projected(shown, azimuth_rad, drawn.up)
             colour, dash = (AFTER, "-") if is_fitted else (BEFORE, "--")
             axes.plot(*seen.T, color=colour, ls=dash, lw=0.8)
         for entry, end in zip(entries, ends, strict=True):

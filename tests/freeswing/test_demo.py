@@ -11,6 +11,7 @@ import pytest
 
 from freeswing.cdpr.model.equations import build_model
 from freeswing.demo import mocap, truth
+from freeswing.demo.lessons import LESSONS
 from freeswing.ident.diagnose.heldout import held_out
 from freeswing.ident.identify import IdentifySettings, identify
 from freeswing.main import main
@@ -53,7 +54,13 @@ def test_a_short_one_by_motion_capture(
     monkeypatch.setattr(stages, "STAGES", (*stages.STAGES[:-1], quick))
     folder = tmp_path / "demo"
     assert main(["demo", str(folder), "--mocap", "--workers", "1"]) == 0
-    check_ending(folder, capsys.readouterr().out)
+    said = capsys.readouterr().out
+    check_ending(folder, said)
+    assert f"identify: {LESSONS['identify']}" in said
+
+
+def test_every_step_has_its_sentence() -> None:
+    assert list(LESSONS) == [stage.name for stage in stages.STAGES]
 
 
 @pytest.mark.slow

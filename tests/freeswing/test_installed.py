@@ -112,6 +112,7 @@ def test_the_wheel_holds_each_module_once_below_one_name(wheel: Path) -> None:
     }
     expected = {p if p.startswith("freeswing/") else f"freeswing/{p}" for p in here}
     assert modules == expected, modules ^ expected
+    assert "freeswing/py.typed" in names, "all below one name carry types by it"
     assert any(name.endswith("report/page.html") or name.endswith(".css") for name in names), names
 
 

@@ -18,13 +18,16 @@ def add_arguments(parser: ArgumentParser) -> None:
         "--mocap", action="store_true", help="motion capture instead of cameras: quicker"
     )
     add_workers(parser)
+    parser.add_argument("--open", action="store_true", help="show the report in a browser")
     parser.add_argument("--seed", type=whole, default=1, help="another seed, another session")
 
 
 def run(options: Namespace, console: Console) -> None:
     """Record, solve, and end with the report's path."""
     from freeswing.cdpr.files.documents import InputError
+    from freeswing.commands.session.report import open_page
     from freeswing.commands.session.run import run_session
+    from freeswing.demo.lessons import LESSONS
     from freeswing.session.session_file import read_session
 
     folder = Path(options.folder)
@@ -34,7 +37,9 @@ def run(options: Namespace, console: Console) -> None:
     console.say(f"recording a session into {folder} (its truth.json is not read by what follows)")
     session = read_session(_record(folder, options, console))
     with crew_of(options, session) as crew:
-        run_session(session, console, crew)
+        run_session(session, console, crew, lessons=LESSONS)
+    if options.open:
+        open_page(session.results / "report.html", console)
     console.show_file(session.results / "identification.json")
 
 

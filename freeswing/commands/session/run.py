@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from freeswing.commands.arguments import add_session, add_workers, crew_of, open_session
@@ -45,6 +45,7 @@ def run_session(
     crew: Crew,
     stages: Sequence[Stage] | None = None,
     refresh_s: float | None = None,
+    lessons: Mapping[str, str] | None = None,
 ) -> None:
     """All steps of a session, then the report, whose path is said last.
 
@@ -54,6 +55,7 @@ def run_session(
         crew: who works.
         stages: those that are taken where they are due; None: all.
         refresh_s: the page reads itself anew so often; None: it stays as it is.
+        lessons: what a step is for, by its name.
 
     Raises:
         DataError: where a step came to no result; the report is written all the same and says so.
@@ -67,7 +69,7 @@ def run_session(
     for stage in STAGES if stages is None else stages:
         try:
             if stage.due(session):
-                _take(stage, session, console, crew)
+                _take(stage, session, console, crew, (lessons or {}).get(stage.name, ""))
             elif stage is DIAGNOSE:
                 console.say(f"diagnose: left out. {NO_VALIDATION}")
         except (DataError, InputError) as failure:
@@ -87,9 +89,9 @@ def run_session(
         raise DataError(told) from next(iter(failures.values()))
 
 
-def _take(stage: Stage, session: Session, console: Console, crew: Crew) -> None:
+def _take(stage: Stage, session: Session, console: Console, crew: Crew, lesson: str) -> None:
     if stage.is_current(session):
         console.say(f"{stage.name}: up to date")
         return
-    console.say(f"{stage.name}:")
+    console.say(f"{stage.name}: {lesson}".rstrip())
     stage.take(session, console, crew=crew)

@@ -9,10 +9,12 @@ import subprocess
 from html.parser import HTMLParser
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from freeswing.report.material import FILES, RESULTS, Material
 from freeswing.report.page import PANELS, render_page
+from freeswing.report.space import enlargement
 from tests.freeswing.report.report_material import whole_material
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
@@ -83,6 +85,20 @@ def test_sections_stand_in_reading_order(page: str) -> None:
     assert "The bench" not in page, "neither the section nor its link where nothing is for it"
     order = "answer bench sure ladder geometry change decay next swings cameras markers dropped"
     assert [panel.name for panel in PANELS] == [*order.split(), "provenance"]
+
+
+def test_cameras_are_no_section_of_other_recordings() -> None:
+    without = dataclasses.replace(whole_material(), calibration=None, tracking=None)
+    assert "The cameras" not in render_page(without)
+    nothing = dataclasses.replace(without, identification=None)
+    assert "The cameras" in render_page(nothing), "they may still come"
+
+
+def test_paths_are_drawn_as_large_as_can_be_seen() -> None:
+    entries = np.array([[0.0, 0.0, 0.0], [2.0, 1.0, 0.0]])
+    for size_m, factor in ((0.5, 1.0), (0.079, 5.0), (0.081, 2.0), (0.001, 20.0)):
+        path = np.array([[0.0, 0.0, 0.0], [size_m, 0.0, 0.0]])
+        assert enlargement([path], entries) == factor, size_m
 
 
 def test_nothing_is_fetched(page: str) -> None:
