@@ -20,6 +20,8 @@ SWEEPS = 12
 KEPT_ORDERS = 6
 LARGEST_SLIP_M_S = 1e-7
 LARGEST_JUMP_RAD = 1.5
+LARGEST_TAIL = 4.0  # tolerances that a segment's last two orders may hold before it is cut
+SETTLED = 1e-3  # of the tolerance: what a further step of Newton's would change is left out
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,7 +136,7 @@ def simulate(
     values = model.start_values if values is None else values
     zeta, rates = finite("zeta", zeta, 6), finite("rates", rates, 6)
     inertia, values = finite("inertia", inertia, 9), finite("values", values, len(model.names))
-    _check_start(model, span_s, zeta, rates, inertia, values, tolerance_m)
+    check_start(model, span_s, zeta, rates, inertia, values, tolerance_m)
     stepper = _Stepper(model, inertia, values, tolerance_m)
     time, end = map(float, span_s)
     state = zeta, rates
@@ -157,12 +159,23 @@ def simulate(
     starts, steps, zetas, speeds, accelerations = (
         np.array(column) for column in zip(*rows, strict=True)
     )
-    _check_swivels(model, np.append(starts, time), np.vstack([zetas, state[0]]), values)
-    return Motion(model, inertia, values, starts, steps, zetas, speeds, accelerations)
+    motion = Motion(model, inertia, values, starts, steps, zetas, speeds, accelerations)
+    check_swivels(motion)
+    return motion
 
 
-def _check_swivels(model: Model, times: Array, zetas: Array, values: Array) -> None:
+def tails(motion: Motion) -> Array:
+    """What the last two orders of each segment's accelerations move the platform by, (s,)."""
+    nodes = motion.accelerations.shape[1]
+    last = np.abs(table(nodes).spectrum[-2:] @ motion.accelerations).max(axis=(1, 2))
+    return motion.steps_s**2 * last / (4 * nodes**2)
+
+
+def check_swivels(motion: Motion) -> None:
     """Refuse a motion that has stepped across a swivel axis, where a pulley would have to flip."""
+    model, values = motion.model, motion.values
+    times = np.append(motion.starts_s, motion.end_s)
+    zetas = np.vstack([motion.zetas, motion.at(times[-1:])[0]])
     swivels = evaluate(only(model.cables, 1), zetas, values)[0]
     jumps = np.abs(np.angle(np.exp(1j * np.diff(swivels, axis=0)))) * (model.robot.radii_m > 0.0)
     if jumps.max(initial=0.0) > LARGEST_JUMP_RAD:
@@ -176,7 +189,7 @@ def _check_swivels(model: Model, times: Array, zetas: Array, values: Array) -> N
         )
 
 
-def _check_start(
+def check_start(
     model: Model,
     span_s: tuple[float, float],
     zeta: Array,
@@ -268,13 +281,13 @@ class _Stepper:
                 return None, 0.4
             # The next change would be about change^2 / last: stop when that is negligible.
             ratio = change / last if np.isfinite(last) else 1.0
-            if change * min(1.0, ratio) < 1e-3 * self.tolerance:
+            if change * min(1.0, ratio) < SETTLED * self.tolerance:
                 break
         else:
             return None, 0.5
         tail = step**2 * float(np.abs(t.spectrum[-2:] @ found).max()) / (4 * NODES**2)
         factor = 0.85 * (self.tolerance / max(tail, 1e-300)) ** (1.0 / NODES)
-        if tail > 4 * self.tolerance and step > SHORTEST_SEGMENT_S:
+        if tail > LARGEST_TAIL * self.tolerance and step > SHORTEST_SEGMENT_S:
             return None, float(np.clip(factor, 0.2, 0.8))
         return found, float(np.clip(factor, 0.5, 1.6))
 

@@ -24,11 +24,17 @@ class Linearised:
         motion: the motion.
         states: of [zeta; rates] at the segment starts, (s, 12, 21 + k).
         accelerations: of the node accelerations, (s, m, 6, 21 + k).
+        inverses: of the collocation equations' matrices, one a segment, (s, 6 m, 6 m).
+        by_start: derivatives of a segment's node accelerations by its own start, (s, 6 m, 12).
+        ends: of the state at a segment's end by that at its start, (s, 12, 12).
     """
 
     motion: Motion
     states: Array
     accelerations: Array
+    inverses: Array
+    by_start: Array
+    ends: Array
 
     def at(self, times_s: Array) -> tuple[Array, Array]:
         """Derivatives of zeta and of the rates at times (n,), each (n, 6, 21 + k)."""
@@ -61,16 +67,20 @@ def linearise(motion: Motion) -> Linearised:
     times = motion.starts_s[:, None] + motion.steps_s[:, None] * t.nodes
     function = with_jacobian(motion.model.acceleration, (1, 2, 3, 4))
     slopes = evaluate(function, times, zetas, rates, motion.inertia, motion.values)[1]
-    changes = _segment_changes(motion, slopes)
-    states = _chained(motion, changes)
+    inverses, changes = _segment_changes(motion, slopes)
+    states, ends = _chained(motion, changes)
     flat = changes.reshape(len(states), -1, changes.shape[-1])
     total = flat[..., :12] @ states
     total[..., 12:] += flat[..., 12:]
-    return Linearised(motion, states, total.reshape(changes.shape))
+    accelerations = total.reshape(changes.shape)
+    return Linearised(motion, states, accelerations, inverses, flat[..., :12], ends[..., :12])
 
 
-def _segment_changes(motion: Motion, slopes: Array) -> Array:
-    """Derivatives of the node accelerations by [zeta_s; rates_s; inertia; values], (s, m, 6, c)."""
+def _segment_changes(motion: Motion, slopes: Array) -> tuple[Array, Array]:
+    """Inverse matrices (s, 6 m, 6 m) and what they make of all that a segment depends on.
+
+    That is the node accelerations' derivatives by [zeta_s; rates_s; inertia; values], (s, m, 6, c).
+    """
     s, m = slopes.shape[:2]
     t = table(m)
     by_zeta, by_rates, by_rest = slopes[..., :6], slopes[..., 6:12], slopes[..., 12:]
@@ -82,11 +92,15 @@ def _segment_changes(motion: Motion, slopes: Array) -> Array:
     matrix -= step * (t.once[:, None, :, None] * by_rates[:, :, :, None, :])
     matrix = matrix.reshape(s, 6 * m, 6 * m)
     matrix[:, np.arange(6 * m), np.arange(6 * m)] += 1.0
-    return np.linalg.solve(matrix, right.reshape(s, 6 * m, -1)).reshape(s, m, 6, -1)
+    inverses = np.linalg.inv(matrix)
+    return inverses, (inverses @ right.reshape(s, 6 * m, -1)).reshape(s, m, 6, -1)
 
 
-def _chained(motion: Motion, changes: Array) -> Array:
-    """Derivatives of the states at the segment starts by the unknowns, (s, 12, c)."""
+def _chained(motion: Motion, changes: Array) -> tuple[Array, Array]:
+    """Derivatives of the states at the segment starts by the unknowns, and across each segment.
+
+    Both are (s, 12, c); the second by the segment's own start instead of the motion's.
+    """
     s, m, _, columns = changes.shape
     t = table(m)
     step = motion.steps_s[:, None, None]
@@ -106,4 +120,4 @@ def _chained(motion: Motion, changes: Array) -> Array:
     for k in range(s - 1):
         states[k + 1] = ends[k, :, :12] @ states[k]
         states[k + 1, :, 12:] += ends[k, :, 12:]
-    return states
+    return states, ends

@@ -12,9 +12,11 @@ from freeswing.cdpr.model.free_motion import admissible_rates
 from freeswing.cdpr.model.known_values import prior_whitener
 from freeswing.cdpr.robot import Array
 from freeswing.cdpr.simulation.free_swing import Motion, simulate
+from freeswing.cdpr.simulation.nearby import Surroundings
 from freeswing.cdpr.simulation.sensitivity import linearise
 from freeswing.ident.judge.consistency import nearest_possible
 from freeswing.ident.likelihood.likelihood_run import (
+    Reduced,
     Samples,
     lengths_residual,
     own_prior,
@@ -25,6 +27,7 @@ from freeswing.ident.likelihood.payload_runs import Loads
 
 TOLERANCE_M = 1e-8
 INERTIA_UNIT = np.array([0.05, 0.05, 0.05, 0.02, 0.02, 0.02, 0.01, 0.01, 0.01])
+STATE_UNIT = 0.05  # m, rad, and these a second: a start
 RANK_LIMIT = 1e-9
 
 
@@ -61,6 +64,19 @@ class State:
 
 
 @dataclass(frozen=True, slots=True)
+class Linear:
+    """All runs to first order at a state.
+
+    Attributes:
+        reduced: each run without its own unknowns.
+        surroundings: of each run's motion.
+    """
+
+    reduced: tuple[Reduced, ...]
+    surroundings: tuple[Surroundings, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Step:
     """A damped Gauss-Newton step.
 
@@ -71,7 +87,8 @@ class Step:
         triangle: R of the scaled joint problem in the free unknowns.
         singular_values: of that triangle, descending.
         rank: how many of them count.
-        decrease: of the cost in the shared unknowns that an undamped linear step would bring.
+        decrease: of the cost that an undamped linear step would bring.
+        length: largest change of a shared unknown or start, each in its unit.
         runs: rows of each run over [shared unknowns; residual].
         priors: rows of what is known beforehand.
     """
@@ -83,6 +100,7 @@ class Step:
     singular_values: Array
     rank: int
     decrease: float
+    length: float
     runs: tuple[Array, ...]
     priors: Array
 
@@ -127,25 +145,34 @@ class Problem:
         far = [3.0 * INERTIA_UNIT, [(p.high - p.low) / 3.0 for p in parameters], self.loads.unit]
         self.farthest = np.concatenate(far)
 
-    def simulated(self, state: State) -> State:
+    def simulated(self, state: State, near: Sequence[Surroundings] = ()) -> State:
         """The state with motions from its starts, whose rates are made admissible.
+
+        Args:
+            state: its motions do not count.
+            near: of motions that may be near, one a run, or none.
 
         Raises:
             ValueError: when one cannot be followed, naming the run.
         """
         motions = tuple(
-            self._followed(state, run, start, samples)
-            for run, (start, samples) in enumerate(zip(state.starts, self.samples, strict=True))
+            self._followed(state, run, start, near[run] if near else None)
+            for run, start in enumerate(state.starts)
         )
         starts = np.array([np.concatenate([one.zetas[0], one.rates[0]]) for one in motions])
         return replace(state, starts=starts, motions=motions)
 
-    def _followed(self, state: State, run: int, start: Array, samples: Samples) -> Motion:
+    def _followed(self, state: State, run: int, start: Array, near: Surroundings | None) -> Motion:
+        samples = self.samples[run]
         zeta, span = start[:6], samples.span_s
         inertia = self.loads.inertia(run, state.inertia, self.loads_of(state))
         values = state.values_of(run, self.model.own_values)
         rates = admissible_rates(self.model, zeta, start[6:], inertia, values, span[0])
         try:
+            if near is not None:
+                moved = near.motion_at(zeta, rates, inertia, values, self.tolerance_m)
+                if moved is not None:
+                    return moved
             return simulate(self.model, zeta, rates, span, inertia, values, self.tolerance_m)
         except (ValueError, np.linalg.LinAlgError) as error:
             raise ValueError(f"run {samples.name}: {error}") from error
@@ -168,12 +195,18 @@ class Problem:
         """Independent distances of unit deviation from what is known of the values, (k,)."""
         return self.prior_whitener @ (values - self.prior_centre)
 
-    def step(self, state: State, damping: float) -> Step:
-        """A damped Gauss-Newton step at the motions of a state."""
-        reduced = [
-            reduce_run(linearise(motion), samples, state.scales)
-            for motion, samples in zip(state.motions, self.samples, strict=True)
-        ]
+    def linear(self, state: State) -> Linear:
+        """The motions of a state to first order."""
+        reduced, surroundings = [], []
+        for motion, samples in zip(state.motions, self.samples, strict=True):
+            linear = linearise(motion)
+            reduced.append(reduce_run(linear, samples, state.scales))
+            surroundings.append(Surroundings.of(linear))
+        return Linear(tuple(reduced), tuple(surroundings))
+
+    def step(self, state: State, linear: Linear, damping: float) -> Step:
+        """A damped Gauss-Newton step from a state with its motions to first order."""
+        reduced = linear.reduced
         maps = [self.shared_map(run, state) for run in range(len(reduced))]
         parts = [
             np.column_stack([run.rows[:-1, :-1] @ one, run.rows[:-1, -1]])
@@ -198,9 +231,21 @@ class Problem:
         shared *= min(1.0, 1.0 / max(np.abs(shared / self.farthest).max(initial=0.0), 1e-300))
         changes = [run.own_change(one @ shared) for run, one in zip(reduced, maps, strict=True)]
         states, own = (tuple(part) for part in zip(*changes, strict=True))
-        decrease = float(right @ right)
-        rank = int(kept.sum())
-        return Step(shared, states, own, triangle, singular, rank, decrease, tuple(parts), priors)
+        gains = [float(part @ part) for part in (right, *(run.own[:, -1] for run in reduced))]
+        lengths = [np.abs(shared / self.unit), *(np.abs(one) / STATE_UNIT for one in states)]
+        longest = max(float(part.max(initial=0.0)) for part in lengths)
+        return Step(
+            shared,
+            states,
+            own,
+            triangle,
+            singular,
+            int(kept.sum()),
+            sum(gains),
+            longest,
+            tuple(parts),
+            priors,
+        )
 
     def shared_map(self, run: int, state: State) -> Array:
         """What a run sees, inertia with its payload and values, by the unknowns, (9 + k, p)."""
@@ -231,8 +276,14 @@ class Problem:
         )
         return rows
 
-    def moved(self, state: State, step: Step) -> State | None:
-        """The simulated state after a step, or None where it cannot be simulated."""
+    def moved(self, state: State, step: Step, near: Sequence[Surroundings]) -> State | None:
+        """The simulated state after a step, or None where it cannot be simulated.
+
+        Args:
+            state: from which the step leads.
+            step: the step.
+            near: of the state's motions.
+        """
         aimed = replace(
             state,
             inertia=state.inertia + step.shared[:9],
@@ -242,7 +293,7 @@ class Problem:
             loads=self.loads_of(state) + step.shared[9 + len(state.values) :],
         )
         try:
-            return self.simulated(aimed)
+            return self.simulated(aimed, near)
         except ValueError:
             return None
 

@@ -19,6 +19,7 @@ from freeswing.cdpr.simulation.free_swing import Motion
 from freeswing.ident.likelihood.between_runs import jackknife_std
 from freeswing.ident.likelihood.joint_problem import TOLERANCE_M, Problem, State, Step
 from freeswing.ident.likelihood.likelihood_run import Samples, predicted, residuals
+from freeswing.ident.likelihood.minimise import minimised
 
 Progress = Callable[[str, float], None]
 
@@ -150,9 +151,9 @@ def fit(
             for first_s in (FIRST_STATES_S, end_s):
                 short = [run.until(run.span_s[0] + first_s) for run in parts]
                 states_alone = Problem(model, short, none, estimate_scales)
-                state = _minimised(states_alone, state, STEPS, ROUGH_DECREASE)[0]
+                state = minimised(states_alone, state, STEPS, ROUGH_DECREASE)[0]
         problem = Problem(model, parts, free, estimate_scales, consistent=consistent)
-        state = _minimised(problem, state, STEPS, ROUGH_DECREASE)[0]
+        state = minimised(problem, state, STEPS, ROUGH_DECREASE)[0]
     if progress:
         progress("maximum likelihood: whole runs", (total - 1) / total)
     if grow:
@@ -160,9 +161,9 @@ def fit(
             if any(run.lengths_m is not None and run.lengths_std_m < std for run in samples):
                 loose = [run.loosened(std) for run in samples]
                 problem = Problem(model, loose, free, estimate_scales, consistent=consistent)
-                state = _minimised(problem, state, STEPS, ROUGH_DECREASE)[0]
+                state = minimised(problem, state, STEPS, ROUGH_DECREASE)[0]
     problem = Problem(model, samples, free, estimate_scales, accuracy_m, consistent)
-    state, step, taken, reason = _minimised(problem, state, steps, tolerance)
+    state, step, taken, reason = minimised(problem, state, steps, tolerance)
     if progress:
         progress("maximum likelihood", 1.0)
     return _packed(problem, state, step, taken, reason)
@@ -176,35 +177,6 @@ def stretches(samples: Sequence[Samples]) -> list[float]:
         lengths.append(length)
         length *= STRETCH_GROWTH
     return lengths
-
-
-def _minimised(
-    problem: Problem, state: State, steps: int, tolerance: float
-) -> tuple[State, Step, int, str]:
-    """Levenberg-Marquardt until an undamped step lowers the cost by less than a tolerance.
-
-    The step returned is the last one taken: its triangle, not its change, is what is wanted.
-    """
-    state = problem.rescaled(problem.simulated(state))
-    damping = 0.0
-    cost, step = problem.cost(state), problem.step(state, damping)
-    for taken in range(1, steps + 1):
-        trial = problem.moved(state, step)
-        lower = problem.cost(trial) if trial is not None else np.inf
-        if trial is None or lower > cost * (1 + 1e-9) + 1e-9:
-            damping = max(1e-7, 10 * damping)
-            if damping > 1e2:
-                return state, problem.step(state, 0.0), taken, "stopped: no step lowers the cost"
-        else:
-            gain = cost - lower
-            state = problem.rescaled(trial)
-            cost = problem.cost(state)
-            damping = 0.0 if damping < 1e-6 else damping / 10
-            if gain < tolerance and damping == 0.0:
-                reason = f"converged: the last step lowered the cost by {gain:.2g}"
-                return state, step, taken, reason
-        step = problem.step(state, damping)
-    return state, problem.step(state, 0.0), steps, f"stopped after {steps} steps"
 
 
 def _packed(problem: Problem, state: State, step: Step, taken: int, reason: str) -> LikelihoodFit:

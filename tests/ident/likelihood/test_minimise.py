@@ -1,0 +1,108 @@
+"""The search for the least cost, on problems of two numbers whose answer is known."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from freeswing.ident.likelihood.joint_problem import State, Step
+from freeswing.ident.likelihood.minimise import minimised
+
+
+@dataclass
+class Valley:
+    """Residuals (m,) of two numbers with their slopes, in the shape of `Problem`."""
+
+    residuals: Any
+    slopes: Any
+    linearised: int = 0
+    moves: int = 0
+
+    def simulated(self, state: State) -> State:
+        return state
+
+    rescaled = simulated
+
+    def cost(self, state: State) -> float:
+        return float(np.sum(self.residuals(*state.values) ** 2))
+
+    def linear(self, state: State) -> Any:
+        self.linearised += 1
+        return Known(self.residuals(*state.values), self.slopes(*state.values))
+
+    def step(self, state: State, linear: Any, damping: float) -> Step:
+        left, sizes, right = np.linalg.svd(linear.slopes, full_matrices=False)
+        along = left.T @ linear.residuals
+        gains = sizes / (sizes**2 + damping * sizes[0] ** 2)
+        change = -right.T @ (gains * along)
+        longest = float(np.abs(change).max())
+        return Step(
+            change, (), (), np.eye(2), sizes, 2, float(along @ along), longest, (), np.eye(2)
+        )
+
+    def moved(self, state: State, step: Step, near: Any) -> State | None:
+        self.moves += 1
+        values = state.values + step.shared
+        return replace(state, values=values) if np.isfinite(values).all() else None
+
+
+@dataclass
+class Known:
+    residuals: Any
+    slopes: Any
+    surroundings: tuple[()] = ()
+
+
+def started(*values: float) -> State:
+    return State(np.zeros(9), np.array(values), np.zeros((0, 12)), np.ones(2))
+
+
+def rosenbrock() -> Valley:
+    return Valley(
+        lambda x, y: np.array([1e3 * (y - x * x), 1.0 - x]),
+        lambda x, y: np.array([[-2e3 * x, 1e3], [-1.0, 0.0]]),
+    )
+
+
+def test_a_step_that_climbs_out_of_a_curved_valley_stands_when_it_leads_on() -> None:
+    """Rosenbrock: the full step raises the cost a million times, the next one ends at 1, 1."""
+    valley = rosenbrock()
+    state, _, taken, reason = minimised(valley, started(-1.2, 1.44), 30, 1e-6)  # type: ignore[arg-type]
+    np.testing.assert_allclose(state.values, [1.0, 1.0], atol=1e-9)
+    assert reason.startswith("converged")
+    assert (taken, valley.linearised) == (3, 3)
+
+
+def test_what_does_not_lead_on_is_damped_and_ends_no_worse() -> None:
+    """Arctan beyond 1.39: full steps overshoot further and further."""
+    valley = Valley(
+        lambda x, y: np.array([np.arctan(x), y]),
+        lambda x, y: np.array([[1.0 / (1.0 + x * x), 0.0], [0.0, 1.0]]),
+    )
+    state, _, _, reason = minimised(valley, started(3.0, 0.5), 60, 1e-8)  # type: ignore[arg-type]
+    np.testing.assert_allclose(state.values, [0.0, 0.0], atol=1e-3)
+    assert reason.startswith("converged")
+
+
+@pytest.mark.parametrize(("start", "most"), [((0.7, 0.1), 2), ((1.0, 1.0), 1)])
+def test_a_linear_problem_takes_one_step_and_what_is_solved_none(
+    start: tuple[float, float], most: int
+) -> None:
+    valley = Valley(lambda x, y: np.array([x - 1.0, y - 1.0]), lambda x, y: np.eye(2))
+    state, _, _, reason = minimised(valley, started(*start), 30, 0.01)  # type: ignore[arg-type]
+    np.testing.assert_allclose(state.values, [1.0, 1.0], atol=1e-12)
+    assert reason.startswith("converged")
+    assert valley.linearised == most
+    assert valley.moves == most - 1
+
+
+def test_where_nothing_lowers_the_cost_it_says_so() -> None:
+    valley = Valley(
+        lambda x, y: np.array([1.0 + x * x, y]), lambda x, y: np.array([[1e-3, 0], [0, 1]])
+    )
+    state, _, _, reason = minimised(valley, started(0.0, 0.0), 60, 1e-8)  # type: ignore[arg-type]
+    assert reason == "stopped: no step lowers the cost"
+    assert np.abs(state.values).max() < 1e-3
