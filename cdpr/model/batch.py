@@ -1,22 +1,125 @@
 """CasADi functions evaluated over leading batch axes, straight from and into numpy memory.
 
-Several points go through the function's tape, all at once (`cdpr.model.tape`); a single one, and a
-function that has no tape, through CasADi's interpreter, to the same bits.
+Several points go through the function's tape, all at once (`cdpr.model.tape_kernels`); a single
+one, and a function that has no tape, through CasADi's interpreter, to the same bits.
 """
 
 from __future__ import annotations
 
-from functools import lru_cache
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache, partial
+from itertools import accumulate
 from math import prod
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
-from freeswing.cdpr.model.tape import Tape, tape_of
+from freeswing.cdpr.model import tape_kernels as kernels
 from freeswing.cdpr.robot import Array
 
 LARGEST_CHUNK = 1024
+OPERATIONS = {
+    ca.OP_MUL: kernels.MUL,
+    ca.OP_ADD: kernels.ADD,
+    ca.OP_SUB: kernels.SUB,
+    ca.OP_DIV: kernels.DIV,
+    ca.OP_NEG: kernels.NEG,
+    ca.OP_SQ: kernels.SQUARE,
+    ca.OP_TWICE: kernels.TWICE,
+    ca.OP_INV: kernels.INVERSE,
+    ca.OP_CONST: kernels.CONSTANT,
+    ca.OP_INPUT: kernels.INPUT,
+    ca.OP_OUTPUT: kernels.OUTPUT,
+    ca.OP_SQRT: kernels.ROOT,
+    ca.OP_SIN: kernels.SINE,
+    ca.OP_COS: kernels.COSINE,
+    ca.OP_TAN: kernels.TANGENT,
+    ca.OP_ASIN: kernels.ARC_SINE,
+    ca.OP_ACOS: kernels.ARC_COSINE,
+    ca.OP_ATAN: kernels.ARC_TANGENT,
+    ca.OP_TANH: kernels.TANH,
+    ca.OP_EXP: kernels.EXP,
+    ca.OP_LOG: kernels.LOG,
+    ca.OP_FABS: kernels.ABSOLUTE,
+    ca.OP_SIGN: kernels.SIGN,
+    ca.OP_ASSIGN: kernels.COPY,
+    ca.OP_NOT: kernels.NOT,
+    ca.OP_ATAN2: kernels.ARC_TANGENT_2,
+    ca.OP_POW: kernels.POWER,
+    ca.OP_CONSTPOW: kernels.POWER,
+    ca.OP_FMIN: kernels.LEAST,
+    ca.OP_FMAX: kernels.LARGEST,
+    ca.OP_LT: kernels.LESS,
+    ca.OP_LE: kernels.LESS_EQUAL,
+    ca.OP_EQ: kernels.EQUAL,
+    ca.OP_NE: kernels.UNEQUAL,
+    ca.OP_AND: kernels.AND,
+    ca.OP_OR: kernels.OR,
+    ca.OP_IF_ELSE_ZERO: kernels.IF_ELSE_ZERO,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Tape:
+    """A function as a list of instructions.
+
+    Attributes:
+        code: (k, 4) and
+        constants: (k,), as `tape_kernels.run_tape` takes them.
+        slots: of scratch memory.
+        inputs: numbers a point.
+        outputs: numbers a result; matrices by columns.
+    """
+
+    code: Array
+    constants: Array
+    slots: int
+    inputs: int
+    outputs: int
+
+    def run(self, points: Array) -> Array:
+        """Results (n, outputs) at C-contiguous points (n, inputs)."""
+        results = np.empty((len(points), self.outputs))
+        self.bound(points, results)()
+        return results
+
+    def bound(self, points: Array, results: Array) -> Callable[[], None]:
+        """What runs the tape over the same memory each time, for tight loops."""
+        work = np.empty((self.slots, kernels.LANES))
+        return partial(kernels.run_tape, self.code, self.constants, points, results, work)
+
+
+@lru_cache(maxsize=256)
+def tape_of(function: Any) -> Tape | None:
+    """A function's tape; None where it does something that tapes do not know.
+
+    Args:
+        function: a casadi Function with dense inputs and outputs.
+    """
+    if not function.is_a("SXFunction"):
+        return None
+    sizes_in = [function.numel_in(i) for i in range(function.n_in())]
+    sizes_out = [function.numel_out(i) for i in range(function.n_out())]
+    first_in, first_out = (list(accumulate(sizes, initial=0)) for sizes in (sizes_in, sizes_out))
+    count = function.n_instructions()
+    code, constants = np.zeros((count, 4), dtype=np.uint32), np.zeros(count)
+    for k in range(count):
+        operation = OPERATIONS.get(function.instruction_id(k))
+        if operation is None:
+            return None
+        to, sources = function.instruction_output(k), function.instruction_input(k)
+        if operation == kernels.CONSTANT:
+            constants[k] = function.instruction_constant(k)
+            code[k] = operation, to[0], 0, 0
+        elif operation == kernels.INPUT:
+            code[k] = operation, to[0], first_in[sources[0]] + sources[1], 0
+        elif operation == kernels.OUTPUT:
+            code[k] = operation, first_out[to[0]] + to[1], sources[0], 0
+        else:
+            code[k] = operation, to[0], sources[0], sources[-1]
+    return Tape(code, constants, function.sz_w(), first_in[-1], first_out[-1])
 
 
 def evaluate(function: Any, *arguments: Any) -> tuple[Array, ...]:
@@ -167,6 +270,43 @@ def with_jacobian(function: Any, inputs: tuple[int, ...], output: int = 0) -> An
     options = {"cse": True}
     name = f"{function.name()}_jacobian"
     return ca.Function(name, symbols, results, function.name_in(), names, options)
+
+
+@lru_cache(maxsize=16)
+def jacobians_about(function: Any, still: tuple[float, ...]) -> tuple[Any, Any]:
+    """Jacobians of a function where its last values stand still: by all before them, and by them.
+
+    What effects that do nothing there would cost falls away: a screen needs their slopes alone.
+
+    Args:
+        function: a casadi Function of SX expressions, of time, columns and, last, values.
+        still: the last values' numbers.
+
+    Returns:
+        Two functions of the same inputs without these values: Jacobians of the first output by all
+        inputs but time, (m, p), and by the values that stand still, (m, q).
+    """
+    symbols = [ca.SX.sym(f"x{i}", function.size1_in(i)) for i in range(function.n_in())]
+    first = symbols[-1].numel() - len(still)
+    moving, fixed, numbers = symbols[-1][:first], symbols[-1][first:], ca.DM(still)
+    # A symbol of its own: slices of one cannot be inputs.
+    known = ca.SX.sym("known", first)
+    there = function.call([*symbols[:-1], ca.vertcat(known, numbers)])[0]
+    by_others = ca.jacobian(there, ca.vertcat(*symbols[1:-1], known))
+    by_fixed = ca.jacobian(function.call(symbols)[0], fixed)
+    by_fixed = ca.substitute(by_fixed, ca.vertcat(moving, fixed), ca.vertcat(known, numbers))
+    options = {"cse": True}
+    return tuple(
+        ca.Function(
+            f"{function.name()}_{name}",
+            [*symbols[:-1], known],
+            [ca.densify(slopes)],
+            function.name_in(),
+            ["matrix_jacobian"],
+            options,
+        )
+        for name, slopes in (("by_others", by_others), ("by_fixed", by_fixed))
+    )
 
 
 @lru_cache(maxsize=256)

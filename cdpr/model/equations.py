@@ -7,14 +7,16 @@ cable lengths and their Jacobian, the constrained acceleration with the specific
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Any, NoReturn
+import pickle
+from dataclasses import dataclass, fields, replace
+from functools import lru_cache
+from typing import Any
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from freeswing.cdpr.effects import Instant, Parameter, effect_named
+from freeswing.cdpr.effects import Effect, Instant, Parameter, effect_named
 from freeswing.cdpr.model.body import Expression, Spin, along, rate_matrix, rotation
 from freeswing.cdpr.model.constrained import (
     Inertia,
@@ -28,32 +30,12 @@ from freeswing.cdpr.model.constrained import (
     total_inertia,
 )
 from freeswing.cdpr.model.pulley import CableState, Geometry, cable_state
+from freeswing.cdpr.model.refused import Refused
 from freeswing.cdpr.robot import Array, Robot
 
 Function = Any  # casadi.Function
 IntArray = NDArray[np.intp]
 LARGEST_SWINGING = 5
-
-
-class Refused:
-    """Stands for a function that a model cannot have: every use raises a ValueError that says why.
-
-    Args:
-        reason: what is refused, why, and the remedy.
-    """
-
-    def __init__(self, reason: str) -> None:
-        self._reason = reason
-
-    def __getattr__(self, name: str) -> NoReturn:
-        """Refuse, except what Python itself asks for."""
-        if name.startswith("__"):
-            raise AttributeError(name)
-        raise ValueError(self._reason)
-
-    def __call__(self, *_: object) -> NoReturn:
-        """Refuse."""
-        raise ValueError(self._reason)
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,6 +107,15 @@ class Model:
             raise ValueError(f"{effect} is not among {self.effects}")
         return slice(where[0], where[-1] + 1)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickled as what it was built from: whoever has built the same has its functions."""
+        built = build_model(self.robot, self.effects)
+        told = {"robot", "effects", "parameters", "names", "correlations"}
+        names = [field.name for field in fields(self)]
+        if all(getattr(self, name) is getattr(built, name) for name in names if name not in told):
+            return _rebuilt, (self.robot, self.effects, self.parameters, self.correlations)
+        return Model, tuple(getattr(self, name) for name in names)
+
     @property
     def start_values(self) -> Array:
         """Values that leave the declared model as it is, (k,)."""
@@ -181,25 +172,40 @@ def build_model(robot: Robot, effects: tuple[str, ...] = ()) -> Model:
         raise ValueError(f"robot {robot.name} has no cables; a model needs 1 or more")
     if len(set(effects)) != len(effects):
         raise ValueError(f"an effect is named twice in {effects}")
-    found = [effect_named(name) for name in effects]
+    found = tuple(effect_named(name) for name in effects)
     parameters = [effect.parameters(robot) for effect in found]
-    s = _Symbols.make(sum(len(group) for group in parameters))
-    owned, used = [], 0
-    for effect, group in zip(found, parameters, strict=True):
-        owned.append((effect, s.values[used : used + len(group)]))
-        used += len(group)
-    geometry = Geometry.of(robot)
-    for effect, values in owned:
-        geometry = effect.geometry(geometry, values)
+    pairs = [(e, p) for e, group in zip(found, parameters, strict=True) for p in group]
     return Model(
         robot,
         tuple(effects),
-        parameters=tuple(p for group in parameters for p in group),
-        names=tuple(
-            f"{e.name}.{p.name}" for e, group in zip(found, parameters, strict=True) for p in group
-        ),
-        **_functions(robot, s, geometry, owned),
+        parameters=tuple(p for _, p in pairs),
+        names=tuple(f"{e.name}.{p.name}" for e, p in pairs),
+        **_built(pickle.dumps(robot), found),
     )
+
+
+def _rebuilt(
+    robot: Robot,
+    effects: tuple[str, ...],
+    parameters: tuple[Parameter, ...],
+    correlations: Array | None,
+) -> Model:
+    model = build_model(robot, effects)
+    return replace(model, parameters=parameters, correlations=correlations)
+
+
+@lru_cache(maxsize=64)
+def _built(pickled: bytes, effects: tuple[Effect, ...]) -> dict[str, Function]:
+    """The functions of a robot with effects, which a session asks for again and again."""
+    robot: Robot = pickle.loads(pickled)
+    sizes = [len(effect.parameters(robot)) for effect in effects]
+    s = _Symbols.make(sum(sizes))
+    ends = np.cumsum([0, *sizes])
+    owned = [(e, s.values[ends[k] : ends[k + 1]]) for k, e in enumerate(effects)]
+    geometry = Geometry.of(robot)
+    for effect, values in owned:
+        geometry = effect.geometry(geometry, values)
+    return _functions(robot, s, geometry, owned)
 
 
 def _functions(robot: Robot, s: _Symbols, geometry: Geometry, owned: Owned) -> dict[str, Function]:

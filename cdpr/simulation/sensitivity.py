@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from freeswing.cdpr.model.batch import evaluate, with_jacobian
+from freeswing.cdpr.model.batch import evaluate, jacobians_about, with_jacobian
 from freeswing.cdpr.robot import Array
 from freeswing.cdpr.simulation.collocation import interpolation, table
 from freeswing.cdpr.simulation.free_swing import Motion
@@ -54,8 +54,13 @@ class Linearised:
         return moved + step**2 * zetas.reshape(shape), start[:, 6:] + step * rates.reshape(shape)
 
 
-def linearise(motion: Motion) -> Linearised:
-    """Derivatives of a motion that obeys its equations."""
+def linearise(motion: Motion, still: int = 0) -> Linearised:
+    """Derivatives of a motion that obeys its equations.
+
+    Args:
+        motion: the motion.
+        still: how many of the last values do nothing where they stand, which is quicker.
+    """
     t = table(motion.accelerations.shape[1])
     step = motion.steps_s[:, None, None]
     zetas = (
@@ -65,8 +70,7 @@ def linearise(motion: Motion) -> Linearised:
     )
     rates = motion.rates[:, None] + step * (t.once @ motion.accelerations)
     times = motion.starts_s[:, None] + motion.steps_s[:, None] * t.nodes
-    function = with_jacobian(motion.model.acceleration, (1, 2, 3, 4))
-    slopes = evaluate(function, times, zetas, rates, motion.inertia, motion.values)[1]
+    slopes = _slopes(motion, still, times, zetas, rates)
     inverses, changes = _segment_changes(motion, slopes)
     states, ends = _chained(motion, changes)
     flat = changes.reshape(len(states), -1, changes.shape[-1])
@@ -74,6 +78,21 @@ def linearise(motion: Motion) -> Linearised:
     total[..., 12:] += flat[..., 12:]
     accelerations = total.reshape(changes.shape)
     return Linearised(motion, states, accelerations, inverses, flat[..., :12], ends[..., :12])
+
+
+def _slopes(motion: Motion, still: int, *instants: Array) -> Array:
+    """Of the accelerations by [zeta; rates; inertia; values] at instants (s, m), (s, m, 6, c)."""
+    force = motion.model.acceleration
+    if not still:
+        function = with_jacobian(force, (1, 2, 3, 4))
+        return evaluate(function, *instants, motion.inertia, motion.values)[1]
+    first = len(motion.values) - still
+    numbers = tuple(float(value) for value in motion.values[first:])
+    parts = [
+        evaluate(function, *instants, motion.inertia, motion.values[:first])[0]
+        for function in jacobians_about(force, numbers)
+    ]
+    return np.concatenate(parts, axis=-1)
 
 
 def _segment_changes(motion: Motion, slopes: Array) -> tuple[Array, Array]:

@@ -74,7 +74,9 @@ def screen(
         mine = values.copy()
         mine[: len(fit.values)] = motion.values
         reduced = reduce_run(
-            linearise(replace(motion, model=model, values=mine)), samples, noise_scales
+            linearise(replace(motion, model=model, values=mine), len(values) - len(fit.values)),
+            samples,
+            noise_scales,
         )
         triangles.append(reduced.rows)
         counts.append(_count(samples, model))

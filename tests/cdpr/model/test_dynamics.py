@@ -1,10 +1,14 @@
 """Internal dynamics: W against the model, virtual work, power, batches, slopes, many cables."""
 
+import pickle
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from freeswing.cdpr.effects import catalogue
 from freeswing.cdpr.model.batch import evaluate, with_jacobian
+from freeswing.cdpr.model.elastic_motion import elastic_model
 from freeswing.cdpr.model.equations import build_model
 from freeswing.cdpr.model.free_motion import admissible_rates, choose_free_coordinates, free_basis
 from freeswing.cdpr.model.internal_dynamics import body_regressor, internal_regressor, twist_of
@@ -174,3 +178,16 @@ def test_models_refuse_what_they_cannot_be_built_from():
         build_model(robot, ("tether", "tether"))
     with pytest.raises(ValueError, match="give a tuple"):
         build_model(robot, "tether")
+
+
+def test_a_pickled_model_has_the_functions_of_whoever_built_the_same():
+    """What is derived from them, Jacobians and tapes, need not be made again."""
+    robot = robot_named("bologna-4")
+    model = replace(build_model(robot, ("translational_drag",)), correlations=np.eye(2))
+    came = pickle.loads(pickle.dumps(model))
+    assert came.acceleration is model.acceleration is build_model(robot, model.effects).acceleration
+    np.testing.assert_array_equal(came.correlations, np.eye(2))
+    other = elastic_model(robot)
+    came = pickle.loads(pickle.dumps(other))
+    assert came.names == other.names
+    assert came.acceleration.n_instructions() == other.acceleration.n_instructions()

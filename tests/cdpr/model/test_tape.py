@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from freeswing.cdpr.effects import catalogue
-from freeswing.cdpr.model.batch import Bound, evaluate
+from freeswing.cdpr.model.batch import OPERATIONS, Bound, evaluate, tape_of
 from freeswing.cdpr.model.equations import build_model
-from freeswing.cdpr.model.tape import OPERATIONS, tape_of
 from freeswing.cdpr.model.tape_kernels import LANES
 from tests.cdpr.model_cases import ring
 

@@ -101,3 +101,14 @@ def test_start_slopes_refuse_singular_choices():
     model, inertia, zeta, rates = swing_start("bologna-4")
     with pytest.raises(ValueError, match="4 cables leave 2"):
         start_slopes(model, ("x",), zeta, rates, inertia)
+
+
+def test_values_that_do_nothing_are_quicker_and_the_same():
+    """Screens hold further effects where they do nothing: all slopes, without their expressions."""
+    effects = ("translational_drag", "pulley_friction", "clock_offset", "harmonic_force")
+    start = np.array([0.2, 0.5, 0.0, 0.0, 0, 0, 0, 0, 0, 0, 1.5])
+    model, inertia, zeta, rates = swing_start("bologna-4", effects, values=start, speed=0.0)
+    motion = simulate(model, zeta, rates, (0.0, 1.5), inertia, start, TIGHT)
+    whole, quick = linearise(motion), linearise(motion, still=len(start) - 2)
+    for one, other in ((whole.states, quick.states), (whole.accelerations, quick.accelerations)):
+        np.testing.assert_allclose(other, one, atol=1e-9 * np.abs(one).max())
