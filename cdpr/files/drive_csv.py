@@ -88,23 +88,28 @@ def _write(path: Path | str, names: list[str], table: Array) -> None:
 def _read(path: Path | str, wanted: tuple[str, ...]) -> tuple[Array, NDArray[np.intp]]:
     lines = comma_separated("\n".join(read_lines(path))).split("\n")
     found = tuple(cell.strip() for cell in lines[0].split(","))
-    extra = [name for name in found[len(wanted) :] if not (name[:1] == "T" and name.endswith("_N"))]
-    if found[: len(wanted)] != wanted or extra:
-        missing = [name for name in wanted if name not in found]
-        odd = [name for name in found if name not in wanted and name not in extra] + extra
-        odd = [name for name in odd if not (name[:1] == "T" and name.endswith("_N"))]
-        says = f"lacks {', '.join(missing)}" if missing else "has them in another order"
-        more = f", has {', '.join(odd[:6])} instead" if odd else ""
+    missing = [name for name in wanted if name not in found]
+    odd = [name for name in found if name not in wanted and not _is_tension(name)]
+    twice = sorted({name for name in found if found.count(name) > 1})
+    if missing or odd or twice:
+        says = [f"lacks {', '.join(missing)}"] if missing else []
+        says += [f"has {', '.join(odd[:6])} instead"] if odd else []
+        says += [f"has {', '.join(twice[:6])} twice"] if twice else []
         raise InputError(
-            f"{path}: line 1: the header must be {wanted[0]},..,{wanted[-1]} of {len(wanted)} "
-            f"columns; it {says}{more}"
+            f"{path}: line 1: the header must hold {wanted[0]},..,{wanted[-1]}, {len(wanted)} "
+            f"columns in any order; it {', '.join(says)}"
         )
     table = read_numbers(path, enumerate(lines[1:], start=2), ",", found)
     if len(table.values) == 0:
         raise InputError(f"{path}: no rows below the header")
     if wanted[0] == "t_s":
-        check_times(path, table, 0, "t_s")
-    return table.values[:, : len(wanted)], table.lines
+        check_times(path, table, found.index("t_s"), "t_s")
+    return table.values[:, [found.index(name) for name in wanted]], table.lines
+
+
+def _is_tension(name: str) -> bool:
+    """Whether a column tells a tension, which no command reads."""
+    return name[:1] == "T" and name.endswith("_N")
 
 
 class _Table:

@@ -35,7 +35,7 @@ def add_drive_arguments(parser: ArgumentParser) -> None:
     group.add_argument("--encoder-step-rad", type=not_negative, default=0.0)
     group.add_argument(
         "--elastic-n",
-        type=positive,
+        type=finite,
         metavar="EA",
         help="elastic cables of EA N: slack is exact",
     )
