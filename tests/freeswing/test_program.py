@@ -43,6 +43,25 @@ def test_what_is_missing_is_an_error_with_its_remedy(
     assert "not usable here: numpy-of-nowhere" in said.err
 
 
+@pytest.mark.parametrize(("size_gb", "level"), [(1.99, "warning"), (2.01, "note")])
+def test_memory_from_both_sides(
+    monkeypatch: pytest.MonkeyPatch, size_gb: float, level: str
+) -> None:
+    told = {"SC_PAGE_SIZE": 4096, "SC_PHYS_PAGES": round(size_gb * 1e9 / 4096)}
+    monkeypatch.setattr(machine.os, "sysconf", told.__getitem__)
+    assert machine._memory().level == level
+
+
+def test_kernels_that_cannot_be_kept_are_said(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    (tmp_path / "one.nbc").write_bytes(b"")
+    assert machine._kernels().text.startswith("1 compiled ones")
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "nowhere"))
+    assert machine._kernels().level == "warning"
+
+
 def test_a_cluster_that_is_not_there_is_said(capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("distributed")
     assert main(["doctor", "--cluster", "nowhere"]) == 1
