@@ -49,6 +49,7 @@ FUSE = "tests/vision/fuse/test_fuse_limits.py"
 RIG = "tests/vision/rig/test_rig_limits.py"
 HOMING = "tests/homing/test_limits.py"
 DECISION = "tests/ident/diagnose/test_decision_limits.py"
+INCLUSION = "tests/ident/diagnose/lengths/test_inclusion.py"
 BENCH = "tests/ident/bench/test_bench_limits.py"
 
 HELD = (
@@ -129,14 +130,31 @@ HELD = (
     Held(
         "ident/diagnose/decision.py",
         (
-            "REFITTED", "NEARLY_AS_GOOD", "LEAST_GAIN", "SIGNIFICANCE", "LARGEST_DELTA_BIC",
+            "REFITTED", "NEARLY_AS_GOOD", "LEAST_GAIN", "ACCEPTED",
             "MOST_WORSE", "NO_WORSE", "NO_WORSE_OF_GAIN", "LEAST_GAIN_LATER",
             "LEAST_EXCESS_LATER", "CONFOUNDED_DIFFERENCE", "LEAST_EXCESS", "SMALL_LEAD",
-            "SCATTERED", "CONTRADICTED", "SCANNED_FREQUENCIES", "LEAST_SHARE_EXPLAINED",
+            "SCATTERED", "CONTRADICTED", "LEAST_SHARE_EXPLAINED",
         ),
         DECISION,
     ),
     Held("ident/diagnose/diagnose.py", ("LARGEST_EXCESS_LEFT",), DECISION),
+    Held("ident/diagnose/lengths/inclusion.py", ("ACCEPTED", "RIVAL"), INCLUSION),
+    Held("ident/diagnose/lengths/wrong_places.py", ("LESS_TRUST",), INCLUSION),
+    Held(
+        "ident/diagnose/lengths/joint_lengths.py",
+        ("WORSE",),
+        "tests/ident/diagnose/lengths/test_joint_lengths.py",
+    ),
+    Held(
+        "ident/likelihood/between_runs.py",
+        ("CHANCE",),
+        "tests/ident/likelihood/test_between_runs.py",
+    ),
+    Held(
+        "cdpr/markers/stand_outs.py",
+        ("STANDS_OUT_M",),
+        "tests/cdpr/markers/test_stand_outs.py",
+    ),
     Held(
         "ident/diagnose/unexplained.py",
         ("LEAST_EXCESS", "LEAST_COLOUR", "LEAST_HINT_GAIN"),

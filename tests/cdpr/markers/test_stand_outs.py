@@ -1,8 +1,11 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
+from freeswing.cdpr.markers.rigidity import Rigidity
 from freeswing.cdpr.markers.session import fit_session
+from freeswing.cdpr.markers.stand_outs import stand_outs
 from tests.cdpr.markers.made import drift, recording, target
 
 SHORT = slice(100, 102)
@@ -47,3 +50,11 @@ def test_what_all_samples_share_and_small_drifts_keep_their_poses():
         _, (run,) = fit_session(target(), [ghost(made, size_m, frames)])
         assert run.trajectory.is_known.all()
         assert run.examined.stand_outs == ()
+
+
+@pytest.mark.parametrize(("size_m", "stands_out"), [(4.6e-4, False), (5.4e-4, True)])
+def test_less_than_half_a_millimetre_is_the_drift_of_half_hidden_markers(size_m, stands_out):
+    residuals = 2e-5 * np.random.default_rng(1).normal(size=(300, 4, 3))
+    residuals[77, 2] = [0.0, size_m, 0.0]
+    found = Rigidity(np.zeros((4, 3)), np.full(4, 2e-5), (), 2e-5, 2e-5, residuals)
+    assert [one.frames.tolist() for one in stand_outs(found)] == ([[77]] if stands_out else [])

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from freeswing.ident.likelihood.between_runs import jackknife_std, widened
 
@@ -65,3 +66,10 @@ def test_correlations_stay_and_few_runs_say_nothing():
     wide = widened(own, np.array([20.0, 0.1]), 8)
     assert wide == pytest.approx(np.array([[400.0, 10.0], [10.0, 1.0]]))
     assert widened(own, np.array([20.0, 0.1]), 2) is own
+
+
+@pytest.mark.parametrize(("runs", "share", "wider"), [(8, 0.06, 1.0), (8, 0.045, 1.4)])
+def test_what_chance_exceeds_once_in_twenty_is_none(runs, share, wider) -> None:
+    ratio = np.sqrt(chi2.isf(share, runs - 1) / (runs - 1))
+    found = np.sqrt(widened(np.eye(1), np.array([ratio]), runs)[0, 0])
+    assert found == pytest.approx(wider, abs=0.05)

@@ -103,3 +103,20 @@ def test_runs_that_deserve_less_trust_are_named_and_both_places_are_told():
     place = WrongPlace(keys, np.zeros(2), np.eye(2), ways, 0.99, -20.0, 1e-4, 5e-5)
     assert "cannot tell attachment_offset:2 by 1.0 +- 0.2 mm (80 %)" in str(place)
     assert "or anchor_offset:2 by -4.0 +- 1.0 mm (30 %)" in str(place)
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "both", "found"),
+    [
+        (0.96, 0.02, 0.0, [("first",)]),
+        (0.94, 0.045, 0.0, []),
+        (0.9, 0.055, 0.0, [("first", "second")]),
+        (0.87, 0.07, 0.0, []),
+        (0.6, 0.2, 0.2, [("first", "second")]),
+    ],
+)
+def test_a_block_and_a_group_that_are_wrong_for_sure(first, second, both, found) -> None:
+    """Sure is 95 %; what has less than 5 % replaces nothing."""
+    none = 1.0 - first - second - both
+    chances = {("first",): first, ("second",): second, ("first", "second"): both, (): none}
+    assert groups(chances, ["first", "second"]) == found
