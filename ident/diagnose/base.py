@@ -20,6 +20,7 @@ from freeswing.ident.signals.prepare import PreparedRun
 
 Progress = Callable[[str, float], None]
 
+# One run is left out at a time: two others have to agree.
 LEAST_RUNS = 3
 MOST_STARTS = 3
 ROUGH_TOLERANCE = 1.0

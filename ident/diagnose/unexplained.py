@@ -12,6 +12,8 @@ from freeswing.ident.likelihood.likelihood import LikelihoodFit
 from freeswing.ident.likelihood.likelihood_run import predicted, residuals
 from freeswing.ident.signals.prepare import PreparedRun
 
+# What white noise does not leave: more power than its own, and that at low frequencies. A hint has
+# three terms of generic forces at most, each of which explains three per cent of the missing one.
 LEAST_EXCESS = 0.15
 LEAST_COLOUR = 1.6
 HINT_TERMS = 3
