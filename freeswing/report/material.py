@@ -8,6 +8,7 @@ from pathlib import Path
 
 from freeswing.cdpr.files.documents import InputError
 from freeswing.cdpr.robot import Robot
+from freeswing.report.control_results import ControlResults, read_control
 from freeswing.results.calibration import Calibration
 from freeswing.results.check import Check
 from freeswing.results.codec import Document
@@ -49,6 +50,7 @@ class Material:
         absent: why a result is not shown, by its kind.
         warnings: what to know of the results as a whole.
         refresh_s: how often the page reads itself anew, while a session is watched.
+        control: what `design` and `servo` wrote.
     """
 
     title: str
@@ -64,6 +66,7 @@ class Material:
     absent: Mapping[str, str] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
     refresh_s: float | None = None
+    control: ControlResults | None = None
 
     @property
     def estimates(self) -> dict[str, Estimate]:
@@ -123,4 +126,9 @@ def read_material(
             if document is not None:
                 found[kind] = document
                 break
-    return Material(title, **found, robot=robot, folder=folder, absent=why, warnings=warnings)  # pyright: ignore[reportArgumentType]
+    try:
+        control = read_control(results)
+    except InputError as failure:
+        control, why["control"] = None, str(failure)
+    shown = {"robot": robot, "folder": folder, "absent": why, "warnings": warnings}
+    return Material(title, **found, **shown, control=control)  # pyright: ignore[reportArgumentType]

@@ -16,6 +16,7 @@ from freeswing.report.panels.answer import Answer
 from freeswing.report.panels.bench import BenchPanel
 from freeswing.report.panels.cameras import Cameras
 from freeswing.report.panels.change import Change
+from freeswing.report.panels.control import ControlPanel
 from freeswing.report.panels.decay import SwingDecay
 from freeswing.report.panels.dropped import Dropped
 from freeswing.report.panels.geometry import Geometry
@@ -64,11 +65,14 @@ PANELS: tuple[Panel, ...] = (
     Cameras(),
     Markers(),
     Dropped(),
+    ControlPanel(),
     Provenance(),
 )
+# A driven robot without a session of free swings.
+DRIVEN: tuple[Panel, ...] = (ControlPanel(),)
 
 
-def render_page(material: Material) -> str:
+def render_page(material: Material, panels: tuple[Panel, ...] = PANELS) -> str:
     """The report as one HTML document; every value is escaped.
 
     Raises:
@@ -81,7 +85,7 @@ def render_page(material: Material) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    sections = [_section(environment, panel, material) for panel in PANELS]
+    sections = [_section(environment, panel, material) for panel in panels]
     sections = [one for one in sections if _is_shown(one, material)]
     style = (files("freeswing.report") / "templates" / "page.css").read_text(encoding="utf-8")
     page = environment.get_template("page.html")
@@ -94,11 +98,11 @@ def render_page(material: Material) -> str:
     )
 
 
-def write_page(path: Path, material: Material) -> None:
+def write_page(path: Path, material: Material, panels: tuple[Panel, ...] = PANELS) -> None:
     """Render the report and put it in the place of an older one, its tables as CSV beside it."""
     for name, rows in csv_tables(material).items():
         replace_file(path.with_name(name), rows.encode("utf-8"))
-    replace_file(path, render_page(material).encode("utf-8"))
+    replace_file(path, render_page(material, panels).encode("utf-8"))
 
 
 def _is_shown(section: dict[str, Any], material: Material) -> bool:

@@ -26,7 +26,8 @@ from freeswing.servo.tensions.robot_wrenches import held_at_rest
 
 # A modulus margin below this is a loop that rings: failing, though not unstable yet.
 FAILING = 0.2
-STEPS = 12  # bisections of a ray: to a four-thousandth of it
+LOOKS = 8  # along a ray, for a first place that fails
+STEPS = 12  # bisections between two looks: to a thirty-thousandth of a ray
 RAY_POINTS = 101  # of a ray, for what tensions hold: to a hundredth of it
 # A margin gained that no one would see in a step: 0.41 and 0.49 overshoot alike.
 WORTH = 0.1
@@ -176,11 +177,11 @@ def _rays(model: DrivenModel, fixed: Look, turned: Look, progress: Progress) -> 
 
 def _first_failure(look: Look, ray: Array) -> float | None:
     """The share of a ray at which the controller first fails, by bisection; None if nowhere."""
-    shares = np.linspace(0.0, 1.0, 9)[1:]
+    shares = np.linspace(0.0, 1.0, LOOKS + 1)[1:]
     first = next((float(share) for share in shares if look(share * ray).fails), None)
     if first is None:
         return None
-    low, high = first - 1.0 / 8, first
+    low, high = first - 1.0 / LOOKS, first
     for _ in range(STEPS):
         middle = (low + high) / 2
         low, high = (low, middle) if look(middle * ray).fails else (middle, high)

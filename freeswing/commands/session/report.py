@@ -27,8 +27,11 @@ def run(options: Namespace, console: Console) -> None:
     """Render what results there are; what is out of date or cannot be read is named."""
     from freeswing.cdpr.files.documents import InputError
 
-    session = open_session(options)
-    page, material = write_report(session)
+    driven = _driven(options)
+    if driven is not None:
+        page, material = driven
+    else:
+        page, material = write_report(open_session(options))
     for warning in material.warnings:
         console.complain(warning)
     console.say(str(page))
@@ -38,6 +41,42 @@ def run(options: Namespace, console: Console) -> None:
     unreadable = [why for why in material.absent.values() if "not a result" in why]
     if unreadable:
         raise InputError("; ".join(dict.fromkeys(unreadable)))
+
+
+def _driven(options: Namespace) -> tuple[Path, Material] | None:
+    """The page of a driven robot's control results; None for a session of free swings.
+
+    Raises:
+        InputError: where neither a controller nor a run of one is there.
+    """
+    from freeswing.cdpr.files.documents import InputError
+    from freeswing.cdpr.system.confine import results_folder
+    from freeswing.report.material import read_material
+    from freeswing.report.page import DRIVEN, write_page
+    from freeswing.session.drive_session import drive_path
+
+    given = Path(options.session)
+    named = drive_path(given) or _driven_robot(given)
+    if named is None:
+        return None
+    results = results_folder(named.parent, options.results)
+    material = read_material(named.resolve().parent.name, results, folder=str(named.parent))
+    if material.control is None:
+        why = material.why_absent("control")
+        raise InputError(
+            why or f"{results}: nothing to show of a driven robot yet: freeswing design {named}"
+        )
+    page = results / "report.html"
+    write_page(page, material, DRIVEN)
+    return page, material
+
+
+def _driven_robot(given: Path) -> Path | None:
+    """The robot.toml of a folder without a session, or the file itself."""
+    if given.is_dir():
+        alone = not (given / "session.toml").is_file()
+        return given / "robot.toml" if alone and (given / "robot.toml").is_file() else None
+    return given if given.name == "robot.toml" and given.is_file() else None
 
 
 def write_report(

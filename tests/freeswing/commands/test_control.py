@@ -10,6 +10,7 @@ import pytest
 from scipy.io import loadmat
 
 from freeswing.main import main
+from freeswing.servo.design import robustness
 from freeswing.servo.files.controller_file import read_controller
 from tests.places import SAMPLES
 from tests.servo.plants import cables
@@ -107,6 +108,53 @@ def test_a_task_outside_the_workspace_is_refused(designed, tmp_path, capsys):
     words = ["servo", str(INCA), "--task", str(task), "--results", str(designed)]
     assert main(words) == 2
     assert "at 2.5 s it leaves the feasible workspace at (0." in capsys.readouterr().err
+
+
+def test_a_driven_robots_report_shows_controllers_runs_and_pictures(designed, tmp_path, capsys):
+    results = tmp_path / "results"
+    shutil.copytree(designed, results)
+    task = tmp_path / "task.toml"
+    task.write_text(
+        'format = "freeswing-task/1"\nend_s = 0.3\n[[steps]]\nt_s = 0.0\nposition_m = [0, 0, 0]\n'
+        "[[steps]]\nt_s = 0.1\nposition_m = [0.01, 0.0, 0.0]\n"
+    )
+    assert main(["servo", str(INCA), "--task", str(task), "--results", str(results)]) == 0
+    assert main(["report", str(INCA), "--results", str(results)]) == 0
+    page = (results / "report.html").read_text()
+    assert page.count("data:image/svg+xml;base64,") == 4
+    for text in ("Under control", "0.940", "no Coulomb friction", "Fig. 12", "Fig. 15"):
+        assert text in page, text
+    (results / "servo.json").write_text("{}")
+    assert main(["report", str(INCA), "--results", str(results)]) == 2
+    assert "not a result of format freeswing-servo/1" in capsys.readouterr().err
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    assert main(["report", str(INCA), "--results", str(empty)]) == 2
+    assert "nothing to show of a driven robot yet: freeswing design" in capsys.readouterr().err
+
+
+def test_robustness_is_told_with_the_identified_covariance(tmp_path, monkeypatch, capsys):
+    for name, value in (("PLACES", 3), ("DRAWS", 4), ("LOOKS", 2), ("STEPS", 2)):
+        monkeypatch.setattr(robustness, name, value)
+    drive = tmp_path / "drive.json"
+    parameters = [{"name": "mass_kg", "value": 0.289, "std": 1e-3}]
+    joint = {"parameters": parameters, "correlation": [[1.0]]}
+    drive.write_text(
+        json.dumps({"format": "freeswing-drive-result/1", "estimates": {"joint": joint}})
+    )
+    words = ["design", str(INCA), "--results", str(tmp_path)]
+    assert main([*words, "--robustness", "--identified", str(drive)]) == 0
+    found = json.loads((tmp_path / "robustness.json").read_text())
+    assert found["method"].startswith("gridding")
+    assert found["draws"]["unstable"] == found["draws"]["failing"] == 0
+    assert found["draws"]["std"] == {"mass_kg": 1e-3}
+    assert len(found["first_failures"]) == 12
+    assert all(row["scheduled"]["stable"] for row in found["grid"])
+    said = capsys.readouterr().out
+    assert "places that allowed tensions hold it is stable at" in said
+    assert f"robots drawn from the covariance of {drive} 0 are unstable" in said
+    assert main([*words, "--identified", str(drive)]) == 2
+    assert "says nothing without --robustness" in capsys.readouterr().err
 
 
 def written(folder, *rows):
