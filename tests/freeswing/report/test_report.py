@@ -84,7 +84,7 @@ def test_sections_stand_in_reading_order(page: str) -> None:
     assert places == sorted(places)
     assert "The bench" not in page, "neither the section nor its link where nothing is for it"
     order = "answer bench sure ladder geometry change decay next swings cameras markers dropped"
-    assert [panel.name for panel in PANELS] == [*order.split(), "provenance"]
+    assert [panel.name for panel in PANELS] == [*order.split(), "control", "provenance"]
 
 
 def test_cameras_are_no_section_of_other_recordings() -> None:
