@@ -5,6 +5,8 @@ from __future__ import annotations
 import time
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from freeswing.commands.arguments import (
@@ -42,11 +44,12 @@ def run(options: Namespace, console: Console) -> None:
     from freeswing.commands.session.report import open_page, write_report
 
     session = open_session(options)
-    _redo(session, options, console)
-    if options.open:
-        open_page(session.results / "report.html", console)
+    seen = Seen.of(session)  # before anything is computed: what comes meanwhile is new
     try:
-        follow(options, console, lambda: time.sleep(options.every_s))
+        _redo(session, options, console)
+        if options.open:
+            open_page(session.results / "report.html", console)
+        follow(options, console, lambda: time.sleep(options.every_s), seen)
     except KeyboardInterrupt:
         console.say("no longer watched")
     finally:
@@ -54,20 +57,35 @@ def run(options: Namespace, console: Console) -> None:
     console.say_json({"format": "freeswing-watch/1", "page": str(session.results / "report.html")})
 
 
-def follow(options: Namespace, console: Console, wait: Callable[[], None]) -> None:
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """What was there at a moment: a mark of every file, and the recordings."""
+
+    files: Mark
+    recordings: frozenset[Path]
+
+    @classmethod
+    def of(cls, session: Session) -> Seen:
+        """As it is now."""
+        from freeswing.session.new_recordings import mark, recordings
+
+        return cls(mark(session), frozenset(recordings(session)))
+
+
+def follow(options: Namespace, console: Console, wait: Callable[[], None], seen: Seen) -> None:
     """Look again and again; `wait` ends it by KeyboardInterrupt.
 
     Args:
         options: as `run` takes them.
         console: where it is said.
         wait: between two looks.
+        seen: what was there when the results were last begun.
     """
     from freeswing.cdpr.files.documents import InputError
-    from freeswing.session.new_recordings import mark, recordings
+    from freeswing.session.new_recordings import mark
 
     session = open_session(options)
-    done, last = mark(session), mark(session)
-    known = recordings(session)
+    done = last = seen.files
     while True:
         wait()
         now = mark(session)
@@ -77,15 +95,18 @@ def follow(options: Namespace, console: Console, wait: Callable[[], None]) -> No
         try:
             session = open_session(options)
             if not options.no_add:
-                session = _take_in(session, known, options, console)
+                session = _take_in(session, seen.recordings, options, console)
             _say_changes(done, now, console)
+            done = last = mark(session)  # what changes while it computes is seen after it
             _redo(session, options, console)
         except InputError as failure:  # a file half edited: the next look may find it whole
             console.complain(str(failure))
-        done = last = mark(session)
+            done = last = now
 
 
-def _take_in(session: Session, known: set, options: Namespace, console: Console) -> Session:
+def _take_in(
+    session: Session, known: frozenset[Path], options: Namespace, console: Console
+) -> Session:
     from freeswing.session.new_recordings import recordings, take_in
 
     names = take_in(session, recordings(session) - known)

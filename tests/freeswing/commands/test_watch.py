@@ -12,7 +12,7 @@ from freeswing.commands.session import watch
 from freeswing.console import Console
 from freeswing.main import build_parser, main
 from freeswing.session.new_recordings import next_role, take_in
-from freeswing.session.session_file import read_session
+from freeswing.session.session_file import Session, read_session
 
 
 def options(session: Path, *flags: str) -> Namespace:
@@ -33,8 +33,9 @@ def watched(found: Namespace, steps: list, monkeypatch: pytest.MonkeyPatch) -> l
             raise KeyboardInterrupt
         step()
 
+    seen = watch.Seen.of(read_session(found.session))
     with pytest.raises(KeyboardInterrupt):
-        watch.follow(found, Console(quiet=True), wait)
+        watch.follow(found, Console(quiet=True), wait, seen)
     return redone
 
 
@@ -57,6 +58,36 @@ def test_a_new_recording_is_taken_once_it_is_whole(
     redone = watched(options(session), steps, monkeypatch)
     assert redone == [["swing-01", "check-01", "swing-02"]], "once, and only when it had settled"
     assert read_session(session).runs[-1].role == "identify"
+
+
+def test_what_comes_while_it_computes_is_not_missed(
+    session: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A person goes on swinging while the page is made."""
+    runs, redone = session / "runs", []
+
+    def redo(opened: Session, *_: object) -> None:
+        redone.append([run.name for run in opened.runs])
+        if len(redone) == 1:
+            shutil.copy(runs / "swing-01.csv", runs / "swing-03.csv")
+
+    left = iter(["swing-02", *[None] * 6])
+
+    def wait() -> None:
+        name = next(left, "end")
+        if name == "end":
+            raise KeyboardInterrupt
+        if name is not None:
+            shutil.copy(runs / "swing-01.csv", runs / f"{name}.csv")
+
+    monkeypatch.setattr(watch, "_redo", redo)
+    seen = watch.Seen.of(read_session(session))
+    with pytest.raises(KeyboardInterrupt):
+        watch.follow(options(session), Console(quiet=True), wait, seen)
+    assert redone == [
+        ["swing-01", "check-01", "swing-02"],
+        ["swing-01", "check-01", "swing-02", "swing-03"],
+    ]
 
 
 def test_without_adding_only_what_is_named_counts(
