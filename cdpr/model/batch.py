@@ -267,9 +267,9 @@ def with_jacobian(function: Any, inputs: tuple[int, ...], output: int = 0) -> An
     by = ca.vertcat(*[symbols[i] for i in inputs])
     results = [ca.densify(value), ca.densify(ca.jacobian(value, by))]
     names = [function.name_out()[output], "matrix_jacobian"]
-    options = {"cse": True}
     name = f"{function.name()}_jacobian"
-    return ca.Function(name, symbols, results, function.name_in(), names, options)
+    # A search for common expressions finds 1 % more of them in ten times the time.
+    return ca.Function(name, symbols, results, function.name_in(), names)
 
 
 @lru_cache(maxsize=16)
@@ -295,7 +295,6 @@ def jacobians_about(function: Any, still: tuple[float, ...]) -> tuple[Any, Any]:
     by_others = ca.jacobian(there, ca.vertcat(*symbols[1:-1], known))
     by_fixed = ca.jacobian(function.call(symbols)[0], fixed)
     by_fixed = ca.substitute(by_fixed, ca.vertcat(moving, fixed), ca.vertcat(known, numbers))
-    options = {"cse": True}
     return tuple(
         ca.Function(
             f"{function.name()}_{name}",
@@ -303,7 +302,6 @@ def jacobians_about(function: Any, still: tuple[float, ...]) -> tuple[Any, Any]:
             [ca.densify(slopes)],
             function.name_in(),
             ["matrix_jacobian"],
-            options,
         )
         for name, slopes in (("by_others", by_others), ("by_fixed", by_fixed))
     )

@@ -11,7 +11,7 @@ from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.model.free_motion import admissible_rates
 from freeswing.cdpr.model.known_values import prior_whitener
 from freeswing.cdpr.robot import Array
-from freeswing.cdpr.simulation.free_swing import Motion, simulate
+from freeswing.cdpr.simulation.free_swing import LARGEST_TAIL, Motion, simulate, tails
 from freeswing.cdpr.simulation.nearby import Surroundings
 from freeswing.cdpr.simulation.sensitivity import linearise
 from freeswing.ident.judge.consistency import nearest_possible
@@ -161,6 +161,30 @@ class Problem:
         )
         starts = np.array([np.concatenate([one.zetas[0], one.rates[0]]) for one in motions])
         return replace(state, starts=starts, motions=motions)
+
+    def begun(self, state: State) -> State:
+        """The state with motions: those that it has where they are its own, else simulated.
+
+        Raises:
+            ValueError: when one cannot be followed, naming the run.
+        """
+        runs = range(len(state.motions))
+        if state.motions and all(self._is_own(state, run) for run in runs):
+            return state
+        return self.simulated(state)
+
+    def _is_own(self, state: State, run: int) -> bool:
+        """Whether a state's motion of a run is what a simulation from it would be."""
+        motion, span = state.motions[run], self.samples[run].span_s
+        inertia = self.loads.inertia(run, state.inertia, self.loads_of(state))
+        has = (np.append(motion.zetas[0], motion.rates[0]), motion.inertia, motion.values)
+        needs = (state.starts[run], inertia, state.values_of(run, self.model.own_values))
+        return bool(
+            motion.model is self.model
+            and np.allclose((motion.starts_s[0], motion.end_s), span, rtol=0.0, atol=1e-9)
+            and all(np.array_equal(a, b) for a, b in zip(has, needs, strict=True))
+            and tails(motion).max() <= LARGEST_TAIL * self.tolerance_m
+        )
 
     def _followed(self, state: State, run: int, start: Array, near: Surroundings | None) -> Motion:
         samples = self.samples[run]

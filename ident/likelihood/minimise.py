@@ -40,14 +40,14 @@ def minimised(
 
     Args:
         problem: what is minimised.
-        state: where to start; its motions are not needed.
+        state: where to start; motions that belong to it are not simulated again.
         steps: at most so many.
         tolerance: converged when an undamped step lowers the cost by less, as it promises or does.
 
     Raises:
         ValueError: when the start cannot be simulated, naming the run.
     """
-    here = best = _place(problem, problem.rescaled(problem.simulated(state)))
+    here = best = _place(problem, problem.rescaled(problem.begun(state)))
     damping, rises = 0.0, 0
     for taken in range(1, steps + 1):
         step = problem.step(here.state, here.linear, damping)

@@ -21,10 +21,10 @@ class Valley:
     linearised: int = 0
     moves: int = 0
 
-    def simulated(self, state: State) -> State:
+    def begun(self, state: State) -> State:
         return state
 
-    rescaled = simulated
+    rescaled = begun
 
     def cost(self, state: State) -> float:
         return float(np.sum(self.residuals(*state.values) ** 2))
