@@ -34,6 +34,7 @@ class Parameter:
             False for shape parameters (a frequency, a point of application).
         per_run: True when each run has its own value (a phase that no clock ties to the runs).
         part: the cable that it belongs to, where an effect may touch one cable alone.
+        source: who says what is known of it beforehand; empty for its plausible range.
     """
 
     name: str
@@ -44,15 +45,17 @@ class Parameter:
     amplitude: bool = True
     per_run: bool = False
     part: str = ""
+    source: str = ""
 
     @property
     def prior_std(self) -> float:
         """A third of the way from the start to the farther bound."""
         return max(self.high - self.start, self.start - self.low) / 3.0
 
-    def known(self, value: float, std: float) -> Parameter:
-        """The parameter with a value and its standard deviation as what is known beforehand."""
-        return replace(self, start=value, low=value - 3.0 * std, high=value + 3.0 * std)
+    def known(self, value: float, std: float, source: str) -> Parameter:
+        """The parameter with a value and its standard deviation as what `source` knows of it."""
+        low, high = value - 3.0 * std, value + 3.0 * std
+        return replace(self, start=value, low=low, high=high, source=source)
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,7 +18,9 @@ def prior_whitener(model: Model) -> Array:
     return np.linalg.solve(np.linalg.cholesky(model.correlations), scaled)
 
 
-def with_known(model: Model, places: IntArray, values: Array, covariance: Array) -> Model:
+def with_known(
+    model: Model, places: IntArray, values: Array, covariance: Array, source: str
+) -> Model:
     """The model with some of its values known as a joint Gaussian.
 
     Args:
@@ -26,11 +28,12 @@ def with_known(model: Model, places: IntArray, values: Array, covariance: Array)
         places: among its values, (q,).
         values: their means, (q,).
         covariance: theirs, (q, q).
+        source: who says so, a few words for people.
     """
     stds = np.sqrt(np.diag(covariance))
     parameters = list(model.parameters)
     for place, value, std in zip(places, values, stds, strict=True):
-        parameters[place] = parameters[place].known(float(value), float(std))
+        parameters[place] = parameters[place].known(float(value), float(std), source)
     count = len(parameters)
     together = np.eye(count) if model.correlations is None else model.correlations.copy()
     together[places] = together[:, places] = 0.0

@@ -12,7 +12,7 @@ from freeswing.cdpr.robot import Array
 from freeswing.ident.diagnose.leave_one_out import Score
 from freeswing.ident.diagnose.lengths.wrong_places import WrongPlace
 from freeswing.ident.diagnose.refit import Refit, colour_of, plausible
-from freeswing.ident.diagnose.screen import BASE, value_priors
+from freeswing.ident.diagnose.screen import value_priors
 from freeswing.ident.diagnose.spectrum import independent_numbers
 from freeswing.ident.diagnose.variants import effect_of, inside, variants
 from freeswing.ident.diagnose.weights import Rival, model_probabilities
@@ -225,8 +225,9 @@ def _rival(one: Refit, key: str) -> Rival:
     columns = np.flatnonzero(fit.free)
     linear = one.evidence.subset(columns)
     known = value_priors(fit.model, fit.values)[:, np.append(columns, -1)]
-    body = np.zeros((BASE, known.shape[1]))
-    body[:, :BASE] = np.diag(1.0 / (INERTIA_RANGE * INERTIA_UNIT))
+    size = len(INERTIA_UNIT)
+    body = np.zeros((size, known.shape[1]))
+    body[:, :size] = np.diag(1.0 / (INERTIA_RANGE * INERTIA_UNIT))
     prior = np.vstack([body, known[np.abs(known[:, :-1]).sum(axis=1) > 0.0]])
     tries = 0.0
     if key:

@@ -21,12 +21,12 @@ from freeswing.ident.diagnose.experiments import separating_experiment
 from freeswing.ident.diagnose.heldout import HeldOut, held_out
 from freeswing.ident.diagnose.lengths.wrong_places import Kinematics
 from freeswing.ident.diagnose.refit import Refit
-from freeswing.ident.diagnose.screen import BASE
 from freeswing.ident.diagnose.search import Round, Search
 from freeswing.ident.diagnose.unexplained import Unexplained, unexplained
 from freeswing.ident.diagnose.variants import effect_of
 from freeswing.ident.fidim.fidim_stage import fidim_estimates
 from freeswing.ident.identify import session_notes
+from freeswing.ident.likelihood.blocks import INERTIA
 from freeswing.ident.likelihood.calibration_modes import with_calibration
 from freeswing.ident.likelihood.inertia_starts import likelihood_starts
 from freeswing.ident.likelihood.likelihood import LikelihoodFit, fit
@@ -333,32 +333,31 @@ def _candidate_entry(one: Candidate) -> dict[str, Any]:
 def _accepted(
     final: LikelihoodFit, covariance: Array, groups: dict[str, tuple[str, ...]]
 ) -> list[dict[str, Any]]:
-    entries = []
-    stds = np.sqrt(np.diag(covariance))
+    entries, unknowns = [], final.unknowns
     beside = {n for key, group in groups.items() for n in group if n != key} - set(groups)
     for name in claims(final.model.effects):
         if name in beside:  # in the model because nobody can tell it from the one named
             continue
-        where = final.model.place_of(name)
+        block, columns = unknowns.block(name), unknowns.columns(name)
+        together = covariance[np.ix_(columns, columns)]
+        parameters = final.model.parameters[final.model.place_of(name)]
         rows = [
-            {
-                "name": final.model.parameters[k].name,
-                "value": float(final.values[k]),
-                "std": float(stds[BASE + k]),
-            }
-            for k in range(where.start, where.stop)
-            if final.model.parameters[k].per_run or final.free[BASE + k]
+            {"name": parameter.name, "value": float(value), "std": float(np.sqrt(variance))}
+            for parameter, value, variance, estimated in zip(
+                parameters, block.value, np.diag(together), block.mask, strict=True
+            )
+            if parameter.per_run or estimated
         ]
         group = [other for other in groups.get(name, ()) if other != name]
-        places = np.arange(where.start, where.stop)[final.free[BASE:][where]]
-        seen = directions(final.model, places, covariance[np.ix_(BASE + places, BASE + places)])
+        places = np.r_[final.model.place_of(name)][block.mask]
+        seen = directions(final.model, places, together[np.ix_(block.mask, block.mask)])
         entry = {"effect": name, "parameters": rows, "confounded_with": group}
         entries.append(entry | ({"directions": seen} if seen else {}))
     return entries
 
 
 def _parameters(found: LikelihoodFit, covariance: Array) -> list[dict[str, Any]]:
-    stds = np.sqrt(np.diag(covariance))[:9]
+    stds = np.sqrt(np.diag(covariance))[found.unknowns.place(INERTIA)]
     return [
         {"name": name, "value": float(value), "std": float(std)}
         for name, value, std in zip(INERTIA_NAMES, found.inertia, stds, strict=True)

@@ -13,13 +13,16 @@ from freeswing.cdpr.model.known_values import with_known
 from freeswing.cdpr.robot import Array
 from freeswing.ident.diagnose.leave_one_out import Evidence, Score, score
 from freeswing.ident.diagnose.outstanding_runs import tempered
-from freeswing.ident.diagnose.screen import BASE, screen
+from freeswing.ident.diagnose.screen import screen
 from freeswing.ident.diagnose.spectrum import residual_powers
 from freeswing.ident.diagnose.variants import effect_of, extended, inside, reduced
+from freeswing.ident.likelihood.blocks import each_run, effect_blocks, free_of
 from freeswing.ident.likelihood.joint_problem import State
 from freeswing.ident.likelihood.likelihood import LikelihoodFit, correlation_factor, fit
+from freeswing.ident.likelihood.unknowns import Unknowns
 
 RANKING_STEPS = 12
+BY_LENGTHS = "the lengths along the runs"
 # Surveys and calibrations are good to a few tenths of a millimetre: 0.3 mm for a displaced point.
 NEGLIGIBLE = 0.1
 RANKING_ACCURACY_M = 3e-7
@@ -82,30 +85,27 @@ def refit(
     Raises:
         ValueError: when the start cannot be simulated.
     """
-    model, free, state = _joined(current.model, current.free, current.state, candidate, values)
-    state = replace(state, scales=noise_scales * np.sqrt(colour))
-    return rescored(_fitted(model, current, state, free), noise_scales, colour)
+    runs = len(current.samples)
+    model, unknowns = _joined(current.model, current.unknowns, candidate, values, runs)
+    state = current.start_of(unknowns, model, noise_scales * np.sqrt(colour))
+    return rescored(_fitted(model, current, state, free_of(unknowns, model)), noise_scales, colour)
 
 
 def _joined(
-    before: Model, estimated: np.ndarray, start: State, key: str, values: Array
-) -> tuple[Model, np.ndarray, State]:
-    """The model with a candidate, which unknowns are estimated, and a state to go on from.
+    before: Model, unknowns: Unknowns, key: str, values: Array, runs: int
+) -> tuple[Model, Unknowns]:
+    """The model with a candidate, and its unknowns to go on from.
 
     `values` are those of the candidate's whole effect; what the model has of it already stays.
     """
-    model, free = before, estimated.copy()
-    all_values, own_values = start.values, start.own_values
-    name = effect_of(key)
-    if name in model.effects:
-        free[BASE:][model.place_of(name)] |= inside(model.robot, key)
-    else:
-        model = extended(model, (name,))
-        free = np.concatenate([free, inside(model.robot, key)])
-        all_values = np.concatenate([all_values, values])
-        own_values = _with_new(own_values, len(model.own_values))
-    state = State(start.inertia, all_values, start.starts, start.scales, own_values=own_values)
-    return model, free, state
+    name, chosen = effect_of(key), inside(before.robot, key)
+    if name in before.effects:
+        return before, unknowns.estimating(name, chosen)
+    model = extended(before, (name,))
+    count = sum(p.per_run for p in model.parameters[model.place_of(name)])
+    return model, unknowns.joined(
+        *effect_blocks(model, name, values, chosen, np.zeros((runs, count)))
+    )
 
 
 def displaced(
@@ -126,10 +126,11 @@ def displaced(
     """
     found = current.fit
     scales = noise_scales * np.sqrt(colour_of(found, noise_scales))
-    model, free, state = found.model, found.free, found.state
+    model, unknowns = found.model, found.unknowns
     for key in keys:
         nothing = [p.start for p in effect_named(effect_of(key)).parameters(model.robot)]
-        model, free, state = _joined(model, free, state, key, np.array(nothing))
+        model, unknowns = _joined(model, unknowns, key, np.array(nothing), len(found.samples))
+    state = found.start_of(unknowns, model, scales)
     values = state.values.copy()
     chosen = np.concatenate(
         [
@@ -138,9 +139,9 @@ def displaced(
         ]
     )
     values[chosen] = centre
-    known = with_known(model, chosen, centre, covariance)
-    start = replace(state, values=values, scales=scales)
-    return polished(_fitted(known, found, start, free), noise_scales)
+    known = with_known(model, chosen, centre, covariance, BY_LENGTHS)
+    start = replace(state, values=values)
+    return polished(_fitted(known, found, start, free_of(unknowns, model)), noise_scales)
 
 
 def polished(found: LikelihoodFit, noise_scales: Array) -> Refit:
@@ -154,15 +155,12 @@ def polished(found: LikelihoodFit, noise_scales: Array) -> Refit:
 
 def without(found: LikelihoodFit, name: str, noise_scales: Array) -> Refit:
     """A fit without one of its effects, from where it stands, converged."""
-    model, start = found.model, found.state
-    place = np.arange(len(start.values))[model.place_of(name)]
-    fewer = reduced(model, name)
-    own = start.own_values
-    if own is not None:
-        own = own[:, ~np.isin(model.own_values, place)]
-    values, free = np.delete(start.values, place), np.delete(found.free, BASE + place)
-    state = State(start.inertia, values, start.starts, start.scales, own_values=own)
-    exact = fit(fewer, found.samples, state, free, estimate_scales=False, grow=False)
+    mine = (name, each_run(name)) if each_run(name) in found.unknowns else (name,)
+    unknowns, fewer = found.unknowns.without(*mine), reduced(found.model, name)
+    state = found.start_of(unknowns, fewer, found.scales)
+    exact = fit(
+        fewer, found.samples, state, free_of(unknowns, fewer), estimate_scales=False, grow=False
+    )
     return rescored(exact, noise_scales, colour_of(exact, noise_scales))
 
 
@@ -181,20 +179,13 @@ def _fitted(model: Model, current: LikelihoodFit, state: State, free: np.ndarray
     )
 
 
-def _with_new(own_values: Array | None, count: int) -> Array | None:
-    """The runs' own values with zeros for those of the candidate."""
-    if own_values is None:
-        return None
-    return np.pad(own_values, ((0, 0), (0, count - own_values.shape[1])))
-
-
 def plausible(refitted: Refit, key: str) -> list[str]:
     """What is not plausible about a candidate's values: a sentence each."""
     name = effect_of(key)
     where = refitted.values_of(name)
     chosen = np.flatnonzero(inside(refitted.fit.model.robot, key))
     parameters = [refitted.fit.model.parameters[where][k] for k in chosen]
-    stds = refitted.fit.std[BASE:][where][chosen]
+    stds = refitted.fit.std_of(name)[chosen]
     values = refitted.fit.values[where][chosen]
     complaints = []
     for parameter, value, std in zip(parameters, values, stds, strict=True):

@@ -6,10 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from freeswing.cdpr.effects import effect_named
 from freeswing.ident.diagnose.decision import ACCEPTED, CONFOUNDED_DIFFERENCE, included
 from freeswing.ident.diagnose.refit import Refit, colour_of
-from freeswing.ident.diagnose.screen import BASE
 
 # Of the BIC without an effect to second order, below which leaving it out is worth a fit.
 LARGEST_RISE = 10.0
@@ -30,14 +28,13 @@ def superfluous(current: Refit, kept: Sequence[str]) -> str:
             continue
         where = current.values_of(name)
         parameters = current.fit.model.parameters[where]
-        settled = parameters != effect_named(name).parameters(current.fit.model.robot)
+        settled = any(parameter.source for parameter in parameters)
         if settled or any(parameter.per_run for parameter in parameters):
             continue
-        estimated = current.fit.free[BASE:][where]
+        estimated = current.fit.unknowns.block(name).mask
         tested = [k for k, p in enumerate(parameters) if p.amplitude and estimated[k]]
         away = current.fit.values[where] - [parameter.start for parameter in parameters]
-        columns = BASE + where.start + np.array(tested)
-        covariance = current.fit.covariance[np.ix_(columns, columns)]
+        covariance = current.fit.covariance_of(name)[np.ix_(tested, tested)]
         rise = float(away[tested] @ np.linalg.solve(covariance, away[tested]))
         rises[name] = rise - estimated.sum() * np.log(count)
     if not rises:

@@ -13,10 +13,9 @@ from freeswing.cdpr.robot import Array
 from freeswing.cdpr.simulation.sensitivity import linearise
 from freeswing.ident.diagnose.leave_one_out import Evidence
 from freeswing.ident.diagnose.variants import effect_of, extended, inside
+from freeswing.ident.likelihood.blocks import columns_of, shared_size
 from freeswing.ident.likelihood.likelihood import LikelihoodFit
 from freeswing.ident.likelihood.likelihood_run import Samples, reduce_run
-
-BASE = 9
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,18 +96,17 @@ def _count(samples: Samples, model: Model) -> int:
 
 
 def _amplitudes(model: Model, key: str) -> np.ndarray:
-    where = model.place_of(effect_of(key))
     chosen = inside(model.robot, key)
-    parameters = model.parameters[where]
+    parameters = model.parameters[model.place_of(effect_of(key))]
     offsets = [k for k, p in enumerate(parameters) if chosen[k] and p.amplitude and not p.per_run]
-    return BASE + where.start + np.array(offsets, dtype=np.int64)
+    return columns_of(model, effect_of(key))[offsets]
 
 
 def value_priors(model: Model, values: Array) -> Array:
     """Each effect value is within its plausible range: a weak row each, (k, 9 + k + 1)."""
-    rows = np.zeros((len(values), BASE + len(values) + 1))
+    rows = np.zeros((len(values), shared_size(model) + 1))
     whitener = prior_whitener(model)
     whitener[model.own_values] = 0.0
-    rows[:, BASE:-1] = whitener
+    rows[:, -1 - len(values) : -1] = whitener
     rows[:, -1] = whitener @ (values - model.start_values)
     return rows

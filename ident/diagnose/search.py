@@ -40,7 +40,7 @@ from freeswing.ident.diagnose.refit import (
     without,
 )
 from freeswing.ident.diagnose.removal import is_no_worse, superfluous
-from freeswing.ident.diagnose.screen import BASE, Screen, screen
+from freeswing.ident.diagnose.screen import Screen, screen
 from freeswing.ident.diagnose.spectrum import Residual, too_small
 from freeswing.ident.diagnose.variants import effect_of, inside, variants
 from freeswing.ident.likelihood.likelihood import LikelihoodFit
@@ -166,7 +166,7 @@ class Search:
         for name in self.candidates:
             keys = variants(model.robot, name)
             if name in current.effects:
-                estimated = current.fit.free[BASE:][current.values_of(name)]
+                estimated = current.fit.unknowns.block(name).mask
                 keys = [k for k in keys[1:] if not estimated[inside(model.robot, k)].any()]
             left += keys
         return left

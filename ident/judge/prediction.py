@@ -8,6 +8,7 @@ import numpy as np
 
 from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.robot import POSE_COORDINATES, Array, frozen_array
+from freeswing.ident.likelihood.blocks import none_free
 from freeswing.ident.likelihood.joint_problem import State
 from freeswing.ident.likelihood.likelihood import LikelihoodFit, fit
 from freeswing.ident.likelihood.likelihood_run import Samples, predicted
@@ -121,9 +122,7 @@ def _followed(model: Model, samples: Samples, state: State) -> LikelihoodFit:
 
 
 def _fitted(model: Model, samples: Samples, state: State, grow: bool) -> LikelihoodFit:
-    return fit(
-        model, [samples], state, free=np.zeros(9 + len(model.parameters), dtype=bool), grow=grow
-    )
+    return fit(model, [samples], state, free=none_free(model), grow=grow)
 
 
 def _seen(found: LikelihoodFit) -> Array:

@@ -52,7 +52,7 @@ class GeometryPriors:
         model = build_model(robot, tuple(stds))
         spread = [stds[name.split(".")[0]] for name in model.names]
         parameters = tuple(
-            replace(parameter.known(0.0, std), scale=std)
+            replace(parameter.known(0.0, std, "[tolerances] of robot.toml"), scale=std)
             for parameter, std in zip(model.parameters, spread, strict=True)
         )
         return replace(model, parameters=parameters)
@@ -97,7 +97,7 @@ def geometry_document(found: LikelihoodFit) -> dict[str, Any]:
     """`geometry` of an estimate's entry: each coordinate's correction; empty where it was exact."""
     if not len(found.values):
         return {}
-    stds = found.std[9 : 9 + len(found.values)]
+    stds = np.concatenate([found.std_of(name) for name in found.model.effects])
     rows = [
         {"name": name, "value": float(value), "std": float(std), "prior_std": parameter.prior_std}
         for name, value, std, parameter in zip(

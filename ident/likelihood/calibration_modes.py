@@ -99,7 +99,7 @@ def with_calibration(
             current.model,
             samples,
             current.state,
-            current.free[: 9 + len(current.values)],
+            current.free,
             grow=False,
             consistent=consistent,
         )

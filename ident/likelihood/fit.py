@@ -87,12 +87,7 @@ class Solution:
 
     def place(self, name: str) -> slice:
         """Where a shared block stands in the covariance."""
-        first = 0
-        for block in self.unknowns.shared:
-            if block.name == name:
-                return slice(first, first + block.size)
-            first += block.size
-        raise ValueError(f"no shared unknown is called {name!r}")
+        return self.unknowns.place(name)
 
     def value(self, name: str) -> Array:
         """Values of a block."""
@@ -100,7 +95,7 @@ class Solution:
 
     def covariance_of(self, *names: str) -> Array:
         """Joint covariance of some shared blocks."""
-        places = np.concatenate([np.r_[self.place(name)] for name in names])
+        places = self.unknowns.columns(*names)
         return self.covariance[np.ix_(places, places)]
 
     def std(self, name: str) -> Array:

@@ -17,9 +17,19 @@ from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.robot import Array
 from freeswing.cdpr.simulation.free_swing import Motion
 from freeswing.ident.likelihood.between_runs import jackknife_std
+from freeswing.ident.likelihood.blocks import (
+    effect_blocks,
+    inertia_block,
+    none_free,
+    payload_block,
+    split_own,
+    state_of,
+)
 from freeswing.ident.likelihood.joint_problem import TOLERANCE_M, Problem, State, Step
 from freeswing.ident.likelihood.likelihood_run import Samples, predicted, residuals
 from freeswing.ident.likelihood.minimise import minimised
+from freeswing.ident.likelihood.payload_runs import Loads
+from freeswing.ident.likelihood.unknowns import Unknowns
 
 Progress = Callable[[str, float], None]
 
@@ -90,6 +100,37 @@ class LikelihoodFit:
         return np.sqrt(np.diag(self.covariance))
 
     @property
+    def unknowns(self) -> Unknowns:
+        """All of them by name (see `ident.likelihood.blocks`)."""
+        model = self.model
+        own = np.array([motion.values[model.own_values] for motion in self.motions])
+        each = split_own(model, own)
+        loads = Loads.of([run.payload for run in self.samples])
+        sizes = [len(self.inertia), len(self.values)]
+        body, values, payloads = np.split(self.free, np.cumsum(sizes))
+        blocks = [inertia_block(self.inertia, body)]
+        for name in model.effects:
+            where = model.place_of(name)
+            mine = each.get(name, np.zeros((len(own), 0)))
+            blocks += effect_blocks(model, name, self.values[where], values[where], mine)
+        if loads.count:
+            blocks.append(payload_block(loads, self.loads, payloads))
+        return Unknowns(tuple(blocks))
+
+    def covariance_of(self, *names: str) -> Array:
+        """Joint covariance of some blocks of the shared unknowns."""
+        places = self.unknowns.columns(*names)
+        return self.covariance[np.ix_(places, places)]
+
+    def std_of(self, name: str) -> Array:
+        """Standard deviations of a block of the shared unknowns."""
+        return self.std[self.unknowns.place(name)]
+
+    def start_of(self, unknowns: Unknowns, model: Model, scales: Array) -> State:
+        """Where a fit of another model goes on from the runs' states as they are here."""
+        return state_of(unknowns, model, self.state.starts, scales)
+
+    @property
     def enlargement(self) -> float:
         """By what the covariance was multiplied for residuals that are not white."""
         return _enlargement(self.correlation)
@@ -142,7 +183,7 @@ def fit(
         raise ValueError("no run to fit")
     stages = stretches(samples) if grow else []
     state, total = start, len(stages) + 1
-    none = np.zeros(9 + len(model.parameters), dtype=bool)
+    none = none_free(model)
     for index, end_s in enumerate(stages):
         if progress:
             progress(f"maximum likelihood: first {end_s:.1f} s", index / total)

@@ -18,6 +18,7 @@ from freeswing.ident.judge.free_swing_law import (
     unexplained_motion,
 )
 from freeswing.ident.likelihood.between_runs import widened
+from freeswing.ident.likelihood.blocks import INERTIA, PAYLOADS
 from freeswing.ident.likelihood.cable_ends import geometry_document, weighed_against_priors
 from freeswing.ident.likelihood.calibration_modes import with_calibration
 from freeswing.ident.likelihood.guess_run_start import first_state
@@ -205,7 +206,7 @@ def _held(found: LikelihoodFit, progress: Progress | None) -> LikelihoodFit:
     """The fit again, its inertia held to what a body can have."""
     if found.rank < int(found.free.sum()):
         return found
-    inertia = nearest_possible(found.inertia, found.covariance[:9, :9])
+    inertia = nearest_possible(found.inertia, found.covariance_of(INERTIA))
     start = replace(found.state, inertia=inertia, motions=())
     return fit(found.model, found.samples, start, progress=progress, consistent=True)
 
@@ -231,8 +232,9 @@ def started(
 def _entry(
     found: LikelihoodFit, dropped: tuple[DroppedRun, ...], held_cost: float | None
 ) -> Estimate:
-    own = found.covariance[:9, :9]
-    covariance = widened(own, found.between[:9], len(found.samples))
+    own = found.covariance_of(INERTIA)
+    between = found.between[found.unknowns.place(INERTIA)]
+    covariance = widened(own, between, len(found.samples))
     if not np.isfinite(covariance).all():
         raise ValueError(
             f"the samples do not determine the inertia: rank {found.rank} of "
@@ -254,9 +256,8 @@ def _entry(
         )
     mass = None
     if len(found.loads):
-        place = 9 + len(found.values)
         try:
-            mass = mass_of(found.loads[0], float(found.std[place]))
+            mass = mass_of(found.loads[0], float(found.std_of(PAYLOADS)[0]))
         except ValueError as error:
             notes.append(str(error))
     if said := consistency(found.inertia, covariance, held_cost).sentence():

@@ -140,6 +140,23 @@ class Unknowns:
                 return block
         raise ValueError(f"no unknown is called {name!r}; there are {', '.join(self.names)}")
 
+    def place(self, name: str) -> slice:
+        """Where a block stands among the shared unknowns.
+
+        Raises:
+            ValueError: when none is called so.
+        """
+        first = 0
+        for block in self.shared:
+            if block.name == name:
+                return slice(first, first + block.size)
+            first += block.size
+        raise ValueError(f"no shared unknown is called {name!r}")
+
+    def columns(self, *names: str) -> NDArray[np.int64]:
+        """Where some blocks stand among the shared unknowns, one after the other."""
+        return np.concatenate([np.r_[self.place(name)] for name in names])
+
     def joined(self, *more: Unknown) -> Unknowns:
         """These and further blocks."""
         return Unknowns((*self.blocks, *more))
@@ -154,6 +171,11 @@ class Unknowns:
         """The same with some blocks held at their values."""
         changed = {name: replace(self.block(name), estimated=np.False_) for name in names}
         return self._changed(changed)
+
+    def estimating(self, name: str, mask: Mask) -> Unknowns:
+        """The same with those numbers of a block estimated too that a mask (size,) picks."""
+        block = self.block(name)
+        return self._changed({name: replace(block, estimated=block.mask | mask)})
 
     def known(self, name: str, prior: Gaussian | None) -> Unknowns:
         """The same with another prior of a block."""

@@ -15,7 +15,8 @@ PLACES = np.array([3, 4, 5])
 def known():
     model = build_model(declared_robot("three-cable"), ("attachment_offset",))
     root = 1e-3 * np.array([[1.0, 0.0, 0.0], [2.0, 1.0, 0.0], [-1.0, 0.5, 0.3]])
-    return with_known(model, PLACES, np.array([1e-3, -2e-3, 3e-3]), root @ root.T), root @ root.T
+    known = with_known(model, PLACES, np.array([1e-3, -2e-3, 3e-3]), root @ root.T, "a test")
+    return known, root @ root.T
 
 
 def test_the_whitener_makes_the_joint_prior_of_unit_deviation(known):
