@@ -12,11 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from freeswing.cdpr.descent import AT_ROUNDING, LevenbergMarquardt, Nielsen, Stop, converged
+
 Array = NDArray[np.float64]
 
 _RANK_LIMIT = 1e-13
 _SETTLED = 1e-11
-_LARGEST_DAMPING = 1e100  # far beyond any step; unbounded it would overflow
+_DAMPING = Nielsen(ease=1 / 30, least=1e-15, growth=2.0, faster=2.0)
 _STRAIGHT = 0.03
 
 
@@ -125,34 +127,79 @@ def solve_arrow(
     A step is final when it changes no unknown by more than `tolerance`, or when the cost has
     settled or cannot fall any more in double precision.
     """
-    current = linearize(blocks, border)
-    cost = _robust_cost(current, loss_limit)
-    damping, growth = 1e-4, 2.0
-    normal = _normal_equations(current, loss_limit)
-    for iteration in range(1, max_iterations + 1):
-        step_blocks, step_border, predicted = _damped_step(normal, damping)
-        size = max(np.abs(step_blocks).max(), np.abs(step_border).max())
-        trial = linearize(blocks + step_blocks, border + step_border)
-        trial_cost = _robust_cost(trial, loss_limit)
-        if np.isfinite(trial_cost) and trial_cost < cost:
-            ratio = (cost - trial_cost) / max(predicted, 1e-300)
-            blocks, border = blocks + step_blocks, border + step_border
-            before, current, cost = cost, trial, trial_cost
-            damping *= max(1 / 30, 1 - (2 * ratio - 1) ** 3)
-            damping, growth = max(damping, 1e-15), 2.0
-            if size < tolerance:
-                return _finish(blocks, border, current, loss_limit, cost, iteration, "small step")
-            if before - cost < _SETTLED * cost:
-                return _finish(blocks, border, current, loss_limit, cost, iteration, "cost settled")
-            normal = _normal_equations(current, loss_limit)
-            continue
-        if size < tolerance or predicted <= 1e-14 * cost:
-            return _finish(
-                blocks, border, current, loss_limit, cost, iteration, "cost at its floor"
-            )
-        damping, growth = min(damping * growth, _LARGEST_DAMPING), growth * 2
-    text = f"no convergence after {max_iterations} iterations"
-    return _finish(blocks, border, current, loss_limit, cost, max_iterations, text, False)
+    search = _Search(linearize, loss_limit, tolerance)
+    solver = LevenbergMarquardt(max_iterations, _DAMPING)
+    ended, count, stop = solver.descend(search, search.at(blocks, border))
+    weights = huber_weights(ended.linearization.residuals, loss_limit)
+    return ArrowSolution(
+        ended.blocks,
+        ended.border,
+        ended.linearization,
+        weights,
+        ended.cost,
+        count,
+        stop.sentence,
+        stop.converged,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _At:
+    """Unknowns, and the residuals and robust cost there."""
+
+    blocks: Array
+    border: Array
+    linearization: Linearization
+    cost: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Step:
+    """Changes of the unknowns, and by what they lower the cost to first order."""
+
+    blocks: Array
+    border: Array
+    promised: float
+
+    @property
+    def size(self) -> float:
+        """Largest change."""
+        return max(np.abs(self.blocks).max(), np.abs(self.border).max())
+
+
+class _Search:
+    """A problem as `LevenbergMarquardt` takes it; the equations of a place are made once."""
+
+    def __init__(self, linearize: Linearize, loss_limit: float, tolerance: float) -> None:
+        self.linearize, self.loss_limit, self.tolerance = linearize, loss_limit, tolerance
+        self._equations: tuple[_At, tuple[Array, ...]] | None = None
+
+    def at(self, blocks: Array, border: Array) -> _At:
+        """A place of the search."""
+        found = self.linearize(blocks, border)
+        return _At(blocks, border, found, _robust_cost(found, self.loss_limit))
+
+    def step(self, place: _At, damping: float) -> _Step:
+        """With every pose eliminated."""
+        if self._equations is None or self._equations[0] is not place:
+            self._equations = place, _normal_equations(place.linearization, self.loss_limit)
+        return _Step(*_damped_step(self._equations[1], damping))
+
+    def moved(self, place: _At, step: _Step) -> _At:
+        """The place after a step."""
+        return self.at(place.blocks + step.blocks, place.border + step.border)
+
+    def ended(
+        self, place: _At, step: _Step, trial: _At | None, lower: bool, damping: float
+    ) -> Stop | None:
+        """Once nothing changes any more, or cannot in double precision."""
+        small = step.size < self.tolerance
+        if trial is not None and lower:
+            if small:
+                return converged("a small step")
+            settled = place.cost - trial.cost < _SETTLED * trial.cost
+            return converged("the cost has settled") if settled else None
+        return AT_ROUNDING if small or step.promised <= 1e-14 * place.cost else None
 
 
 def covariance(linearization: Linearization, weights: Array) -> ArrowCovariance:
@@ -207,9 +254,7 @@ def _normal_equations(
     return _weighted(linearization, weights, np.where(weights < 1, _STRAIGHT * weights, weights))
 
 
-def _damped_step(
-    normal: tuple[Array, Array, Array, Array, Array], damping: float
-) -> tuple[Array, Array, float]:
+def _damped_step(normal: tuple[Array, ...], damping: float) -> tuple[Array, Array, float]:
     """Steps of the blocks and the border, and the fall of cost that the linear model promises."""
     block, mixed, border, slope_block, slope_border = normal
     diagonal = np.einsum("npp->np", block)
@@ -227,17 +272,3 @@ def _damped_step(
         np.diag(border) @ step_border**2
     )
     return step_blocks, step_border, float(0.5 * (linear + quadratic))
-
-
-def _finish(
-    blocks: Array,
-    border: Array,
-    linearization: Linearization,
-    limit: float,
-    cost: float,
-    iterations: int,
-    stop: str,
-    converged: bool = True,
-) -> ArrowSolution:
-    weights = huber_weights(linearization.residuals, limit)
-    return ArrowSolution(blocks, border, linearization, weights, cost, iterations, stop, converged)

@@ -22,8 +22,12 @@ from freeswing.calib.rig.normal_equations import (
     normal_equations,
 )
 from freeswing.calib.rig.reprojection import Scene, board_residuals, fixed_residuals, moved
+from freeswing.cdpr import descent
+from freeswing.cdpr.descent import Damping, LevenbergMarquardt, Stop
 
 MOST_ITERATIONS = 60
+SOLVER = LevenbergMarquardt(MOST_ITERATIONS, Damping(growth=4.0, faster=2.0), level=True)
+_HARDLY_DAMPED = 1e-3  # a step so damped is as good as the full one
 # expected fall of the cost at which to stop, in units where one residual of 1 sigma counts 1/2
 CONVERGED = 1e-7
 ROUGHLY_CONVERGED = 1e-2
@@ -88,7 +92,9 @@ def adjust(
     for turn in range(rounds):
         if turn:
             sigma = _noise(scene, problem, residuals, sigma)
-        scene, cost, steps, stop = _minimise(scene, problem, sigma, converged)
+        search = _Search(problem, sigma, converged)
+        ended, steps, reason = SOLVER.descend(search, search.at(scene))
+        scene, cost, stop = ended.scene, ended.cost, reason.sentence
         residuals = board_residuals(scene, problem.board_points_m, problem.views)
         iterations += steps
     sigma = _noise(scene, problem, residuals, sigma)
@@ -101,28 +107,59 @@ def adjust(
     )  # fmt: skip
 
 
-def _minimise(
-    scene: Scene, problem: Problem, sigma: Array, converged: float
-) -> tuple[Scene, float, int, str]:
-    damping, growth = 1e-4, 4.0
-    normal = normal_equations(scene, problem, sigma)
-    for iteration in range(1, MOST_ITERATIONS + 1):
-        shared, boards = damped_step(normal, problem.free, damping)
+@dataclass(frozen=True, slots=True)
+class _At:
+    """A scene and its normal equations."""
+
+    scene: Scene
+    normal: Normal
+
+    @property
+    def cost(self) -> float:
+        return self.normal.cost
+
+
+@dataclass(frozen=True, slots=True)
+class _Step:
+    """Changes of what is shared and of the boards, and the fall of cost they promise."""
+
+    shared: Array
+    boards: Array
+    promised: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Search:
+    """A problem with a noise, as `LevenbergMarquardt` takes it."""
+
+    problem: Problem
+    sigma: Array
+    converged: float
+
+    def at(self, scene: Scene) -> _At:
+        """A place of the search."""
+        return _At(scene, normal_equations(scene, self.problem, self.sigma))
+
+    def step(self, place: _At, damping: float) -> _Step | None:
+        """None where the normal equations are singular."""
+        normal = place.normal
+        shared, boards = damped_step(normal, self.problem.free, damping)
         fall = float(shared @ normal.shared_slope + np.sum(boards * normal.board_slopes)) / 2.0
-        if not np.isfinite(fall):
-            return scene, normal.cost, iteration, "the normal equations cannot be solved"
-        trial = moved(scene, shared, boards)
-        new: Normal = normal_equations(trial, problem, sigma)
-        if new.cost <= normal.cost:
-            scene, normal = trial, new
-            if fall < converged and damping <= 1e-3:
-                return scene, normal.cost, iteration, "converged"
-            damping, growth = max(damping * 0.1, 1e-12), 4.0
-        elif fall < converged:
-            return scene, normal.cost, iteration, "converged to rounding"
-        else:
-            damping, growth = damping * growth, growth * 2.0
-    return scene, normal.cost, MOST_ITERATIONS, f"stopped after {MOST_ITERATIONS} steps"
+        return _Step(shared, boards, fall) if np.isfinite(fall) else None
+
+    def moved(self, place: _At, step: _Step) -> _At:
+        """The scene after a step, its cost infinite where a corner cannot be seen."""
+        return self.at(moved(place.scene, step.shared, step.boards))
+
+    def ended(
+        self, place: _At, step: _Step, trial: _At | None, lower: bool, damping: float
+    ) -> Stop | None:
+        """Once a step promises next to nothing."""
+        if step.promised >= self.converged:
+            return None
+        if not lower:
+            return descent.AT_ROUNDING
+        return descent.CONVERGED if damping <= _HARDLY_DAMPED else None
 
 
 def _noise(scene: Scene, problem: Problem, residuals: Array, last: Array | None) -> Array:

@@ -8,9 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from freeswing.cdpr.descent import CONVERGED, Damping, LevenbergMarquardt, Stop
+
 Array = NDArray[np.float64]
 
 MOST_ITERATIONS = 60
+DAMPING = Damping(largest=1e8)
 SMALL_GAIN = 1e-8  # of the cost: at 4e4 residuals a fiftieth of a standard deviation
 # Columns scaled to 1: below this a direction is not determined by the data in double precision.
 RANK_LIMIT = 1e-13
@@ -93,26 +96,61 @@ def minimise(
     at = np.array(start, dtype=np.float64)
     low = np.full_like(at, -np.inf) if low is None else low
     high = np.full_like(at, np.inf) if high is None else high
-    normal, damping = evaluate(at), 1e-4
-    for count in range(1, MOST_ITERATIONS + 1):
+    solver = LevenbergMarquardt(MOST_ITERATIONS, DAMPING)
+    ended, count, stop = solver.descend(_Search(evaluate, low, high), _At(at, evaluate(at)))
+    return Found(ended.values, ended.normal, count, stop.sentence)
+
+
+@dataclass(frozen=True, slots=True)
+class _At:
+    """A point and the sum of squares about it."""
+
+    values: Array
+    normal: Normal
+
+    @property
+    def cost(self) -> float:
+        return self.normal.cost
+
+
+@dataclass(frozen=True, slots=True)
+class _Step:
+    """A change of the values, and by what it lowers the cost to first order."""
+
+    change: Array
+    promised: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Search:
+    """A sum of squares within bounds, as `LevenbergMarquardt` takes it."""
+
+    evaluate: Callable[[Array], Normal]
+    low: Array
+    high: Array
+
+    def step(self, place: _At, damping: float) -> _Step:
+        """Damped by Marquardt's scaling."""
+        normal = place.normal
         unit, lengths = scaled(normal.matrix)
-        lifted = unit + damping * np.eye(len(at))
-        step = -np.linalg.solve(lifted, normal.gradient / lengths) / lengths
-        trial = np.clip(at + step, low, high)
+        lifted = unit + damping * np.eye(len(place.values))
+        change = -np.linalg.solve(lifted, normal.gradient / lengths) / lengths
+        return _Step(change, float(-normal.gradient @ change))
+
+    def moved(self, place: _At, step: _Step) -> _At | None:
+        """Led back inside the bounds; None for a step too far."""
+        trial = np.clip(place.values + step.change, self.low, self.high)
         try:
-            ahead = evaluate(trial)
+            return _At(trial, self.evaluate(trial))
         except ValueError:
-            ahead = None
-        if ahead is not None and ahead.cost < normal.cost:
-            gain = normal.cost - ahead.cost
-            at, normal, damping = trial, ahead, max(damping * 0.1, 1e-12)
-            if gain < SMALL_GAIN * max(normal.cost, 1.0):
-                return Found(at, normal, count, "converged")
-        elif damping > 1e8:
-            return Found(at, normal, count, "converged")
-        else:
-            expected = -normal.gradient @ step
-            if ahead is not None and expected < SMALL_GAIN * max(normal.cost, 1.0):
-                return Found(at, normal, count, "converged")
-            damping *= 10.0
-    return Found(at, normal, MOST_ITERATIONS, f"stopped after {MOST_ITERATIONS} steps")
+            return None
+
+    def ended(
+        self, place: _At, step: _Step, trial: _At | None, lower: bool, damping: float
+    ) -> Stop | None:
+        """Once the cost falls, or could fall, by next to nothing."""
+        if trial is None:
+            return None
+        here = trial.cost if lower else place.cost
+        gain = place.cost - trial.cost if lower else step.promised
+        return CONVERGED if gain < SMALL_GAIN * max(here, 1.0) else None

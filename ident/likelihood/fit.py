@@ -12,6 +12,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from freeswing.cdpr.descent import STUCK, Stop, converged, out_of_steps
 from freeswing.cdpr.robot import Array
 from freeswing.ident.likelihood.unknowns import Unknown, Unknowns
 
@@ -71,8 +72,7 @@ class Solution:
         singular_values: of the scaled triangle in the estimated shared unknowns, descending.
         rank: how many of them count.
         steps: taken.
-        reason: why it stopped, a sentence.
-        converged: whether it is because nothing could be gained any more.
+        stop: why it ended.
     """
 
     unknowns: Unknowns
@@ -82,8 +82,17 @@ class Solution:
     singular_values: Array
     rank: int
     steps: int
-    reason: str
-    converged: bool
+    stop: Stop
+
+    @property
+    def reason(self) -> str:
+        """Why it ended, a sentence."""
+        return self.stop.sentence
+
+    @property
+    def converged(self) -> bool:
+        """Whether it ended because nothing could be gained any more."""
+        return self.stop.converged
 
     def place(self, name: str) -> slice:
         """Where a shared block stands in the covariance."""
@@ -134,7 +143,7 @@ def fit(swings: Sequence[Swing], unknowns: Unknowns, how: How | None = None) -> 
         raise ValueError("no run to fit")
     made = _simulated(swings, unknowns)
     cost, damping, taken = _cost(swings, unknowns, made), 0.0, 0
-    reason, converged = f"stopped after {how.steps} steps", False
+    stop = out_of_steps(how.steps)
     parts = _linearised(swings, unknowns, made)
     while taken < how.steps:
         taken += 1
@@ -143,23 +152,23 @@ def fit(swings: Sequence[Swing], unknowns: Unknowns, how: How | None = None) -> 
             damping = max(FIRST_DAMPING, 10.0 * damping)
             step = _step(parts, unknowns, damping)
         if damping == 0.0 and step.gain < how.tolerance:
-            reason, converged = f"converged: a step would gain {step.gain:.2g}", True
+            stop = converged(f"a step would gain {step.gain:.2g}")
             break
         trial = _moved(unknowns, step, how.farthest)
         lower, made = _cost_or_infinite(swings, trial)
         if lower > cost * (1.0 + 1e-12):
             damping = max(FIRST_DAMPING, 10.0 * damping)
             if damping > LARGEST_DAMPING:
-                reason = "stopped: no step lowers the cost"
+                stop = STUCK
                 break
             continue
         gained, unknowns, cost = cost - lower, trial, lower
         parts = _linearised(swings, unknowns, made)
         damping = 0.0 if damping < FIRST_DAMPING else damping / 3.0
         if gained < how.tolerance and step.gain < 10.0 * how.tolerance:
-            reason, converged = f"converged: the last step gained {gained:.2g}", True
+            stop = converged(f"the last step gained {gained:.2g}")
             break
-    return _packed(parts, unknowns, cost, taken, reason, converged)
+    return _packed(parts, unknowns, cost, taken, stop)
 
 
 def _simulated(swings: Sequence[Swing], unknowns: Unknowns) -> list[Any]:
@@ -283,9 +292,7 @@ def _moved(unknowns: Unknowns, step: _Step, farthest: float) -> Unknowns:
     return unknowns.moved(moves)
 
 
-def _packed(
-    parts: list[Part], unknowns: Unknowns, cost: float, taken: int, reason: str, converged: bool
-) -> Solution:
+def _packed(parts: list[Part], unknowns: Unknowns, cost: float, taken: int, stop: Stop) -> Solution:
     step = _step(parts, unknowns, 0.0)
     free = _joined([block.mask for block in unknowns.shared]).astype(bool)
     scales = _joined([block.scale for block in unknowns.shared])
@@ -300,9 +307,7 @@ def _packed(
     n_own = sum(block.size for block in unknowns.own)
     white = tuple(residuals[: len(residuals) - n_own] for residuals, _, _ in parts)
     rank = int(kept.sum())
-    return Solution(
-        unknowns, covariance, cost, white, step.singular_values, rank, taken, reason, converged
-    )
+    return Solution(unknowns, covariance, cost, white, step.singular_values, rank, taken, stop)
 
 
 def _joined(parts: Sequence[Array]) -> Array:

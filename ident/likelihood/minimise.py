@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from freeswing.cdpr.descent import STUCK, converged, out_of_steps
 from freeswing.ident.likelihood.joint_problem import Linear, Problem, State, Step
 
 FIRST_DAMPING = 1e-7  # of the largest curvature: below, a damped step is the full one
@@ -76,8 +77,8 @@ def minimised(
             break
     step = problem.step(best.state, best.linear, 0.0)
     failed = damping > LARGEST_DAMPING
-    reason = "stopped: no step lowers the cost" if failed else f"stopped after {steps} steps"
-    return best.state, step, taken, reason
+    stop = STUCK if failed else out_of_steps(steps)
+    return best.state, step, taken, stop.sentence
 
 
 def _place(problem: Problem, state: State) -> Place:
@@ -85,4 +86,4 @@ def _place(problem: Problem, state: State) -> Place:
 
 
 def _converged(gain: float) -> str:
-    return f"converged: the last step lowered the cost by {max(gain, 0.0):.2g}"
+    return converged(f"the last step lowered the cost by {max(gain, 0.0):.2g}").sentence
