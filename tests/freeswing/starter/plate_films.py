@@ -27,7 +27,7 @@ from tests.vision.scenes import look_at
 SECOND_TAG_M = (1.2, 0.0, 0.1)
 MIDDLE_M = np.array([0.6, -0.9, -0.25])  # of the plate
 SHEET_M = np.array([0.0, -0.15, 0.0])  # its cross from the plate's middle, on the front
-SIZE_PX, RATE_HZ, SECONDS = (640, 480), 25.0, 5.0
+SIZE_PX, RATE_HZ, SECONDS = (1024, 576), 20.0, 5.0
 LOOK = Look(psf_px=0.6, noise=1.5, texture=8.0)
 # Axes of the sheet in the plate's at rest: x to the right, y up, z towards the cameras.
 SHEET_AXES = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
@@ -101,8 +101,8 @@ def _stamps(start_s: float, seconds: float, rate_hz: float) -> Array:
 
 def _cameras() -> tuple[Camera, ...]:
     centre = MIDDLE_M + np.array([0.0, 0.2, 0.1])
-    left = np.array([620.0, 621.0, 318.0, 241.0, -0.10, 0.03, -4e-4, 2e-4])
-    right = np.array([612.0, 611.0, 321.0, 238.0, -0.12, 0.05, 2e-4, 4e-4])
+    left = np.array([1000.0, 1001.5, 509.0, 289.0, -0.10, 0.03, -4e-4, 2e-4])
+    right = np.array([992.0, 991.0, 514.0, 285.0, -0.12, 0.05, 2e-4, 4e-4])
     return (
         Camera("left", SIZE_PX, "OPENCV", left, look_at((-0.2, -2.5, 0.1), centre)),
         Camera("right", SIZE_PX, "OPENCV", right, look_at((1.4, -2.5, 0.0), centre), 0.0031),
@@ -149,9 +149,9 @@ def _board_scene(session: Session) -> Scene:
 
     def carried(times_s: Array) -> tuple[Array, Array]:
         t = np.asarray(times_s)
-        way = [0.3 * np.sin(1.3 * t), 0.25 * np.sin(0.9 * t + 1.0), 0.25 * np.sin(2.1 * t + 0.5)]
+        way = [0.25 * np.sin(1.3 * t), 0.2 * np.sin(0.9 * t + 1.0), 0.15 * np.sin(2.1 * t + 0.5)]
         tilt = [0.5 * np.sin(1.7 * t), 0.3 * np.sin(1.1 * t + 2.0), 0.5 * np.sin(0.8 * t + 0.3)]
-        middle = MIDDLE_M + np.array([0.0, -0.55, 0.15])
+        middle = MIDDLE_M + np.array([0.0, -0.7, 0.15])
         return middle + np.stack(way, axis=1), exp_rotation(np.stack(tilt, axis=1))
 
     return Scene((*_wall(session), patch.moved(facing, "platform")), carried)

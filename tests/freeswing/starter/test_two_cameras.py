@@ -20,7 +20,7 @@ LARGEST_Z = 4.0  # of nine parameters; the samples allow 4.5
 def test_from_an_empty_folder_to_an_answer(tmp_path: Path) -> None:
     """new, (print, measure, film), check, run."""
     folder = tmp_path / "lab-day"
-    words = ["--kind", "plate", "--cables", "3", "--mass-kg", "4", "--rate-hz", "25"]
+    words = ["--kind", "plate", "--cables", "3", "--mass-kg", "4", "--rate-hz", "20"]
     commands = [["new", str(folder), *words], ["check", str(folder)], ["run", str(folder)]]
     assert len(commands) <= MOST_COMMANDS
     assert main(commands[0]) == 0
