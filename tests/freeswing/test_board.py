@@ -167,3 +167,18 @@ def test_a_wrong_resolution_is_refused(tmp_path: Path, capsys: pytest.CaptureFix
     printed(tmp_path, CHARUCO)
     assert main(["board", str(tmp_path), "--dpi", "0"]) == 2
     assert "--dpi 0 must lie in 10 to 4800" in capsys.readouterr().err
+
+
+def test_pages_of_paper_hold_all_with_a_ruler(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pdfium = pytest.importorskip("pypdfium2")
+    folder = printed(tmp_path, CHARUCO, "--paper", "a3")
+    book = pdfium.PdfDocument(folder / "a3.pdf")
+    sizes = {tuple(sorted(round(25.4 / 72.0 * side) for side in page.get_size())) for page in book}
+    assert sizes == {(297, 420)}
+    texts = [page.get_textpage().get_text_range() for page in book]
+    assert all("this ruler must be 100.0 mm long" in text for text in texts)
+    assert "tag36h11 100" in texts[1]
+    assert main(["board", str(tmp_path), "--paper", "a4", "--quiet"]) == 2
+    assert "take larger paper" in capsys.readouterr().err

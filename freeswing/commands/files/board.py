@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 
 FORMATS = ("pdf", "svg", "png")
+PAPERS = ("a4", "letter", "a3")
 MOST_DPI = 4800.0
 
 
@@ -29,6 +30,9 @@ def add_arguments(parser: ArgumentParser) -> None:
         action="append",
         dest="formats",
         help="default pdf; may be repeated",
+    )
+    parser.add_argument(
+        "--paper", choices=PAPERS, help="also all on pages of paper, a test ruler on each"
     )
     parser.add_argument(
         "--dpi", type=finite, default=600.0, help="dots per inch of png, default 600"
@@ -49,10 +53,31 @@ def run(options: Namespace, console: Console) -> None:
             replace_file(path, _bytes(sheet, kind, options.dpi))
             console.say(f"{path}: {sheet.width_mm:.6g} mm wide")
             written.append(str(path))
+    if options.paper:
+        path = session.results / "print" / f"{options.paper}.pdf"
+        replace_file(path, _pages(session, options.paper))
+        console.say(f"{path}: all of them, a test ruler on each page")
+        written.append(str(path))
     if not written:
         raise DataError(f"{session.path}: names neither a calibration board nor tags to print")
     console.say("print at 100 % (no fit to page), then measure the width with a ruler")
     console.say_json({"format": "freeswing-board/1", "sheets": written})
+
+
+def _pages(session: Session, paper: str) -> bytes:
+    """All sheets on pages of paper.
+
+    Raises:
+        InputError: where one does not fit.
+    """
+    from freeswing.cdpr.files.documents import InputError
+    from freeswing.printing.pages import Page, Placed, pages_pdf
+
+    pages = [Page((Placed(sheet, 0.0, 0.0),), sheet.label) for _, sheet in _sheets(session)]
+    try:
+        return pages_pdf(pages, paper)
+    except ValueError as failure:
+        raise InputError(f"--paper: {failure}") from failure
 
 
 def _bytes(sheet: Sheet, kind: str, dpi: float) -> bytes:
