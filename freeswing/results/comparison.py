@@ -6,9 +6,10 @@ import json
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from freeswing.cdpr.files.documents import InputError
+from freeswing.cdpr.robot import INERTIA_NAMES
 from freeswing.results.codec import Document, Entry, Numbers, entry
 from freeswing.results.common import Parameter
 from freeswing.results.diagnosis import Diagnosis
@@ -58,6 +59,8 @@ class Comparison(Document):
 def read_side(name: str) -> Side:
     """A result by its place: a session, a results folder, or a file; `:ESTIMATE` picks one.
 
+    A truth.json (of `freeswing demo`, of a sample) serves too: it has no deviations.
+
     The diagnosis' parameters are taken where there is one and no estimate is named, since they
     count the effects that the model lacked.
 
@@ -78,7 +81,8 @@ def read_side(name: str) -> Side:
 
 def _from_file(name: str, path: Path, estimate: str) -> Side:
     try:
-        kind = json.loads(path.read_text(encoding="utf-8")).get("format", "")
+        table = json.loads(path.read_text(encoding="utf-8"))
+        kind = table.get("format", "")
     except FileNotFoundError:
         raise InputError(f"{path}: no such result; run freeswing identify first") from None
     except (OSError, ValueError, AttributeError, RecursionError) as error:
@@ -87,6 +91,9 @@ def _from_file(name: str, path: Path, estimate: str) -> Side:
         found = read_document(path, Diagnosis)
         rows = () if found is None else found.parameters_after
         return Side(name=name, source="diagnosis", parameters=rows)
+    truth = _truth(table)
+    if truth:
+        return Side(name=name, source="truth", parameters=truth)
     document = read_document(path, Identification)
     estimates = {} if document is None else document.ranked
     chosen = estimate or next(iter(estimates), "")
@@ -94,6 +101,22 @@ def _from_file(name: str, path: Path, estimate: str) -> Side:
         there = ", ".join(one for one in ESTIMATE_ORDER if one in estimates) or "none"
         raise InputError(f"{path}: estimate {chosen or 'any'}: it holds {there}")
     return Side(name=name, source=chosen, parameters=estimates[chosen].parameters)
+
+
+def _truth(table: dict[str, Any]) -> tuple[Parameter, ...]:
+    """The nine parameters of a truth.json, without deviations; empty where it is none."""
+    known = table.get("parameters")
+    if not isinstance(known, dict):
+        com, inertia = table.get("com_m"), table.get("specific_inertia_m2")
+        if not (isinstance(com, list) and isinstance(inertia, list)):
+            return ()
+        known = dict(zip(INERTIA_NAMES, [*com, *inertia], strict=False))
+    found = {name: known.get(name) for name in INERTIA_NAMES}
+    return tuple(
+        Parameter(name=name, value=float(value))
+        for name, value in found.items()
+        if isinstance(value, int | float)
+    )
 
 
 def compare(sides: Sequence[Side]) -> Comparison:

@@ -18,7 +18,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         "results",
         metavar="RESULT",
         nargs="+",
-        help="a session, its results folder, identification.json or diagnosis.json; "
+        help="a session, its results folder, identification.json, diagnosis.json or truth.json; "
         "RESULT:ml_free and the like name one estimate",
     )
     parser.add_argument(

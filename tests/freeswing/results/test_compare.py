@@ -70,6 +70,26 @@ def test_the_picture_names_sides_and_what_differs(tmp_path: Path) -> None:
     assert f"{sides[1]} (ml_full)" in text
 
 
+@pytest.mark.parametrize(
+    "table",
+    [
+        {"parameters": {"com_x_m": 0.0021, "Ixx_m2": 0.05}},
+        {"com_m": [0.0021, 0.0, 0.2], "specific_inertia_m2": [0.05, 0.07, 0.04, 0, 0, 0]},
+    ],
+    ids=["of the demonstration", "of a sample"],
+)
+def test_a_truth_is_a_side_without_deviations(
+    table: dict, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = left(tmp_path / "a", 0.002)
+    write_json(tmp_path / "truth.json", table)
+    assert main(["compare", found, str(tmp_path / "truth.json"), "--json"]) == 0
+    row = json.loads(capsys.readouterr().out)["rows"][0]
+    assert row["values"] == [0.002, 0.0021]
+    assert row["stds"] == [1e-5, None]
+    assert row["z"] == [pytest.approx(10.0)]
+
+
 def test_what_cannot_be_compared_is_named(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
