@@ -32,12 +32,11 @@ NO_WORSE_OF_GAIN = 0.1
 # application differ a little from reality, and 0.1 mm samples see it.
 LEAST_GAIN_LATER = 0.25
 LEAST_EXCESS_LATER = 0.005
-# Leads that say nothing: e^6 in likelihood, a tenth of the gain against the likelihood, one that a
-# third of the runs contradict; and a gain that 15 % of them do.
+# What may well be it instead of the best: more probable than this, or behind by no more than e^6 in
+# the likelihood of left-out runs. A gain that 15 % of the runs contradict is none.
+RIVAL = 0.05
 CONFOUNDED_DIFFERENCE = 12.0
 LEAST_EXCESS = 0.005
-SMALL_LEAD = 0.1
-SCATTERED = 1.0 / 3.0
 CONTRADICTED = 0.15
 # Inertias are anywhere within so many of their usual sizes.
 INERTIA_RANGE = 10.0
@@ -181,8 +180,8 @@ def decided(
             complaints[name] = complaint
         else:
             passed[name] = one
-    key, group = _winner(passed, current, noise_scales)
     chances = probabilities(current, tried, noise_scales)
+    key, group = _winner(passed, chances, current, noise_scales)
     told = _best_of_each([key, *sorted(tried, key=lambda n: tried[n].held_out), *ranked])
     candidates = []
     for one in filter(None, told):
@@ -309,36 +308,25 @@ def excess_of(current: Refit) -> float:
 
 
 def _winner(
-    passed: dict[str, Refit], current: Refit, noise_scales: Array
+    passed: dict[str, Refit], chances: dict[str, float], current: Refit, noise_scales: Array
 ) -> tuple[str, tuple[str, ...]]:
-    """The best of those that passed, and all effects that held-out runs cannot tell from it."""
+    """The best of those that passed, and all effects that the runs cannot tell from it.
+
+    These are the ones that left-out runs predict as well but for the noise, and those that may
+    well be it instead.
+    """
     if not passed:
         return "", ()
     first = min(passed, key=lambda name: passed[name].held_out)
     colour = colour_of(passed[first].fit, noise_scales)
-    group = [name for name in passed if _as_good(passed, name, first, current, colour)]
+    group = [
+        name
+        for name, one in passed.items()
+        if (one.held_out - passed[first].held_out) / colour < CONFOUNDED_DIFFERENCE
+        or chances[name] > RIVAL
+    ]
     group.sort(key=lambda n: (sum(unknowns(current, n)), passed[n].held_out))
     return group[0], tuple(dict.fromkeys(map(effect_of, group)))
-
-
-def _as_good(
-    passed: dict[str, Refit], name: str, first: str, current: Refit, colour: float
-) -> bool:
-    """Whether the best's lead is within the noise, or within its own scatter from run to run.
-
-    A lead that a third of the runs contradict, and that is less than two of its standard errors,
-    could be another one's on the next recordings. So could a small one against the likelihood.
-    """
-    one, best = passed[name], passed[first]
-    lead = one.held_out - best.held_out
-    if lead / colour < CONFOUNDED_DIFFERENCE:
-        return True
-    bic = delta_bic(current, one.score, name, colour)
-    if bic <= delta_bic(current, best.score, first, colour):
-        return bool(lead < SMALL_LEAD * (current.held_out - best.held_out))
-    leads = one.score.held_out - best.score.held_out
-    against = runs_worse(leads, current.score)
-    return bool(against >= SCATTERED * len(leads) and leads.sum() < 2.0 * _scatter(leads))
 
 
 def _scatter(gains: Array) -> float:
@@ -359,7 +347,7 @@ def _verdict(
     if name in group:
         others = tuple(n for n in group if n != name)
         if others:
-            return "confounded", f"held-out runs cannot tell it from {', '.join(others)}", others
+            return "confounded", f"these runs cannot tell it from {', '.join(others)}", others
         return "accepted", f"removes {100 * gain:.1f} % of the held-out excess over the noise", ()
     if key in complaints:
         return "rejected", complaints[key], ()

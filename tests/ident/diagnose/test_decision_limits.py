@@ -11,9 +11,9 @@ from freeswing.ident.diagnose import base, decision, diagnose, outstanding_runs,
 from freeswing.ident.diagnose import unexplained as rest
 from freeswing.ident.diagnose.decision import (
     Decision,
-    _as_good,
     _complaint,
     _gain,
+    _winner,
     promising,
     runs_worse,
     settles,
@@ -156,34 +156,23 @@ def test_whether_what_won_may_be_the_cause(share, left, settled) -> None:
     assert settles(Decision((), winner, "effect", ("effect",)), before) == settled
 
 
-def as_good(lead: float, bic: float, colour: float = 1.0, runs=None) -> bool:
-    """Whether a fit that is behind by `lead` in left-out squares, BIC ahead, counts as good."""
-    before = fitted([1000.0] * 12, 1e4)
-    best = fitted([500.0] * 12, 100.0)
-    leads = np.full(12, lead / 12) if runs is None else np.asarray(runs, dtype=float)
-    one = fitted(500.0 + leads, 100.0 - bic)
-    return _as_good({"best": best, "one": one}, "one", "best", before, colour)
+def group_of(lead: float, chance: float) -> tuple[str, ...]:
+    """The group of a best fit and of one behind by `lead` in left-out squares, so probable."""
+    before, best = fitted([1000.0] * 12, 1e4), fitted([500.0] * 12, 100.0)
+    best.fit = None
+    passed = {"best": best, "one": fitted(500.0 + np.full(12, lead / 12), 99.0)}
+    chances = {"best": 1.0 - chance, "one": chance}
+    return _winner(passed, chances, before, np.ones(2))[1]
 
 
 @pytest.mark.parametrize(
-    ("lead", "bic", "good"),
-    [(11.2, -1.0, True), (12.8, -1.0, False), (560.0, 1.0, True), (640.0, 1.0, False)],
+    ("lead", "chance", "told_apart"),
+    [(11.2, 0.0, False), (12.8, 0.0, True), (500.0, 0.055, False), (500.0, 0.045, True)],
 )
-def test_leads_that_are_none(lead, bic, good) -> None:
-    """Twelve in squares; against the likelihood a tenth of what the best gained, 6000."""
-    assert as_good(lead, bic) == good
-
-
-@pytest.mark.parametrize(("against", "good"), [(3, False), (4, True)])
-def test_a_lead_that_a_third_of_the_runs_contradict(against, good) -> None:
-    runs = [900.0] + [20.0] * (11 - against) + [-100.0] * against
-    assert as_good(0.0, -1.0, runs=runs) == good
-
-
-def test_a_lead_that_three_of_ten_contradict_stands() -> None:
-    before, best = fitted([1000.0] * 10, 1e4), fitted([500.0] * 10, 100.0)
-    one = fitted(500.0 + np.array([900.0] + [20.0] * 6 + [-100.0] * 3), 101.0)
-    assert not _as_good({"best": best, "one": one}, "one", "best", before, 1.0)
+def test_leads_that_are_none(monkeypatch, lead, chance, told_apart) -> None:
+    """Twelve in squares of left-out runs, or what is more probable than 5 %."""
+    monkeypatch.setattr(decision, "colour_of", lambda *_: 1.0)
+    assert group_of(lead, chance) == (("best",) if told_apart else ("best", "one"))
 
 
 @pytest.mark.parametrize(("excess", "believed"), [(0.47, True), (0.53, False)])
