@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import cache, lru_cache, partial
 from itertools import accumulate
 from math import prod
 from typing import Any
@@ -16,49 +16,55 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from freeswing.cdpr.model import tape_kernels as kernels
 from freeswing.cdpr.robot import Array
 
 LARGEST_CHUNK = 1024
-OPERATIONS = {
-    ca.OP_MUL: kernels.MUL,
-    ca.OP_ADD: kernels.ADD,
-    ca.OP_SUB: kernels.SUB,
-    ca.OP_DIV: kernels.DIV,
-    ca.OP_NEG: kernels.NEG,
-    ca.OP_SQ: kernels.SQUARE,
-    ca.OP_TWICE: kernels.TWICE,
-    ca.OP_INV: kernels.INVERSE,
-    ca.OP_CONST: kernels.CONSTANT,
-    ca.OP_INPUT: kernels.INPUT,
-    ca.OP_OUTPUT: kernels.OUTPUT,
-    ca.OP_SQRT: kernels.ROOT,
-    ca.OP_SIN: kernels.SINE,
-    ca.OP_COS: kernels.COSINE,
-    ca.OP_TAN: kernels.TANGENT,
-    ca.OP_ASIN: kernels.ARC_SINE,
-    ca.OP_ACOS: kernels.ARC_COSINE,
-    ca.OP_ATAN: kernels.ARC_TANGENT,
-    ca.OP_TANH: kernels.TANH,
-    ca.OP_EXP: kernels.EXP,
-    ca.OP_LOG: kernels.LOG,
-    ca.OP_FABS: kernels.ABSOLUTE,
-    ca.OP_SIGN: kernels.SIGN,
-    ca.OP_ASSIGN: kernels.COPY,
-    ca.OP_NOT: kernels.NOT,
-    ca.OP_ATAN2: kernels.ARC_TANGENT_2,
-    ca.OP_POW: kernels.POWER,
-    ca.OP_CONSTPOW: kernels.POWER,
-    ca.OP_FMIN: kernels.LEAST,
-    ca.OP_FMAX: kernels.LARGEST,
-    ca.OP_LT: kernels.LESS,
-    ca.OP_LE: kernels.LESS_EQUAL,
-    ca.OP_EQ: kernels.EQUAL,
-    ca.OP_NE: kernels.UNEQUAL,
-    ca.OP_AND: kernels.AND,
-    ca.OP_OR: kernels.OR,
-    ca.OP_IF_ELSE_ZERO: kernels.IF_ELSE_ZERO,
-}
+
+
+@cache
+def operations() -> dict[int, int]:
+    """The operations of tapes by CasADi's numbers for them."""
+    from freeswing.cdpr.model import tape_kernels as kernels  # numba takes a while to import
+
+    return {
+        ca.OP_MUL: kernels.MUL,
+        ca.OP_ADD: kernels.ADD,
+        ca.OP_SUB: kernels.SUB,
+        ca.OP_DIV: kernels.DIV,
+        ca.OP_NEG: kernels.NEG,
+        ca.OP_SQ: kernels.SQUARE,
+        ca.OP_TWICE: kernels.TWICE,
+        ca.OP_INV: kernels.INVERSE,
+        ca.OP_CONST: kernels.CONSTANT,
+        ca.OP_INPUT: kernels.INPUT,
+        ca.OP_OUTPUT: kernels.OUTPUT,
+        ca.OP_SQRT: kernels.ROOT,
+        ca.OP_SIN: kernels.SINE,
+        ca.OP_COS: kernels.COSINE,
+        ca.OP_TAN: kernels.TANGENT,
+        ca.OP_ASIN: kernels.ARC_SINE,
+        ca.OP_ACOS: kernels.ARC_COSINE,
+        ca.OP_ATAN: kernels.ARC_TANGENT,
+        ca.OP_TANH: kernels.TANH,
+        ca.OP_EXP: kernels.EXP,
+        ca.OP_LOG: kernels.LOG,
+        ca.OP_FABS: kernels.ABSOLUTE,
+        ca.OP_SIGN: kernels.SIGN,
+        ca.OP_ASSIGN: kernels.COPY,
+        ca.OP_NOT: kernels.NOT,
+        ca.OP_ATAN2: kernels.ARC_TANGENT_2,
+        ca.OP_POW: kernels.POWER,
+        ca.OP_CONSTPOW: kernels.POWER,
+        ca.OP_FMIN: kernels.LEAST,
+        ca.OP_FMAX: kernels.LARGEST,
+        ca.OP_LT: kernels.LESS,
+        ca.OP_LE: kernels.LESS_EQUAL,
+        ca.OP_EQ: kernels.EQUAL,
+        ca.OP_NE: kernels.UNEQUAL,
+        ca.OP_AND: kernels.AND,
+        ca.OP_OR: kernels.OR,
+        ca.OP_IF_ELSE_ZERO: kernels.IF_ELSE_ZERO,
+    }
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,6 +93,8 @@ class Tape:
 
     def bound(self, points: Array, results: Array) -> Callable[[], None]:
         """What runs the tape over the same memory each time, for tight loops."""
+        from freeswing.cdpr.model import tape_kernels as kernels
+
         work = np.empty((self.slots, kernels.LANES))
         return partial(kernels.run_tape, self.code, self.constants, points, results, work)
 
@@ -100,13 +108,16 @@ def tape_of(function: Any) -> Tape | None:
     """
     if not function.is_a("SXFunction"):
         return None
+    from freeswing.cdpr.model import tape_kernels as kernels
+
+    known = operations()
     sizes_in = [function.numel_in(i) for i in range(function.n_in())]
     sizes_out = [function.numel_out(i) for i in range(function.n_out())]
     first_in, first_out = (list(accumulate(sizes, initial=0)) for sizes in (sizes_in, sizes_out))
     count = function.n_instructions()
     code, constants = np.zeros((count, 4), dtype=np.uint32), np.zeros(count)
     for k in range(count):
-        operation = OPERATIONS.get(function.instruction_id(k))
+        operation = known.get(function.instruction_id(k))
         if operation is None:
             return None
         to, sources = function.instruction_output(k), function.instruction_input(k)
