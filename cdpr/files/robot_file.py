@@ -32,6 +32,8 @@ from freeswing.cdpr.tolerances import Tolerances
 Array = NDArray[np.float64]
 
 MOST_CABLES = 8
+# Driven ones may be more than pose and limits need: r = n - 6 spare ones, by a QP above 2.
+MOST_DRIVEN = 24
 AXIS_TOLERANCE = 1e-6
 SWIVEL_KEYS = ("swivel_x", "swivel_y", "swivel_z")
 INERTIA_TOLERANCE = 1e-9
@@ -52,7 +54,7 @@ def read_robot(path: Path | str) -> Robot:
     driving = reader.child("drive", required=False)
     read = [_read_cable(table, named, is_driven=driving is not None) for table in tables]
     cables, points = [values for values, _ in read], [formulas for _, formulas in read]
-    _check_cables(reader, cables)
+    _check_cables(reader, cables, MOST_CABLES if driving is None else MOST_DRIVEN)
     free = _read_free_coordinates(reader, len(cables))
     attachments = np.array([values[3] for values in cables]).reshape(-1, 3)
     platform = _read_platform(
@@ -197,9 +199,9 @@ def _read_swivel(reader: Reader, *, is_eyelet: bool) -> tuple[Array, Array, Arra
     return x, y, z
 
 
-def _check_cables(reader: Reader, cables: list[CableValues]) -> None:
-    if len(cables) > MOST_CABLES or ("cables" in reader and not cables):
-        reader.add("cables", f"{len(cables)} cables, must be 1 to {MOST_CABLES}")
+def _check_cables(reader: Reader, cables: list[CableValues], most: int) -> None:
+    if len(cables) > most or ("cables" in reader and not cables):
+        reader.add("cables", f"{len(cables)} cables, must be 1 to {most}")
         return
     names = [values[0] for values in cables]
     for count, name in enumerate(names):

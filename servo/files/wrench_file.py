@@ -19,7 +19,9 @@ COLUMNS = (*POSE_COLUMNS, *WRENCH_COLUMNS)
 NORM_TOLERANCE = 1e-3  # a quaternion written with three decimals
 # A moment of this many times all tensions at their limit on the longest arm is no moment in N m;
 # newton millimetres are 1000 times too large.
-MOST_MOMENT = 50.0
+MOST_MOMENT = 2.0
+# Half the frame, times this: a place so far out is not a slip of the hand but a unit.
+MILLIMETRES = 5.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +91,7 @@ def _check_rows(
     if len(outside):
         row, axis = outside[0]
         far = values[row, axis]
-        unit = "; is this in mm? write metres" if abs(far) > 100.0 * reach_m[axis] else ""
+        unit = "; is this in mm? write metres" if abs(far) > MILLIMETRES * reach_m[axis] else ""
         raise InputError(
             f"{path}: line {lines[row]}: {COLUMNS[axis]} is {far:g}, outside the frame of "
             f"+-{reach_m[axis]:.3g} m{unit}"

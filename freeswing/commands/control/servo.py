@@ -64,9 +64,15 @@ def run(options: Namespace, console: Console) -> None:
     from freeswing.servo.files.task_file import read_task
     from freeswing.servo.loop.feasible_path import leaves_workspace
     from freeswing.servo.loop.trials import carry_out
+    from freeswing.servo.tensions.methods import MOST_SPARE
 
     path, model = read_driven(options.robot)
     folder = results_folder(path.parent, options.results)
+    if model.n_cables > 6 + MOST_SPARE:
+        raise InputError(
+            f"{path}: {model.n_cables} cables: the control loop distributes wrenches over at most "
+            f"{6 + MOST_SPARE} (freeswing tensions takes more)"
+        )
     task = read_task(options.task)
     if (why := leaves_workspace(model, task)) is not None:
         raise InputError(f"{options.task}: {why}")

@@ -11,7 +11,9 @@ from scipy.io import loadmat
 
 from freeswing.main import main
 from freeswing.servo.design import robustness
+from freeswing.servo.driven_file import read_driven
 from freeswing.servo.files.controller_file import read_controller
+from freeswing.servo.robot_now import Survey, motors_of
 from tests.places import SAMPLES
 from tests.servo.plants import cables
 
@@ -199,7 +201,9 @@ def test_tensions_give_the_wrench(tmp_path, method):
     ("row", "says"),
     [
         ("0,0,0,1,0,0,0,0,0,3,0,6000,0", "N mm"),
+        ("0,0,0,1,0,0,0,0,0,3,0,41.7,0", "N mm"),
         ("900,0,0,1,0,0,0,0,0,3,0,0,0", "is this in mm"),
+        ("6.3,0,0,1,0,0,0,0,0,3,0,0,0", "is this in mm"),
         ("1.3,0,0,1,0,0,0,0,0,3,0,0,0", "outside the frame"),
         ("0,0,0,2,0,0,0,0,0,3,0,0,0", "quaternion's length"),
         ("0,0,0,1,0,0,0,0,,3,0,0,0", "fy_N is empty"),
@@ -211,6 +215,50 @@ def test_wrong_wrenches_are_refused_by_line(tmp_path, capsys, row, says):
     said = capsys.readouterr().err
     assert says in said, said
     assert "line 3" in said
+
+
+def test_places_and_moments_that_may_be_meant_are_no_units(tmp_path, capsys):
+    path = written(tmp_path, "6.2,0,0,1,0,0,0,0,0,3,0,0,0")
+    assert main(["tensions", str(INCA), str(path), "--results", str(tmp_path)]) == 2
+    said = capsys.readouterr().err
+    assert "outside the frame" in said
+    assert "mm" not in said.split("outside the frame")[1]
+    path = written(tmp_path, "0,0,0,1,0,0,0,0,0,3,0,40,0")
+    assert main(["tensions", str(INCA), str(path), "--results", str(tmp_path)]) == 0
+
+
+@pytest.mark.parametrize("n", [6, 7, 9, 10])
+def test_robots_of_other_numbers_of_cables(tmp_path, capsys, n):
+    """A wrench that tensions about 10 N make; nine and ten cables by the QP."""
+    head, *cables = (INCA / "robot.toml").read_text().split("[[cables]]")
+    more = [
+        f'\nname = "{k}"\nentry_m = ["{s}Lx_m/2", 0, "{s}Lz_m/2"]\n'
+        f'attachment_m = ["{s}arm_m", "{s}0.2*arm_m", 0]\n'
+        for k, s in ((9, ""), (10, "-"))
+    ]
+    robot = tmp_path / "robot.toml"
+    robot.write_text(head + "".join("[[cables]]" + one for one in [*cables, *more][:n]))
+    model = read_driven(robot)[1]
+    at = Survey(model).here(np.array([0.01, 0, 0.02, 0, 0, 0]))
+    pull = at.wrench_matrix / motors_of(model).tension_per_A
+    meant = 10.0 + 0.2 * np.arange(n)
+    wrench = ",".join(repr(float(value)) for value in pull @ meant)
+    path = written(tmp_path, f"0.01,0,0.02,1,0,0,0,{wrench}")
+    assert main(["tensions", str(robot), str(path), "--results", str(tmp_path)]) == 0
+    row = (tmp_path / "tensions.csv").read_text().splitlines()[1].split(",")
+    assert row[2 * n] == "feasible"
+    found = np.array(row[:n], dtype=float)
+    np.testing.assert_allclose(pull @ found, pull @ meant, atol=1e-8)
+    if n == 6:
+        np.testing.assert_allclose(found, meant, atol=1e-8)
+    else:
+        assert np.linalg.norm(found - 10.0) < np.linalg.norm(meant - 10.0), "nearest to 10 N"
+    task = INCA / "task.toml"
+    if n > 8:
+        assert main(["servo", str(robot), "--task", str(task), "--results", str(tmp_path)]) == 2
+        assert "at most 8" in capsys.readouterr().err
+        words = ["--method", "barycentre", "--results", str(tmp_path)]
+        assert main(["tensions", str(robot), str(path), *words]) == 2
 
 
 def test_columns_in_millimetres_and_robots_without_motors_are_refused(tmp_path, capsys):
