@@ -102,9 +102,9 @@ def design_mpc(plant: Plant, speeds_rad_s: Array) -> Predictor:
     Y = scipy.linalg.solve_continuous_are(
         A.T, C.T, walk @ walk.T + 1e-9 * np.eye(n_late + 6), np.eye(6)
     )
-    rest = np.linalg.inv(
-        np.block([[bare.A, bare.B], [bare.C, np.zeros((6, 6))]])
-    )  # state and wrench of any drift and pose at rest
+    # State and wrench of any drift and pose at rest.
+    whole = np.linalg.inv(np.block([[bare.A, bare.B], [bare.C, np.zeros((6, 6))]]))
+    rest = np.asarray(whole, dtype=np.float64)
     return Predictor(
         A, B, C, Y @ C.T, step.A, step.B, gain, Q, R, P,
         rest[:, n_plant:], -rest[:, :n_plant] @ bare.B,

@@ -85,10 +85,10 @@ class Examiner:
             for half in (slice(0, 3), slice(3, 6))
         ]
         if not gamma:
-            return Found(stable, *margins)
+            return Found(stable, margins[0], margins[1])
         loop = close(weighted(plant.system, self._order.goals.weights).plant, controller)
         norm = hinf_norm(loop, 1e-3).value if loop.is_stable() else np.inf
-        return Found(stable, *margins, norm)
+        return Found(stable, margins[0], margins[1], norm)
 
 
 def survey_document(
@@ -216,7 +216,7 @@ def _draws(
 def _sentences(grid: list[Seen], rays: list[Row], draws: Row) -> list[str]:
     said = ["no place is held by allowed tensions: there is no workspace to examine"]
     if grid:
-        fixed, turned = ([pair[k] for pair in grid] for k in (1, 2))
+        fixed, turned = [seen for _, seen, _ in grid], [seen for _, _, seen in grid]
         least = min(range(len(grid)), key=lambda k: fixed[k].margin)
         said = [
             f"of {len(grid)} places that allowed tensions hold it is stable at "
@@ -255,5 +255,5 @@ def _along(row: Row) -> str:
     return f"along {row['along']} the controller {', '.join(ends)}; {held}"
 
 
-def _place(position: object) -> str:
+def _place(position: list[float]) -> str:
     return f"({', '.join(f'{value:.3f}' for value in position)}) m"

@@ -29,7 +29,8 @@ class Schedule:
 
     def factor(self, pose: Array) -> Array:
         """T with B(pose) T = B(design), (6, 6)."""
-        return np.linalg.solve(self._pushes(pose), self._design)
+        turned = np.linalg.solve(self._pushes(pose), self._design)
+        return np.asarray(turned, dtype=np.float64)
 
     def _pushes(self, pose: Array) -> Array:
         """Accelerations by wrenches, (6, 6)."""

@@ -192,7 +192,9 @@ class _Brain:
         wrench = rest + (change if turn is None else turn @ change)
         answer = _distributed(self._here, self._motors, wrench)
         given = answer.scale * wrench - rest
-        self._loop.regulator.applied(given if turn is None else np.linalg.solve(turn, given))
+        if turn is not None:
+            given = np.asarray(np.linalg.solve(turn, given), dtype=np.float64)
+        self._loop.regulator.applied(given)
         return wrench, self._with_friction(answer, angles)
 
     def _error(self, asked: Array, angles: Array) -> Array:

@@ -98,7 +98,8 @@ class _Program:
         self._bounds = bounds
         reach, free = _prediction(p)
         steps = np.eye(PLAN_STEPS)
-        costs = scipy.linalg.block_diag(*[p.state_cost] * (PLAN_STEPS - 1), p.end_cost)
+        blocks = scipy.linalg.block_diag(*[p.state_cost] * (PLAN_STEPS - 1), p.end_cost)
+        costs = np.asarray(blocks, dtype=np.float64)
         wrenches = np.kron(steps, p.wrench_cost)
         self._hessian = reach.T @ costs @ reach + wrenches
         self._by_state = reach.T @ costs @ free
@@ -125,7 +126,8 @@ class _Program:
         if (currents >= b.lower).all() and (currents <= b.upper).all():
             return True
         none = np.zeros_like(whole)
-        status = distribute_rows(self._matrices, whole, none, *self._ends, NEAREST)[1]
+        lower, upper, wish = self._ends
+        status = distribute_rows(self._matrices, whole, none, lower, upper, wish, NEAREST)[1]
         return bool((status == FEASIBLE).all())
 
     def best(self, away: Array, rest: Array) -> Array:
