@@ -46,7 +46,12 @@ def coordinate_indices(names: tuple[str, ...]) -> list[int]:
     return [POSE_COORDINATES.index(name) for name in names]
 
 
-def _split(model: Model, free: tuple[str, ...]) -> tuple[list[int], list[int]]:
+def split_coordinates(model: Model, free: tuple[str, ...]) -> tuple[list[int], list[int]]:
+    """Where the free coordinates stand in the pose, and where those that follow.
+
+    Raises:
+        ValueError: when they are not 6 - n different ones.
+    """
     chosen = coordinate_indices(free)
     n = model.robot.n_cables
     if n > 5:
@@ -75,7 +80,7 @@ def free_basis(
         ValueError: when the number of free coordinates is not 6 - n, or they do not determine the
             others at one of the poses (singular dependent block).
     """
-    chosen, dependent = _split(model, free)
+    chosen, dependent = split_coordinates(model, free)
     jacobian = evaluate(only(model.cables, 3), zeta, values)[0]
     jacobian_rate = evaluate(only(model.cable_rates, 0), zeta, rates, values)[0]
     block = jacobian[..., dependent]
@@ -105,7 +110,7 @@ def amplification(
     noise in the free coordinates swamps the dependent ones. Infinite where they are singular.
     """
     values = model.start_values if values is None else values
-    chosen, dependent = _split(model, free)
+    chosen, dependent = split_coordinates(model, free)
     size = float(np.sqrt(np.mean(np.sum(model.robot.attachments_m**2, axis=1))))
     scale = np.array([1.0, 1.0, 1.0, size, size, size])
     jacobian = evaluate(only(model.cables, 3), zeta, values)[0] / scale
@@ -190,6 +195,6 @@ def assemble(
             the mode ends (at a singularity of the free coordinates); it never jumps to another.
     """
     values = model.start_values if values is None else values
-    chosen, dependent = _split(model, free)
+    chosen, dependent = split_coordinates(model, free)
     follower = Follower(only(model.cables, 0, 3), values, chosen, dependent, tolerance_m)
     return follow(follower, tuple(free), lengths_m, free_values, start)
