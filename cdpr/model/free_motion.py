@@ -16,6 +16,10 @@ from freeswing.cdpr.model.batch import evaluate, only
 from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.robot import POSE_COORDINATES, Array, finite
 
+RATE_SWEEPS = 3  # rigid cables are done in one
+MOST_RATE_SWEEPS = 30  # cables that stretch take some 3 % of the slip along from sweep to sweep
+NO_SLIP_M_S = 1e-10  # a thousandth of what a simulation refuses
+
 
 @dataclass(frozen=True, slots=True)
 class FreeBasis:
@@ -164,9 +168,12 @@ def admissible_rates(
     values = model.start_values if values is None else values
     zeta, rates = finite("zeta", zeta, 6), finite("rates", rates, 6)
     jacobian = evaluate(only(model.cables, 3), zeta, values)[0]
-    for _ in range(3):
+    inverse = np.linalg.pinv(jacobian)
+    for sweep in range(MOST_RATE_SWEEPS):
         slip = evaluate(model.slip, time_s, zeta, rates, inertia, values)[0]
-        rates = rates - np.linalg.pinv(jacobian) @ slip
+        if sweep >= RATE_SWEEPS and np.abs(slip).max() < NO_SLIP_M_S:
+            break
+        rates = rates - inverse @ slip
     return rates
 
 
