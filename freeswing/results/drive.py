@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from freeswing.cdpr.files.documents import InputError
 from freeswing.ident.drive.diagnose.candidates import Candidate
 from freeswing.ident.drive.diagnose.diagnose import DriveDiagnosis, Verdict
 from freeswing.ident.drive.diagnose.refit import Fitted
@@ -56,6 +59,25 @@ def drive_document(name: str, session: DriveSession, found: DriveIdentification)
             "times_noise": {fit.run.name: times_noise(session, fit) for fit in found.fits},
         },
     }
+
+
+def joint_estimates(path: Path) -> dict[str, float | None] | None:
+    """Values of the joint estimate in a `drive.json`, None where there is no such file.
+
+    Raises:
+        InputError: where it is not one.
+    """
+    try:
+        table = json.loads(path.read_text(encoding="utf-8"))
+        entries = table["estimates"]["joint"]["parameters"]
+        return {entry["name"]: entry["value"] for entry in entries}
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError, KeyError, TypeError) as failure:
+        raise InputError(
+            f"{path}: not a result of this version ({str(failure)[:200]}); delete it and run "
+            "freeswing drive again"
+        ) from None
 
 
 def times_noise(session: DriveSession, fit: RunFit) -> float:
