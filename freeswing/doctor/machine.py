@@ -9,7 +9,6 @@ import tempfile
 from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Literal
 
 from freeswing import __version__
 from freeswing.console import has_desktop
@@ -95,9 +94,7 @@ def _codecs() -> Iterator[Finding]:
         from av.error import FFmpegError
     except ImportError:
         return  # said above
-    wanted: tuple[tuple[Literal["r", "w"], tuple[str, ...], str], ...]
-    wanted = (("r", READ, "read"), ("w", WRITTEN, "write"))
-    for mode, names, what in wanted:
+    for mode, names, what in (("r", READ, "read"), ("w", WRITTEN, "write")):
         absent = []
         for name in names:
             try:

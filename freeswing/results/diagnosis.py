@@ -58,6 +58,7 @@ class Candidate(Entry):
         confounded_with: what the data cannot tell it from.
         reason: why.
         experiment: that would tell them apart.
+        next_swing: the swing that would, in numbers.
         probability: that the effect is in the model, where a posterior was computed.
     """
 
@@ -70,6 +71,7 @@ class Candidate(Entry):
     confounded_with: tuple[str, ...] = ()
     reason: str = ""
     experiment: str = absent(default="")
+    next_swing: Any = absent(default=None)
 
 
 @entry

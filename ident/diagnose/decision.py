@@ -77,12 +77,14 @@ class Decision:
         winner: the fit with the one that won, or None.
         key: the winner's, or "".
         group: effects that held-out runs cannot tell from it, its own among them.
+        rival: the fit with the likeliest other effect of the group, or None.
     """
 
     candidates: tuple[Candidate, ...]
     winner: Refit | None = None
     key: str = ""
     group: tuple[str, ...] = ()
+    rival: Refit | None = None
 
 
 def by_lengths(place: WrongPlace, share: float) -> tuple[Candidate, ...]:
@@ -195,7 +197,9 @@ def decided(
         candidates.append(
             Candidate(effect_of(one), verdict, float(bic), gain, others, reason, chance)
         )
-    return Decision(tuple(candidates), passed.get(key), key, group)
+    others = [n for n in passed if effect_of(n) in group and effect_of(n) != effect_of(key)]
+    rival = max(others, key=lambda n: chances[n], default="")
+    return Decision(tuple(candidates), passed.get(key), key, group, passed.get(rival))
 
 
 def probabilities(current: Refit, tried: dict[str, Refit], noise_scales: Array) -> dict[str, float]:

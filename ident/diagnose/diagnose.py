@@ -15,6 +15,7 @@ from freeswing.cdpr.model.equations import build_model
 from freeswing.cdpr.robot import INERTIA_NAMES, POSE_COORDINATES, Array, Robot
 from freeswing.ident.diagnose.answer.decay import swing_decay
 from freeswing.ident.diagnose.answer.deviations import directions, honest_covariance
+from freeswing.ident.diagnose.answer.next_swing import NextSwing, next_swing
 from freeswing.ident.diagnose.base import base_fit, refuse_few
 from freeswing.ident.diagnose.decision import LEAST_SHARE_EXPLAINED, Candidate, excess_of
 from freeswing.ident.diagnose.experiments import separating_experiment
@@ -65,6 +66,8 @@ class Diagnosis:
         kinematics: what cable lengths along the runs say; None where poses were not measured.
         unexplained: what remains.
         notes: sentences about the session.
+        apart: for each effect of the final model that has rivals, the swing that would part it
+            from the likeliest.
     """
 
     ladder: tuple[Rung, ...]
@@ -76,6 +79,7 @@ class Diagnosis:
     kinematics: Kinematics | None
     unexplained: Unexplained
     notes: tuple[str, ...]
+    apart: dict[str, NextSwing]
 
     def document(self) -> dict[str, Any]:
         """results/diagnosis.json."""
@@ -83,7 +87,7 @@ class Diagnosis:
         return {
             "format": FORMAT,
             "before": before,
-            "candidates": [_candidate_entry(one) for one in self.candidates],
+            "candidates": [_candidate_entry(one, self.apart) for one in self.candidates],
             "accepted": _accepted(self.final, self.spreads[1], self.groups),
             "after": after,
             "share_closed": _share_closed(before, after),
@@ -169,6 +173,11 @@ def diagnose(
     begun = search.rounds[0].before if accepted else last
     first = final if not accepted else _with_own_noise(begun.fit, fitted)
     groups = {effect_of(one.decision.key): one.decision.group for one in accepted}
+    apart = {
+        effect_of(one.decision.key): next_swing(one.after, one.decision.rival, noise_scales)
+        for one in accepted
+        if one.decision.rival is not None
+    }
     if progress:
         progress("diagnosis", 1.0)
     return Diagnosis(
@@ -181,6 +190,7 @@ def diagnose(
         search.kinematics,
         rest,
         tuple(notes),
+        {name: one for name, one in apart.items() if one is not None},
     )
 
 
@@ -315,7 +325,7 @@ def _last_words(
     return tuple(sorted(words.values(), key=lambda c: (order[c.verdict], c.delta_bic)))
 
 
-def _candidate_entry(one: Candidate) -> dict[str, Any]:
+def _candidate_entry(one: Candidate, apart: dict[str, NextSwing]) -> dict[str, Any]:
     entry: dict[str, Any] = {
         "effect": one.effect,
         "verdict": one.verdict,
@@ -327,6 +337,9 @@ def _candidate_entry(one: Candidate) -> dict[str, Any]:
     }
     if one.confounded_with:
         entry["experiment"] = separating_experiment((one.effect, *one.confounded_with))
+        if one.effect in apart:
+            entry["experiment"] += f"; {apart[one.effect]}"
+            entry["next_swing"] = apart[one.effect].document()
     return entry
 
 

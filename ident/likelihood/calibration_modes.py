@@ -27,7 +27,6 @@ from freeswing.ident.likelihood.likelihood_run import Samples, reduce_run
 from freeswing.ident.runs import SwingRun
 
 ROUNDS = 3
-MODES = "camera modes"
 CONVERGED = 0.02  # of a standard deviation of the amplitudes
 UNLIKELY = 4.5
 
@@ -90,7 +89,7 @@ def with_calibration(
     known = [none if one is None else one for one in errors]
     current = found
     for _ in range(ROUNDS):
-        step = _solved(current, known, amplitudes).step
+        step, _ = _solved(current, known, amplitudes)
         amplitudes = amplitudes + step
         samples = [
             replace(run, values=run.values - _shifts(motion, run, one)[:, run.columns] @ step)
@@ -106,8 +105,11 @@ def with_calibration(
         )
         if np.abs(step).max() < CONVERGED:
             break
-    joint = _solved(current, known, amplitudes)
-    return Calibrated(replace(current, covariance=joint.shared), amplitudes, joint.spread)
+    _, covariance = _solved(current, known, amplitudes)
+    shared = len(found.free)
+    spread = np.sqrt(np.diag(covariance)[shared:])
+    current = replace(current, covariance=covariance[:shared, :shared])
+    return Calibrated(current, amplitudes, spread)
 
 
 def freed(run: SwingRun, amplitudes: Array) -> SwingRun:
@@ -155,29 +157,15 @@ def _shifts(motion: Motion, samples: Samples, errors: PoseErrors) -> Array:
     return mode_shifts(zetas, rates, errors)
 
 
-@dataclass(frozen=True, slots=True)
-class _Joint:
-    """Amplitudes beside all other shared unknowns, to first order.
-
-    Attributes:
-        step: change of the amplitudes, (r,).
-        spread: their standard deviations, (r,).
-        shared: covariance of the others, (p, p).
-    """
-
-    step: Array
-    spread: Array
-    shared: Array
-
-
-def _solved(current: LikelihoodFit, errors: Sequence[PoseErrors], amplitudes: Array) -> _Joint:
-    """All runs, the priors, and amplitudes of unit deviation about zero.
+def _solved(
+    current: LikelihoodFit, errors: Sequence[PoseErrors], amplitudes: Array
+) -> tuple[Array, Array]:
+    """Change of the amplitudes, and the covariance of shared unknowns and amplitudes together.
 
     Coloured residuals say less than their number: the samples count by `correlation`.
     """
     problem = Problem(current.model, current.samples, current.free)
-    n_modes, n_shared = len(amplitudes), problem.layout.size
-    layout = problem.layout.joined(MODES, n_modes)
+    n_modes, n_shared = len(amplitudes), len(current.free)
     weight = 1.0 / np.sqrt(current.enlargement)
     rows = []
     for motion, run, one in zip(current.motions, current.samples, errors, strict=True):
@@ -195,10 +183,8 @@ def _solved(current: LikelihoodFit, errors: Sequence[PoseErrors], amplitudes: Ar
     matrix, right = stacked[:, :-1][:, kept] * unit, stacked[:, -1]
     Q, R = np.linalg.qr(matrix)
     inverse = np.linalg.inv(R) * unit[:, None]
-    covariance = np.zeros((layout.size, layout.size))
+    covariance = np.zeros((len(kept), len(kept)))
     covariance[np.ix_(kept, kept)] = inverse @ inverse.T
-    step = np.zeros(layout.size)
+    step = np.zeros(len(kept))
     step[kept] = -inverse @ (Q.T @ right)
-    modes = layout.place(MODES)
-    spread = np.sqrt(np.diag(covariance)[modes])
-    return _Joint(step[modes], spread, covariance[:n_shared, :n_shared])
+    return step[n_shared:], covariance
