@@ -25,7 +25,7 @@ def stand_outs(found: Rigidity) -> tuple[Jump, ...]:
         found: what a run's markers are worth.
     """
     residuals = found.residuals_m
-    known = np.isfinite(residuals).all(axis=2)
+    known: NDArray[np.bool_] = np.asarray(np.isfinite(residuals).all(axis=2))
     jumps = []
     for k in range(residuals.shape[1]):
         if k in found.left_out or not known[:, k].any():

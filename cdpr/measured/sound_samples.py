@@ -135,7 +135,7 @@ def _wild(values: Array, times_s: Array, coordinates: tuple[str, ...]) -> list[t
     """First and last of each few samples that lie far from those around them."""
     single = _single(values)
     rest = np.where(single[:, None], np.nan, values)
-    steps, known = _steps(rest, coordinates), np.isfinite(rest).all(axis=1)
+    steps, known = _steps(rest, coordinates), np.asarray(np.isfinite(rest).all(axis=1))
     found = [(k, k) for k in np.flatnonzero(single).tolist()]
     joined = known[1:] & known[:-1] & ~steps.any(axis=1)
     starts = np.flatnonzero(known & ~np.concatenate([[False], joined])).tolist()

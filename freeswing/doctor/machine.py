@@ -9,6 +9,7 @@ import tempfile
 from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import Literal
 
 from freeswing import __version__
 from freeswing.console import has_desktop
@@ -94,7 +95,11 @@ def _codecs() -> Iterator[Finding]:
         from av.error import FFmpegError
     except ImportError:
         return  # said above
-    for mode, names, what in (("r", READ, "read"), ("w", WRITTEN, "write")):
+    ways: tuple[tuple[Literal["r", "w"], tuple[str, ...], str], ...] = (
+        ("r", READ, "read"),
+        ("w", WRITTEN, "write"),
+    )
+    for mode, names, what in ways:
         absent = []
         for name in names:
             try:

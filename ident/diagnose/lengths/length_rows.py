@@ -65,6 +65,7 @@ def measured_rates(times_s: Array, values: Array) -> Array:
     even = np.array([np.interp(grid, times_s, column) for column in values.T])
     width = min(2 * round(0.5 * RATES_OVER_S / step) + 1, len(grid) - 1 + len(grid) % 2)
     rates = savgol_filter(even, max(width, 5), 3, deriv=1, delta=step, axis=1)
+    rates = np.asarray(rates, dtype=np.float64)
     return np.array([np.interp(times_s, grid, row) for row in rates]).T
 
 
