@@ -18,9 +18,16 @@ from freeswing.calib.exchange import colmap
 from freeswing.cdpr.files.documents import InputError, replace_file
 
 # COLMAP reads some ten thousand images a second; a model of a rig has a dozen.
-_LONGEST_S = 120.0
+_LONGEST_S = 40.0
+# An image point takes 24 bytes, in text 40: what grows more is made up from a damaged count.
+_GROWTH, _HEADER_BYTES = 16, 2**20
 _CONVERT = """
 import sys
+try:
+    import resource
+    resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[4]),) * 2)
+except ImportError:
+    pass
 import pycolmap
 model = pycolmap.Reconstruction()
 if sys.argv[3] == "text":
@@ -54,7 +61,9 @@ def write(path: Path, cameras: Sequence[Camera]) -> None:
 
 
 def _converted(source: Path, target: Path, kind: str) -> None:
-    words = [sys.executable, "-c", _CONVERT, str(source.resolve()), str(target), kind]
+    size = sum(file.stat().st_size for file in source.iterdir() if file.is_file())
+    most = str(_GROWTH * size + _HEADER_BYTES)
+    words = [sys.executable, "-c", _CONVERT, str(source.resolve()), str(target), kind, most]
     try:
         done = subprocess.run(words, capture_output=True, timeout=_LONGEST_S, check=False)
     except subprocess.TimeoutExpired as error:

@@ -16,6 +16,10 @@ from freeswing.cdpr.model.batch import evaluate, only
 from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.robot import POSE_COORDINATES, Array, finite
 
+RATE_SWEEPS = 3  # rigid cables are done in one
+MOST_RATE_SWEEPS = 30  # cables that stretch take some 3 % of the slip along from sweep to sweep
+NO_SLIP_M_S = 1e-10  # a thousandth of what a simulation refuses
+
 
 @dataclass(frozen=True, slots=True)
 class FreeBasis:
@@ -46,7 +50,12 @@ def coordinate_indices(names: tuple[str, ...]) -> list[int]:
     return [POSE_COORDINATES.index(name) for name in names]
 
 
-def _split(model: Model, free: tuple[str, ...]) -> tuple[list[int], list[int]]:
+def split_coordinates(model: Model, free: tuple[str, ...]) -> tuple[list[int], list[int]]:
+    """Where the free coordinates stand in the pose, and where those that follow.
+
+    Raises:
+        ValueError: when they are not 6 - n different ones.
+    """
     chosen = coordinate_indices(free)
     n = model.robot.n_cables
     if n > 5:
@@ -75,7 +84,7 @@ def free_basis(
         ValueError: when the number of free coordinates is not 6 - n, or they do not determine the
             others at one of the poses (singular dependent block).
     """
-    chosen, dependent = _split(model, free)
+    chosen, dependent = split_coordinates(model, free)
     jacobian = evaluate(only(model.cables, 3), zeta, values)[0]
     jacobian_rate = evaluate(only(model.cable_rates, 0), zeta, rates, values)[0]
     block = jacobian[..., dependent]
@@ -105,7 +114,7 @@ def amplification(
     noise in the free coordinates swamps the dependent ones. Infinite where they are singular.
     """
     values = model.start_values if values is None else values
-    chosen, dependent = _split(model, free)
+    chosen, dependent = split_coordinates(model, free)
     size = float(np.sqrt(np.mean(np.sum(model.robot.attachments_m**2, axis=1))))
     scale = np.array([1.0, 1.0, 1.0, size, size, size])
     jacobian = evaluate(only(model.cables, 3), zeta, values)[0] / scale
@@ -159,9 +168,12 @@ def admissible_rates(
     values = model.start_values if values is None else values
     zeta, rates = finite("zeta", zeta, 6), finite("rates", rates, 6)
     jacobian = evaluate(only(model.cables, 3), zeta, values)[0]
-    for _ in range(3):
+    inverse = np.linalg.pinv(jacobian)
+    for sweep in range(MOST_RATE_SWEEPS):
         slip = evaluate(model.slip, time_s, zeta, rates, inertia, values)[0]
-        rates = rates - np.linalg.pinv(jacobian) @ slip
+        if sweep >= RATE_SWEEPS and np.abs(slip).max() < NO_SLIP_M_S:
+            break
+        rates = rates - inverse @ slip
     return rates
 
 
@@ -190,6 +202,6 @@ def assemble(
             the mode ends (at a singularity of the free coordinates); it never jumps to another.
     """
     values = model.start_values if values is None else values
-    chosen, dependent = _split(model, free)
+    chosen, dependent = split_coordinates(model, free)
     follower = Follower(only(model.cables, 0, 3), values, chosen, dependent, tolerance_m)
     return follow(follower, tuple(free), lengths_m, free_values, start)

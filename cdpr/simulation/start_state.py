@@ -10,7 +10,7 @@ import numpy as np
 
 from freeswing.cdpr.model.batch import evaluate, with_jacobian
 from freeswing.cdpr.model.equations import Model
-from freeswing.cdpr.model.free_motion import coordinate_indices
+from freeswing.cdpr.model.free_motion import split_coordinates
 from freeswing.cdpr.robot import Array, finite
 
 
@@ -41,9 +41,7 @@ def start_slopes(
         ValueError: for wrong shapes, and when the free coordinates do not determine the pose.
     """
     n = model.robot.n_cables
-    chosen = coordinate_indices(free)
-    if len(set(chosen)) != 6 - n or len(chosen) != 6 - n:
-        raise ValueError(f"{n} cables leave {max(0, 6 - n)} free coordinates, got {free}")
+    chosen, _ = split_coordinates(model, free)
     values = model.start_values if values is None else values
     arguments = (time_s, finite("zeta", zeta, 6), finite("rates", rates, 6), inertia, values)
     slopes = np.vstack(

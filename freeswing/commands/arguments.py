@@ -104,7 +104,9 @@ def open_session(options: Namespace) -> Session:
     session, results = options.session, options.results
     driven = drive_path(session)
     if driven is not None:
-        raise InputError(f"{driven}: a driven robot's session; drive, check and run take it")
+        raise InputError(
+            f"{driven}: a driven robot's session; drive, check, diagnose, export and run take it"
+        )
     if getattr(options, "cluster", None):  # whose workers start in other folders
         session, results = Path(session).resolve(), results and Path(results).resolve()
     return read_session(session, results)

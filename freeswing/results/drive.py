@@ -1,18 +1,27 @@
-"""`drive.json`: the estimates of a driven robot."""
+"""`drive.json` and a driven robot's `diagnosis.json`: estimates, and what the model lacks."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from freeswing.cdpr.files.documents import InputError
+from freeswing.ident.drive.diagnose.candidates import Candidate
+from freeswing.ident.drive.diagnose.diagnose import DriveDiagnosis, Verdict
+from freeswing.ident.drive.diagnose.refit import Fitted
 from freeswing.ident.drive.identify import DriveIdentification, DriveSession, RunFit
 from freeswing.ident.drive.joint import Estimate
 from freeswing.ident.drive.kinematics import Kinematics
 
 Array = NDArray[np.float64]
+
+EVIDENCE_S = 0.5  # of a run: what an effect explains is told in pieces of this length
+MOST_EVIDENCE = 5
 
 # A number whose deviation is more of itself is not an estimate.
 LARGEST_SHARE = 0.3
@@ -50,6 +59,25 @@ def drive_document(name: str, session: DriveSession, found: DriveIdentification)
             "times_noise": {fit.run.name: times_noise(session, fit) for fit in found.fits},
         },
     }
+
+
+def joint_estimates(path: Path) -> dict[str, float | None] | None:
+    """Values of the joint estimate in a `drive.json`, None where there is no such file.
+
+    Raises:
+        InputError: where it is not one.
+    """
+    try:
+        table = json.loads(path.read_text(encoding="utf-8"))
+        entries = table["estimates"]["joint"]["parameters"]
+        return {entry["name"]: entry["value"] for entry in entries}
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError, KeyError, TypeError) as failure:
+        raise InputError(
+            f"{path}: not a result of this version ({str(failure)[:200]}); delete it and run "
+            "freeswing drive again"
+        ) from None
 
 
 def times_noise(session: DriveSession, fit: RunFit) -> float:
@@ -127,3 +155,118 @@ def _saturated(session: DriveSession, fit: RunFit) -> dict[str, Any]:
     cables = session.model.robot.cables
     motors = [cables[k].name for k in np.flatnonzero(fit.saturated)]
     return {"run": fit.run.name, "samples": int(fit.saturated.max()), "motors": motors}
+
+
+def drive_diagnosis_document(name: str, session: DriveSession, found: DriveDiagnosis) -> dict:
+    """The document `freeswing-diagnosis/1` of a driven robot's session.
+
+    Motor angles tell far more than poses: `motor_rmse_rad` beside its noise decides.
+    """
+    steps = zip(found.ladder, found.ladder[1:], strict=False)
+    document = {
+        "format": "freeswing-diagnosis/1",
+        "session": name,
+        "before": _held_out(session, found.before),
+        "candidates": [_candidate(verdict) for verdict in found.verdicts],
+        "accepted": [
+            _accepted(one, found.after, *pair)
+            for one, pair in zip(found.accepted, steps, strict=True)
+        ],
+        "after": _held_out(session, found.after),
+        "share_closed": _share(found),
+        "parameters_before": _asked(found.before, len(session.asked.groups)),
+        "parameters_after": _asked(found.after, len(session.asked.groups)),
+        "ladder": [_held_out(session, fit) for fit in found.ladder],
+        "unexplained": _unexplained(session, found),
+    }
+    return document
+
+
+def _held_out(session: DriveSession, fit: Fitted) -> dict[str, Any]:
+    told, noise = fit.held_out, session.noise
+    entry: dict[str, Any] = {"effects": list(fit.given.model.effects), "sigma_perp": None}
+    if told is None:
+        return entry | {"prediction_rmse_m": None, "noise_floor_m": noise.pose_std[0]}
+    return entry | {
+        "prediction_rmse_m": told.poses_m,
+        "noise_floor_m": noise.pose_std[0],
+        "prediction_rmse_rad": told.poses_rad,
+        "motor_rmse_rad": told.rms_rad,
+        "motor_noise_rad": noise.angle_std_rad,
+        "runs": [
+            {"run": one.run.name, "motor_rmse_rad": one.rms_rad, "matlab_percent": one.matlab}
+            for one in told.fits
+        ],
+    }
+
+
+def _candidate(verdict: Verdict) -> dict[str, Any]:
+    one = verdict.candidate
+    entry = {"effect": one.effect} | ({"part": one.part} if one.part else {})
+    return entry | {
+        "verdict": verdict.verdict,
+        "delta_bic": verdict.delta_bic if np.isfinite(verdict.delta_bic) else None,
+        "held_out_gain": verdict.held_out_gain if np.isfinite(verdict.held_out_gain) else None,
+        "confounded_with": list(verdict.confounded_with),
+        "reason": verdict.reason,
+    }
+
+
+def _accepted(one: Candidate, after: Fitted, below: Fitted, above: Fitted) -> dict[str, Any]:
+    names, found = after.found.asked.names, after.found
+    parameters = []
+    for group in one.groups:
+        k = names.index(group.name)
+        std = found.std[k] if found.determined[k] else None
+        short = group.name.partition(".")[2]
+        parameters.append({"name": short, "value": found.values[k], "std": std})
+    entry = {"effect": one.effect} | ({"part": one.part} if one.part else {})
+    return entry | {"parameters": parameters, "evidence": _evidence(below, above)}
+
+
+def _evidence(below: Fitted, above: Fitted) -> list[dict[str, Any]]:
+    """Which seconds of which held-out runs an effect explains, most telling first."""
+    if below.held_out is None or above.held_out is None:
+        return []
+    pieces = []
+    for one, other in zip(below.held_out.fits, above.held_out.fits, strict=True):
+        times = one.motion.times_s
+        falls = np.sum(one.gaps_rad**2, axis=1) - np.sum(other.gaps_rad**2, axis=1)
+        places = (times / EVIDENCE_S).astype(np.intp)
+        for place, fall in enumerate(np.bincount(places, falls)):
+            pieces.append((float(fall), one.run.name, EVIDENCE_S * place))
+    whole = sum(fall for fall, _, _ in pieces)
+    pieces.sort(key=lambda piece: -piece[0])
+    return [
+        {"run": run, "from_s": first, "to_s": first + EVIDENCE_S, "share": fall / whole}
+        for fall, run, first in pieces[:MOST_EVIDENCE]
+        if fall > 0.0
+    ]
+
+
+def _share(found: DriveDiagnosis) -> float | None:
+    before, after = found.before.times_noise, found.after.times_noise
+    return (before - after) / (before - 1.0) if before > 1.0 and np.isfinite(before) else None
+
+
+def _asked(fit: Fitted, count: int) -> list[dict[str, Any]]:
+    std = np.where(fit.found.determined, fit.found.std, np.inf)[:count]
+    return _parameters(fit.found.asked.names[:count], fit.found.values[:count], std)
+
+
+def _unexplained(session: DriveSession, found: DriveDiagnosis) -> dict[str, Any]:
+    """What remains: which motor, how large, how fast."""
+    if not found.unexplained or found.after.held_out is None:
+        return {"present": found.unexplained, "signature": "", "evidence": {}}
+    fits, cables = found.after.held_out.fits, session.model.robot.cables
+    sizes = np.sqrt(np.mean([np.mean(fit.gaps_rad**2, axis=0) for fit in fits], axis=0))
+    worst = int(np.argmax(sizes))
+    gaps = max((fit.gaps_rad[:, worst] for fit in fits), key=lambda column: float(column.std()))
+    power = np.abs(np.fft.rfft(gaps - gaps.mean())) ** 2
+    rate_hz = np.argmax(power) * fits[0].run.rate_hz / len(gaps)
+    signature = (
+        f"motor {cables[worst].name}'s angle is off by {sizes[worst]:.2g} rad rms "
+        f"({found.after.times_noise:.1f} times the noise over all motors), most at {rate_hz:.2g} Hz"
+    )
+    evidence = {"motor_rmse_rad": sizes, "frequency_hz": rate_hz}
+    return {"present": True, "signature": signature, "evidence": evidence}

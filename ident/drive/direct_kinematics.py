@@ -11,8 +11,10 @@ from freeswing.cdpr.model.batch import evaluate
 
 Array = NDArray[np.float64]
 
-MOST_ITERATIONS = 12
-DONE = 1e-10
+MOST_ITERATIONS = 20
+# Metres and radians: a thousandth of an encoder step. Angles that fit no pose exactly (elastic
+# cables, other geometry) make the iteration's end linear rather than quadratic.
+DONE = 1e-8
 
 
 def poses_from_turns(

@@ -70,6 +70,8 @@ class RunFit:
         slack: samples at which each cable would have had to push, (n,).
         saturated: samples at which each motor was asked for more than its limits, (n,).
         motion: the prediction.
+        gaps_rad: motor angles predicted less read, (n_t, n).
+        pose_gaps: poses predicted less measured, small translation and turn, (n_p, 6).
     """
 
     run: DriveRun
@@ -79,6 +81,8 @@ class RunFit:
     slack: NDArray[np.intp]
     saturated: NDArray[np.intp]
     motion: DrivenMotion
+    gaps_rad: Array
+    pose_gaps: Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,12 +117,12 @@ def identify_drive(session: DriveSession, progress: Progress) -> DriveIdentifica
         ValueError: when the angles fit no pose or a run cannot be simulated.
     """
     model, asked = session.model, session.asked
-    published, kinematics = _step_1(session)
-    theta, offsets = _geometry(session, kinematics)
+    published, kinematics = step_1(session)
+    theta, offsets = geometry(session, kinematics)
     runs = session.of("identify")
     progress("inverse dynamics", 0.05)
     regression = inverse_dynamics(model, theta, asked.dynamic, list(runs), offsets)
-    start = asked.dynamic.put(model, theta, _possible(session, regression))
+    start = asked.dynamic.put(model, theta, possible(session, regression))
     given = Premise(model, start, runs, session.noise, session.zero_pose, offsets)
     progress("output error", 0.1)
     second = estimate(given, asked.dynamic)
@@ -148,7 +152,8 @@ def identify_drive(session: DriveSession, progress: Progress) -> DriveIdentifica
     )
 
 
-def _step_1(session: DriveSession) -> tuple[Kinematics | None, Kinematics | None]:
+def step_1(session: DriveSession) -> tuple[Kinematics | None, Kinematics | None]:
+    """Kinematics by (18) and by likelihood, None without static poses or kinematic unknowns."""
     wanted = session.asked.kinematic
     if session.static is None or not wanted.groups:
         return None, None
@@ -156,7 +161,7 @@ def _step_1(session: DriveSession) -> tuple[Kinematics | None, Kinematics | None
     return as_published(*args), most_likely(*args)
 
 
-def _geometry(session: DriveSession, found: Kinematics | None) -> tuple[Array, Array]:
+def geometry(session: DriveSession, found: Kinematics | None) -> tuple[Array, Array]:
     """Numbers with the estimated geometry, and L / r where the angles are zero."""
     model = session.model
     if found is not None:
@@ -177,7 +182,7 @@ def offsets_of(session: DriveSession, theta: Array, fallback: Array | None) -> A
     )
 
 
-def _possible(session: DriveSession, regression: Regression) -> Array:
+def possible(session: DriveSession, regression: Regression) -> Array:
     """Regressed values, or the declared one where the regression gives an impossible one."""
     declared = session.asked.dynamic.read(session.model, session.model.declared)
     usable = np.isfinite(regression.values) & (regression.values * declared > 0.0)
@@ -211,6 +216,8 @@ def predict(session: DriveSession, run: DriveRun, theta: Array, zero: Array) -> 
         motion.slack.sum(axis=0),
         ((asked < limits[:, 0]) | (asked > limits[:, 1])).sum(axis=0),
         motion,
+        gaps,
+        seen.poses * session.noise.pose_std,
     )
 
 

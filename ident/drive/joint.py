@@ -22,7 +22,13 @@ from freeswing.ident.drive.run_problem import (
     simulated,
     start_pose,
 )
-from freeswing.ident.drive.solver import Found, Normal, covariance_of, minimise
+from freeswing.ident.drive.solver import (
+    MOST_ITERATIONS,
+    Found,
+    Normal,
+    covariance_of,
+    minimise,
+)
 from freeswing.ident.drive.unknowns import Asked
 
 Array = NDArray[np.float64]
@@ -126,6 +132,11 @@ class Problem:
         positive = at > 0.0
         low[: self.k][positive] = (at / reach)[positive]
         high[: self.k][positive] = (at * reach)[positive]
+        model, first = self.given.model, len(self.given.model.numbers.names)
+        for k, group in enumerate(self.asked.groups):
+            place = model.index(group.members[0]) - first
+            if place >= 0:  # an effect's own limits
+                low[k], high[k] = model.parameters[place].low, model.parameters[place].high
         return low, high
 
     def zero(self, values: Array, offsets: Array) -> tuple[Array, Array, Array]:
@@ -134,7 +145,7 @@ class Problem:
         theta = self.asked.put(given.model, given.theta, values)
         if given.free_offsets:
             return theta, offsets, np.hstack([np.zeros((n, self.k)), np.eye(n)])
-        if given.zero_pose is None or self.asked.n_kinematic == 0:
+        if given.zero_pose is None:
             return theta, given.offsets, np.zeros((n, self.k))
         return theta, *zero_turns(given.model, theta, given.zero_pose, self.asked)
 
@@ -215,15 +226,15 @@ class Problem:
         return part, np.concatenate([np.arange(self.n_shared), own])
 
 
-def estimate(given: Premise, asked: Asked) -> Estimate:
-    """The most likely values of what is asked for.
+def estimate(given: Premise, asked: Asked, most: int = MOST_ITERATIONS) -> Estimate:
+    """The most likely values of what is asked for, after `most` steps of the search at most.
 
     Raises:
         ValueError: when the runs cannot be simulated from where the search begins.
     """
     problem = Problem(given, asked)
     low, high = problem.bounds()
-    found = minimise(problem.normal, problem.start(), low, high)
+    found = minimise(problem.normal, problem.start(), low, high, most)
     at = problem.normal(found.values)
     k = problem.k
     inverse, known = covariance_of(at.matrix)

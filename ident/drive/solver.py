@@ -81,6 +81,7 @@ def minimise(
     start: Array,
     low: Array | None = None,
     high: Array | None = None,
+    most: int = MOST_ITERATIONS,
 ) -> Found:
     """The least sum of squares from a start, within bounds.
 
@@ -89,6 +90,7 @@ def minimise(
         start: (k,).
         low: least values, (k,).
         high: greatest values, (k,).
+        most: steps tried at most.
 
     Raises:
         ValueError: when the start itself cannot be evaluated.
@@ -96,7 +98,7 @@ def minimise(
     at = np.array(start, dtype=np.float64)
     low = np.full_like(at, -np.inf) if low is None else low
     high = np.full_like(at, np.inf) if high is None else high
-    solver = LevenbergMarquardt(MOST_ITERATIONS, DAMPING)
+    solver = LevenbergMarquardt(most, DAMPING)
     ended, count, stop = solver.descend(_Search(evaluate, low, high), _At(at, evaluate(at)))
     return Found(ended.values, ended.normal, count, stop.sentence)
 

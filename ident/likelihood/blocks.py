@@ -12,11 +12,9 @@ from numpy.typing import NDArray
 
 from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.robot import Array
-from freeswing.ident.likelihood.joint_problem import INERTIA_UNIT, State
+from freeswing.ident.likelihood.joint_problem import INERTIA, INERTIA_UNIT, PAYLOADS, State
 from freeswing.ident.likelihood.payload_runs import Loads
 from freeswing.ident.likelihood.unknowns import Gaussian, Mask, Unknown, Unknowns
-
-INERTIA, PAYLOADS = "inertia", "payloads"
 
 
 def each_run(effect: str) -> str:

@@ -27,6 +27,7 @@ from freeswing.ident.likelihood.likelihood_run import Samples, reduce_run
 from freeswing.ident.runs import SwingRun
 
 ROUNDS = 3
+MODES = "camera modes"
 CONVERGED = 0.02  # of a standard deviation of the amplitudes
 UNLIKELY = 4.5
 
@@ -89,7 +90,7 @@ def with_calibration(
     known = [none if one is None else one for one in errors]
     current = found
     for _ in range(ROUNDS):
-        step, _ = _solved(current, known, amplitudes)
+        step = _solved(current, known, amplitudes).step
         amplitudes = amplitudes + step
         samples = [
             replace(run, values=run.values - _shifts(motion, run, one)[:, run.columns] @ step)
@@ -105,11 +106,8 @@ def with_calibration(
         )
         if np.abs(step).max() < CONVERGED:
             break
-    _, covariance = _solved(current, known, amplitudes)
-    shared = len(found.free)
-    spread = np.sqrt(np.diag(covariance)[shared:])
-    current = replace(current, covariance=covariance[:shared, :shared])
-    return Calibrated(current, amplitudes, spread)
+    joint = _solved(current, known, amplitudes)
+    return Calibrated(replace(current, covariance=joint.shared), amplitudes, joint.spread)
 
 
 def freed(run: SwingRun, amplitudes: Array) -> SwingRun:
@@ -157,15 +155,29 @@ def _shifts(motion: Motion, samples: Samples, errors: PoseErrors) -> Array:
     return mode_shifts(zetas, rates, errors)
 
 
-def _solved(
-    current: LikelihoodFit, errors: Sequence[PoseErrors], amplitudes: Array
-) -> tuple[Array, Array]:
-    """Change of the amplitudes, and the covariance of shared unknowns and amplitudes together.
+@dataclass(frozen=True, slots=True)
+class _Joint:
+    """Amplitudes beside all other shared unknowns, to first order.
+
+    Attributes:
+        step: change of the amplitudes, (r,).
+        spread: their standard deviations, (r,).
+        shared: covariance of the others, (p, p).
+    """
+
+    step: Array
+    spread: Array
+    shared: Array
+
+
+def _solved(current: LikelihoodFit, errors: Sequence[PoseErrors], amplitudes: Array) -> _Joint:
+    """All runs, the priors, and amplitudes of unit deviation about zero.
 
     Coloured residuals say less than their number: the samples count by `correlation`.
     """
     problem = Problem(current.model, current.samples, current.free)
-    n_modes, n_shared = len(amplitudes), len(current.free)
+    n_modes, n_shared = len(amplitudes), problem.layout.size
+    layout = problem.layout.joined(MODES, n_modes)
     weight = 1.0 / np.sqrt(current.enlargement)
     rows = []
     for motion, run, one in zip(current.motions, current.samples, errors, strict=True):
@@ -183,8 +195,10 @@ def _solved(
     matrix, right = stacked[:, :-1][:, kept] * unit, stacked[:, -1]
     Q, R = np.linalg.qr(matrix)
     inverse = np.linalg.inv(R) * unit[:, None]
-    covariance = np.zeros((len(kept), len(kept)))
+    covariance = np.zeros((layout.size, layout.size))
     covariance[np.ix_(kept, kept)] = inverse @ inverse.T
-    step = np.zeros(len(kept))
+    step = np.zeros(layout.size)
     step[kept] = -inverse @ (Q.T @ right)
-    return step[n_shared:], covariance
+    modes = layout.place(MODES)
+    spread = np.sqrt(np.diag(covariance)[modes])
+    return _Joint(step[modes], spread, covariance[:n_shared, :n_shared])

@@ -24,7 +24,9 @@ from freeswing.ident.likelihood.likelihood_run import (
     residuals,
 )
 from freeswing.ident.likelihood.payload_runs import Loads
+from freeswing.ident.likelihood.unknowns import Layout
 
+INERTIA, EFFECTS, PAYLOADS = "inertia", "effects", "payloads"
 TOLERANCE_M = 1e-8
 INERTIA_UNIT = np.array([0.05, 0.05, 0.05, 0.02, 0.02, 0.02, 0.01, 0.01, 0.01])
 STATE_UNIT = 0.05  # m, rad, and these a second: a start
@@ -129,12 +131,15 @@ class Problem:
         parameters = model.parameters
         self.model = model
         self.samples = tuple(samples)
-        count = 9 + len(parameters)
-        self.free = np.ones(count, dtype=bool) if free is None else np.array(free[:count])
-        self.free[9 + model.own_values] = False
         self.loads = Loads.of([run.payload for run in samples])
+        self.seen = Layout(((INERTIA, len(INERTIA_UNIT)), (EFFECTS, len(parameters))))
+        self.layout = self.seen.joined(PAYLOADS, self.loads.count)
+        size = self.seen.size
+        known = np.ones(size, dtype=bool) if free is None else np.array(free[:size])
+        known[self.seen.place(EFFECTS)][model.own_values] = False
         # Where the inertia is held, so is what payloads do to it.
-        self.free = np.append(self.free, np.full(self.loads.count, self.free[:9].any()))
+        body = known[self.seen.place(INERTIA)]
+        self.free = np.append(known, np.full(self.loads.count, body.any()))
         self.consistent = consistent
         self.estimate_scales = estimate_scales
         self.tolerance_m = tolerance_m
@@ -251,7 +256,8 @@ class Problem:
         shared[free] = -self.unit[free] * (back.T @ (gains * (left.T @ right)))
         if self.consistent:
             curves = singular**2 + (damping + RANK_LIMIT**2) * largest**2
-            shared += self._held(state.inertia + shared[:9], (back.T / curves) @ back)
+            aimed = state.inertia + shared[self.layout.place(INERTIA)]
+            shared += self._held(aimed, (back.T / curves) @ back)
         shared *= min(1.0, 1.0 / max(np.abs(shared / self.farthest).max(initial=0.0), 1e-300))
         changes = [run.own_change(one @ shared) for run, one in zip(reduced, maps, strict=True)]
         states, own = (tuple(part) for part in zip(*changes, strict=True))
@@ -273,32 +279,33 @@ class Problem:
 
     def shared_map(self, run: int, state: State) -> Array:
         """What a run sees, inertia with its payload and values, by the unknowns, (9 + k, p)."""
-        values = len(self.prior_centre)
-        found = np.zeros((9 + values, len(self.free)))
-        found[9:, 9 : 9 + values] = np.eye(values)
-        slopes = self.loads.slopes(run, state.inertia, self.loads_of(state))
-        found[:9, :9], found[:9, 9 + values :] = slopes[:, :9], slopes[:, 9:]
+        seen, by = self.seen, self.layout
+        found = np.zeros((seen.size, by.size))
+        found[seen.place(EFFECTS), by.place(EFFECTS)] = np.eye(len(self.prior_centre))
+        by_inertia, by_payloads = self.loads.slopes(run, state.inertia, self.loads_of(state))
+        found[seen.place(INERTIA), by.place(INERTIA)] = by_inertia
+        found[seen.place(INERTIA), by.place(PAYLOADS)] = by_payloads
         return found
 
     def _held(self, inertia: Array, scaled_covariance: Array) -> Array:
         """Change of the shared unknowns (p,) that makes an inertia aimed at a possible body's."""
-        free = np.flatnonzero(self.free)
+        free, body = np.flatnonzero(self.free), self.layout.place(INERTIA)
         covariance = scaled_covariance * np.outer(self.unit[free], self.unit[free])
-        change = nearest_possible(inertia, covariance[:9, :9]) - inertia
+        own = covariance[body, body]  # all nine are free, and they come first
+        change = nearest_possible(inertia, own) - inertia
         found = np.zeros(len(self.free))
-        found[free] = covariance[:, :9] @ np.linalg.solve(covariance[:9, :9], change)
+        found[free] = covariance[:, body] @ np.linalg.solve(own, change)
         return found
 
     def prior_rows(self, state: State) -> Array:
         """Rows of the priors of effect values and payloads, (k + u, p + 1)."""
-        values = len(self.prior_centre)
-        rows = np.zeros((len(self.free) - 9, len(self.free) + 1))
-        rows[:values, 9 : 9 + values] = self.prior_whitener
-        rows[values:, 9 + values : -1] = np.diag(1.0 / self.loads.prior_std)
-        rows[:, -1] = np.concatenate(
-            [self.prior(state.values), self.loads_of(state) / self.loads.prior_std]
-        )
-        return rows
+        effects = np.zeros((len(self.prior_centre), self.layout.size + 1))
+        effects[:, self.layout.place(EFFECTS)] = self.prior_whitener
+        effects[:, -1] = self.prior(state.values)
+        payloads = np.zeros((self.loads.count, self.layout.size + 1))
+        payloads[:, self.layout.place(PAYLOADS)] = np.diag(1.0 / self.loads.prior_std)
+        payloads[:, -1] = self.loads_of(state) / self.loads.prior_std
+        return np.vstack([effects, payloads])
 
     def moved(self, state: State, step: Step, near: Sequence[Surroundings]) -> State | None:
         """The simulated state after a step, or None where it cannot be simulated.
@@ -308,13 +315,14 @@ class Problem:
             step: the step.
             near: of the state's motions.
         """
+        change = self.layout.split(step.shared)
         aimed = replace(
             state,
-            inertia=state.inertia + step.shared[:9],
-            values=state.values + step.shared[9 : 9 + len(state.values)],
+            inertia=state.inertia + change[INERTIA],
+            values=state.values + change[EFFECTS],
             starts=state.starts + np.array(step.states),
             own_values=self._own_of(state) + np.array(step.own),
-            loads=self.loads_of(state) + step.shared[9 + len(state.values) :],
+            loads=self.loads_of(state) + change[PAYLOADS],
         )
         try:
             return self.simulated(aimed, near)

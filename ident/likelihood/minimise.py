@@ -49,9 +49,11 @@ def minimised(
         ValueError: when the start cannot be simulated, naming the run.
     """
     here = best = _place(problem, problem.rescaled(problem.begun(state)))
-    damping, rises = 0.0, 0
+    damping, rises, falls = 0.0, 0, False
     for taken in range(1, steps + 1):
         step = problem.step(here.state, here.linear, damping)
+        if falls and damping > 0.0 and step.decrease < tolerance:
+            damping, step = 0.0, problem.step(here.state, here.linear, 0.0)
         promised = step.decrease if damping == 0.0 else np.inf
         if promised < NEGLIGIBLE * tolerance and here is best:
             return best.state, step, taken, _converged(promised)
@@ -62,7 +64,8 @@ def minimised(
         if trial is not None and settled and abs(gain) < tolerance:
             kept = problem.rescaled(trial) if gain >= 0.0 else best.state
             return kept, step, taken, _converged(gain)
-        if trial is not None and gain > 0.0:
+        falls = trial is not None and gain > 0.0
+        if falls:
             here = best = _place(problem, problem.rescaled(trial))
             damping, rises = (0.0 if damping < FIRST_DAMPING / 10.0 else damping / 4.0), 0
             continue

@@ -82,27 +82,29 @@ class Loads:
         ratio = payload.mass_kg * unknowns[0]
         return (inertia + ratio * self._own(which, unknowns)) / (1.0 + ratio)
 
-    def slopes(self, run: int, inertia: Array, unknowns: Array) -> Array:
-        """Derivatives of that by the platform's inertia and by the unknowns, (9, 9 + count)."""
-        found = np.hstack([np.eye(9), np.zeros((9, self.count))])
+    def slopes(self, run: int, inertia: Array, unknowns: Array) -> tuple[Array, Array]:
+        """Its derivatives by the platform's inertia, (9, 9), and by the unknowns, (9, count)."""
+        by_inertia, by_unknowns = np.eye(9), np.zeros((9, self.count))
         which = self.of_run[run]
         if which < 0:
-            return found
+            return by_inertia, by_unknowns
         payload = self.payloads[which]
         ratio = payload.mass_kg * unknowns[0]
         change = self._own(which, unknowns) - inertia
-        found[:, :9] /= 1.0 + ratio
-        found[:, 9] = payload.mass_kg * change / (1.0 + ratio) ** 2
-        first = 10 + 6 * which
-        found[3:, first : first + 6] = ratio / (1.0 + ratio) * np.eye(6)
-        return found
+        by_inertia /= 1.0 + ratio
+        by_unknowns[:, 0] = payload.mass_kg * change / (1.0 + ratio) ** 2
+        by_unknowns[3:, self._place(which)] = ratio / (1.0 + ratio) * np.eye(6)
+        return by_inertia, by_unknowns
 
     def _own(self, which: int, unknowns: Array) -> Array:
         """Specific inertia of a payload alone about P, (9,)."""
         found = point_inertia(self.payloads[which].position_m)
-        first = 1 + 6 * which
-        found[3:] += unknowns[first : first + 6]
+        found[3:] += unknowns[self._place(which)]
         return found
+
+    def _place(self, which: int) -> slice:
+        """Where a payload's own six stand among the unknowns."""
+        return slice(1 + 6 * which, 7 + 6 * which)
 
 
 def point_inertia(position_m: Array) -> Array:

@@ -101,6 +101,43 @@ class Unknown:
 
 
 @dataclass(frozen=True, slots=True)
+class Layout:
+    """Where named parts stand in one vector, one after the other: index arithmetic is here.
+
+    Attributes:
+        sizes: name and size of each part.
+    """
+
+    sizes: tuple[tuple[str, int], ...]
+
+    @property
+    def size(self) -> int:
+        """Of the whole vector."""
+        return sum(size for _, size in self.sizes)
+
+    def joined(self, name: str, size: int) -> Layout:
+        """The same with one more part at the end."""
+        return Layout((*self.sizes, (name, size)))
+
+    def place(self, name: str) -> slice:
+        """Where a part stands.
+
+        Raises:
+            ValueError: when none is called so.
+        """
+        first = 0
+        for other, size in self.sizes:
+            if other == name:
+                return slice(first, first + size)
+            first += size
+        raise ValueError(f"no shared unknown is called {name!r}")
+
+    def split(self, vector: Array) -> dict[str, Array]:
+        """The parts of a vector (..., size)."""
+        return {name: vector[..., self.place(name)] for name, _ in self.sizes}
+
+
+@dataclass(frozen=True, slots=True)
 class Unknowns:
     """All blocks of a fit, their names all different."""
 
@@ -146,12 +183,7 @@ class Unknowns:
         Raises:
             ValueError: when none is called so.
         """
-        first = 0
-        for block in self.shared:
-            if block.name == name:
-                return slice(first, first + block.size)
-            first += block.size
-        raise ValueError(f"no shared unknown is called {name!r}")
+        return Layout(tuple((block.name, block.size) for block in self.shared)).place(name)
 
     def columns(self, *names: str) -> NDArray[np.int64]:
         """Where some blocks stand among the shared unknowns, one after the other."""

@@ -32,12 +32,13 @@ class Lqg:
 def design_lqg(plant: StateSpace, mass: Array, speeds_rad_s: Array) -> Lqg:
     """The controller of given speeds.
 
-    The regulator weighs the error's integral by speed^6 and the wrench by M_o^-2: of 1/s^2 that
-    is a Butterworth pattern of radius `speed`. The filter takes white wrenches of M_o^2 speed^4
-    against white pose noise, a Butterworth pattern too, `FILTER_RATIO` faster.
+    The regulator weighs the error's integral by speed^6, the pose by 3 speed^4, its rate by 3
+    speed^2 and the wrench by M_o^-2: of 1/s^2 three poles at -speed, and modes that springs make
+    faster than that are damped. The filter takes white wrenches of M_o^2 speed^4 against white
+    pose noise, a Butterworth pattern `FILTER_RATIO` faster.
 
     Args:
-        plant: wrench to pose, with its delay if that is to be designed in.
+        plant: wrench to pose, its states pose and rate, then those of its delay.
         mass: M_o, (6, 6).
         speeds_rad_s: radius of the regulator's poles for each axis, (6,).
     """
@@ -46,7 +47,9 @@ def design_lqg(plant: StateSpace, mass: Array, speeds_rad_s: Array) -> Lqg:
     A = np.block([[plant.A, np.zeros((n, m))], [plant.C, np.zeros((m, m))]])
     B = np.vstack([plant.B, np.zeros((m, m))])
     inverse = np.linalg.inv(mass)
-    Q = scipy.linalg.block_diag(1e-9 * np.eye(n), np.diag(speeds**6))
+    states = np.full(n, 1e-9)
+    states[:m], states[m : 2 * m] = 3.0 * speeds**4, 3.0 * speeds**2
+    Q = np.diag(np.concatenate([states, speeds**6]))
     R = inverse.T @ inverse
     X = scipy.linalg.solve_continuous_are(A, B, Q, R)
     gain = np.linalg.solve(R, B.T @ X)

@@ -71,7 +71,8 @@ class Examiner:
     """
 
     def __init__(self, found: Controller, order: Order) -> None:
-        self._found, self._order = found, order
+        self._found = found
+        self._weights = order.goals.weights.faster(found.facts.get("share", 1.0))
         self._response = found.system.at(RATES_RAD_S)
         self._late = np.exp(-1j * RATES_RAD_S * found.delay_s)[:, None, None]
 
@@ -86,7 +87,7 @@ class Examiner:
         ]
         if not gamma:
             return Found(stable, margins[0], margins[1])
-        loop = close(weighted(plant.system, self._order.goals.weights).plant, controller)
+        loop = close(weighted(plant.system, self._weights).plant, controller)
         norm = hinf_norm(loop, 1e-3).value if loop.is_stable() else np.inf
         return Found(stable, margins[0], margins[1], norm)
 

@@ -120,7 +120,7 @@ def read_controller(path: Path | str) -> Stored:
         system = StateSpace(A, B, C, D, 1.0 / rate)
         method = str(table.get("method", "hinf"))
         predictor = _predictor(table.get("predictor"), order)
-    except (KeyError, TypeError, ValueError, ZeroDivisionError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError, ZeroDivisionError) as error:
         raise InputError(
             f"{path}: not a controller of 6 errors and 6 wrenches: {error!r}"
         ) from error

@@ -34,12 +34,17 @@ def run(options: Namespace, console: Console) -> None:
     """Write results/platform.urdf, .xml or .json."""
     from freeswing.cdpr.files.documents import InputError, replace_file, write_json
     from freeswing.export import write_exports as exports
+    from freeswing.session.drive_session import drive_path
     from freeswing.session.load_swings import load_robot
 
     # `--json` names the format here, besides its use in every command: the file on stdout.
     kind = options.kind or ("plain" if options.json else None)
     if kind is None:
         raise InputError("freeswing export: choose one of --urdf, --mjcf and --json")
+    driven = drive_path(options.session)
+    if driven is not None:
+        _driven(driven, options, kind, console)
+        return
     session = open_session(options)
     robot = load_robot(session)
     _refuse_stale(session)
@@ -52,6 +57,40 @@ def run(options: Namespace, console: Console) -> None:
         replace_file(path, text.encode("utf-8"))
     console.say(str(path))
     console.show_file(path)
+
+
+def _driven(path: Path, options: Namespace, kind: str, console: Console) -> None:
+    """A driven robot with its estimated numbers; MJCF alone has motors and springs."""
+    import numpy as np
+
+    from freeswing.cdpr.driven.constants import constants
+    from freeswing.cdpr.driven.statics import static_pose
+    from freeswing.cdpr.files.documents import DataError, InputError, replace_file
+    from freeswing.export.driven_mjcf import driven_mjcf
+    from freeswing.results.drive import joint_estimates
+    from freeswing.session.drive_session import read_drive_session
+
+    if kind != "mjcf":
+        raise InputError(f"{path}: a driven robot is exported as --mjcf alone")
+    file = read_drive_session(path, options.results)
+    found = file.results / "drive.json"
+    values = joint_estimates(found)
+    if values is None:
+        raise DataError(f"{found}: nothing is identified yet; run freeswing drive first")
+    model, asked = file.session.model, file.session.asked
+    lost = [name for name in asked.names if values.get(name) is None]
+    if lost:
+        raise DataError(f"{found}: has no value of {', '.join(lost)}; declare or excite it")
+    theta = asked.put(model, model.declared, np.array([values[n] for n in asked.names], float))
+    pose = static_pose(model, np.zeros(model.n_cables), theta).pose
+    try:
+        text = driven_mjcf(model.robot, constants(model, theta), pose)
+    except ValueError as error:
+        raise DataError(f"{path}: {error}") from error
+    result = file.results / "robot.xml"
+    replace_file(result, text.encode("utf-8"))
+    console.say(str(result))
+    console.show_file(result)
 
 
 def _refuse_stale(session: Session) -> None:

@@ -30,8 +30,14 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(options: Namespace, console: Console) -> None:
     """Diagnose and say before and after."""
+    from freeswing.commands.session.drive import diagnose as diagnose_drive
+    from freeswing.session.drive_session import drive_path
     from freeswing.session.stages import DIAGNOSE
 
+    driven = drive_path(options.session)
+    if driven is not None:
+        diagnose_drive(driven, options.results, options.only, console)
+        return
     session = open_session(options)
     with crew_of(options, session) as crew:
         result = DIAGNOSE.take(session, console, {"only": options.only}, crew)

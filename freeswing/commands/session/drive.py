@@ -93,6 +93,73 @@ def check(path: Path, results: str | None, console: Console) -> None:
     console.say(f"{file.name}: nothing keeps it from a result (0 findings)")
 
 
+def diagnose(path: Path, results: str | None, only: list[str] | None, console: Console) -> None:
+    """diagnosis.json of a session of a driven robot.
+
+    Raises:
+        InputError: for an effect that driven robots do not have.
+        DataError: when the recordings cannot give a result.
+    """
+    from freeswing.cdpr.effects import driven_catalogue
+    from freeswing.cdpr.files.documents import DataError, InputError, write_json
+    from freeswing.ident.drive.diagnose.diagnose import diagnose_drive
+    from freeswing.results.drive import drive_diagnosis_document
+    from freeswing.session.drive_session import read_drive_session
+
+    file, known = read_drive_session(path, results), driven_catalogue()
+    for name in only or ():
+        if name not in known:
+            raise InputError(f"--only {name}: not one of {', '.join(sorted(known))}")
+    examined(file)
+    try:
+        found = diagnose_drive(file.session, console.progress, only)
+    except ValueError as error:
+        raise DataError(f"{file.path}: {error}") from error
+    document = drive_diagnosis_document(file.name, file.session, found)
+    result = file.results / "diagnosis.json"
+    write_json(result, document)
+    _say_missing(document, console)
+    console.say(str(result))
+    console.show_file(result)
+
+
+def _say_missing(document: dict[str, Any], console: Console) -> None:
+    for entry in document["accepted"]:
+        part = f" of {entry['part']}" if "part" in entry else ""
+        values = ", ".join(
+            f"{p['name']} {p['value']:.4g} +- {p['std'] or float('nan'):.2g}"
+            for p in entry["parameters"]
+        )
+        console.say(f"  accepted: {entry['effect']}{part} ({values})")
+        for one in entry["evidence"][:2]:
+            console.say(
+                f"    seen in {one['run']} from {one['from_s']:g} to {one['to_s']:g} s "
+                f"({100.0 * one['share']:.0f} % of what it explains)"
+            )
+    groups = {
+        tuple(sorted([_label(entry), *entry["confounded_with"]]))
+        for entry in document["candidates"]
+        if entry["verdict"] == "confounded"
+    }
+    for group in groups:
+        console.say(f"  these recordings cannot tell apart: {', '.join(group)}")
+    left = document["unexplained"]
+    if left["present"]:
+        console.complain(f"none of these explains what remains: {left['signature']}")
+    elif not document["accepted"] and not groups:
+        console.say("  nothing is missing: what the model leaves is noise")
+    before, after = document["before"], document["after"]
+    if "motor_rmse_rad" in before and "motor_rmse_rad" in after:
+        console.say(
+            f"  held-out runs: motor angles off by {before['motor_rmse_rad']:.2g} rad before, "
+            f"{after['motor_rmse_rad']:.2g} after (counts leave {after['motor_noise_rad']:.2g})"
+        )
+
+
+def _label(entry: dict[str, Any]) -> str:
+    return f"{entry['effect']}.{entry['part']}" if "part" in entry else entry["effect"]
+
+
 def _say(document: dict[str, Any], console: Console) -> None:
     for entry in document["estimates"]["joint"]["parameters"]:
         if not entry["identifiable"]:

@@ -154,3 +154,12 @@ def test_admissible_rates_are_nearest_and_creep_along():
     assert np.abs(jacobian @ rates - creep).max() < 1e-14
     free = np.linalg.svd(jacobian)[2][4:]
     assert np.abs(free @ (rates - wishes[0])).max() < 1e-14, "moved along a free direction"
+
+
+def test_rates_are_admissible_where_cables_stretch():
+    """The slip follows the rates through the tensions: three sweeps leave some."""
+    values = np.array([4e-4, 4e-7])
+    model, inertia, zeta, rates = swing_start("bologna-4", ("cable_elasticity",), values=values)
+    found = admissible_rates(model, zeta, rates + 0.3, inertia, values)
+    slip = evaluate(model.slip, 0.0, zeta, found, inertia, values)[0]
+    assert np.abs(slip).max() < 1e-9, f"{np.abs(slip).max():.1e} m/s"

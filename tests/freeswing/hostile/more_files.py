@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import cv2
@@ -46,6 +47,7 @@ from tests.freeswing.hostile.text_files import Case, cameras
 from tests.freeswing.report.report_material import whole_material
 from tests.ident.drive.made_sessions import TOML
 from tests.places import SAMPLES
+from tests.vision.loops import small_cameras
 from tests.vision.scenes import platform_tags
 
 PLUMB = "camera,u_px,v_px\n" + "".join(
@@ -192,7 +194,7 @@ def _driven() -> dict[str, Case]:
         "sample_rate_hz": 200.0,
         "order": 2,
         **{key: np.zeros(shape).tolist() for key, shape in _SHAPES.items()},
-        "operating_point": {"wrench": [0.0] * 6},
+        "operating_point": {k: [0.0] * n for k, n in _POINT.items()},
     }
     return {
         "drive run": Case("a.csv", run, lambda path: read_drive_run(path, 8)),
@@ -209,6 +211,7 @@ def _driven() -> dict[str, Case]:
     }
 
 
+_POINT = {"wrench": 6, "position_m": 3, "angles_rad": 3}
 _SHAPES = {"A": (2, 2), "B": (2, 6), "C": (6, 2), "D": (6, 6)}
 
 
@@ -242,14 +245,19 @@ def _pieces(folder: Path) -> dict[str, Case]:
     }
 
 
+@cache
+def a_follower() -> Follower:
+    return Follower(small_cameras(1)[0], Watch.of(Target(platform_tags())))
+
+
 def piece_of_sightings(path: Path) -> None:
     if is_whole(path):
         load_piece(path)
-        restore(Follower(cameras()[0], Watch.of(Target(platform_tags()))), path)
+        restore(a_follower(), path)
 
 
 def _sightings(path: Path) -> bytes:
     blank = FrameView(0, (), (np.eye(3), np.ones(3)))
-    follower = Follower(cameras()[0], Watch.of(Target(platform_tags())))
+    follower = a_follower()
     save_piece(path, Piece.of(range(4), 0.1 * np.arange(4), [blank] * 4), follower)
     return path.read_bytes()

@@ -7,12 +7,15 @@ from pathlib import Path
 
 import numpy as np
 
+from freeswing.cdpr.driven.behaviour import rest_pose, simulate, turns_at_rest
 from freeswing.cdpr.driven.excitation import prbs
-from freeswing.cdpr.driven.motion import motor_angles, simulate_driven
+from freeswing.cdpr.driven.model import DrivenModel
+from freeswing.cdpr.driven.motion import motor_angles
 from freeswing.cdpr.driven.record import Instruments, observed
 from freeswing.cdpr.driven.slopes import moved
 from freeswing.cdpr.driven.statics import CENTRE, static_pose
 from freeswing.cdpr.files.drive_csv import write_drive_run, write_static
+from freeswing.cdpr.model.batch import evaluate
 from tests.cdpr.driven_robots import inca
 from tests.places import SAMPLES
 
@@ -63,22 +66,39 @@ def static_readings(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return currents, angles, moved(poses, generator.normal(size=(9, 6)) * STD / 10.0)
 
 
-def recording(seed: int, seconds: float):
+def recording(seed: int, seconds: float, model: DrivenModel | None = None, theta=None):
     """A run of PRBS from rest."""
-    model, generator = inca(), np.random.default_rng(seed)
+    model, generator = inca() if model is None else model, np.random.default_rng(seed)
     still = np.zeros(8)
-    state = np.concatenate([static_pose(model, still).pose, np.zeros(6)])
+    state = np.concatenate([rest_pose(model, still, theta), np.zeros(6)])
     references = prbs(round(1000 * seconds) + 1, 8, 1000.0, (0.0, 1.0), 1.0, generator)
-    motion = simulate_driven(model, state, references, 1000.0, currents_A=still)
+    motion = simulate(model, state, references, 1000.0, theta, currents_A=still)
     return observed(motion, CENTRE, INSTRUMENTS, generator)
 
 
-def write_session(folder: Path, seed: int, seconds: float) -> Path:
+def write_session(folder: Path, seed: int, seconds: float, robot="robot-initial.toml") -> Path:
     """drive.toml with Table 1's initial robot, an identify and a validate run."""
-    initial = SAMPLES / "inca-6d" / "robot-initial.toml"
-    (folder / "robot.toml").write_text(initial.read_text())
+    (folder / "robot.toml").write_text((SAMPLES / "inca-6d" / robot).read_text())
     for k, name in enumerate(("ident", "check")):
         write_drive_run(folder / f"{name}.csv", recording(seed + k, seconds))
     write_static(folder / "static.csv", *static_readings(seed))
     (folder / "drive.toml").write_text(TOML)
+    return folder
+
+
+def write_flawed(folder: Path, seed: int, seconds: float, flaws: dict[str, float]) -> Path:
+    """The true robot declared, but recorded with undeclared effects, values by full name."""
+    effects = tuple(dict.fromkeys(name.partition(".")[0] for name in flaws))
+    model = inca(effects)
+    theta = model.theta(flaws)
+    write_session(folder, seed, 0.06, "robot.toml")
+    for k, name in enumerate(("ident", "check")):
+        write_drive_run(folder / f"{name}.csv", recording(seed + k, seconds, model, theta))
+    currents, generator = np.vstack([np.zeros(8), np.eye(8)]), np.random.default_rng(seed)
+    poses = np.array([rest_pose(model, row, theta) for row in currents])
+    zero = evaluate(model.lengths, CENTRE, theta)[0] / evaluate(model.drums, theta)[0]
+    angles = zero - turns_at_rest(model, poses, currents, theta)
+    angles = np.round(angles / STEP_RAD) * STEP_RAD
+    noise = generator.normal(size=(9, 6)) * STD / 10.0
+    write_static(folder / "static.csv", currents, angles, moved(poses, noise))
     return folder

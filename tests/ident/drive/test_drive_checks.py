@@ -72,7 +72,7 @@ def test_a_sound_session_has_no_finding(made, tmp_path):
 
 def test_commands_of_free_swings_say_which_take_it(made, capsys):
     assert main(["identify", str(made)]) == 2
-    assert "drive, check and run take it" in capsys.readouterr().err
+    assert "drive, check, diagnose, export and run take it" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

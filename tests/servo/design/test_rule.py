@@ -6,9 +6,12 @@ import pytest
 from freeswing.servo.design import family
 from freeswing.servo.design.controller import HALF_HOLD_S
 from freeswing.servo.design.hinf import design_hinf
+from freeswing.servo.design.lqg import design_lqg
+from freeswing.servo.design.mpc import PLAN_STEP_S, design_mpc
 from freeswing.servo.design.plant import Plant
 from freeswing.servo.design.tuning import LEAST_MARGIN, MOST_NOISE, RATES_RAD_S, Noise, look
 from freeswing.servo.files.weights_file import USUAL
+from freeswing.servo.synthesis.state_space import StateSpace
 from freeswing.servo.synthesis.weights import Filter
 from tests.servo.plants import inca_plant
 
@@ -59,3 +62,23 @@ def test_each_controller_keeps_the_rule_at_its_delay(method):
 def test_a_method_that_there_is_not_is_refused():
     with pytest.raises(ValueError, match="one of hinf, hinf-fastest"):
         family.design("fuzzy", plant(0.0), USUAL, NOISE, np.eye(6), with_delay=False)
+
+
+def floating():
+    """1/s^2 in six axes, each of mass one."""
+    zero, one = np.zeros((6, 6)), np.eye(6)
+    A = np.block([[zero, one], [zero, zero]])
+    return StateSpace(A, np.vstack([zero, one]), np.hstack([one, zero]), zero)
+
+
+def test_speeds_are_poles_of_a_floating_mass():
+    speeds = np.array([2.0, 3.0, 4.0, 5.0, 6.0, 7.0])
+    lqg = design_lqg(floating(), np.eye(6), speeds)
+    A = np.block([[floating().A, np.zeros((12, 6))], [floating().C, np.zeros((6, 6))]])
+    B = np.vstack([floating().B, np.zeros((6, 6))])
+    poles = np.sort_complex(np.linalg.eigvals(A - B @ lqg.gain))
+    np.testing.assert_allclose(poles, -np.sort(np.repeat(speeds, 3))[::-1], rtol=2e-2)
+    p = design_mpc(Plant(np.zeros(6), np.zeros(6), np.eye(6), floating(), 0.0), speeds)
+    rates = np.log(np.linalg.eigvals(p.step_A - p.step_B @ p.gain)) / PLAN_STEP_S
+    # A cost summed over steps of 20 ms is the integral's to some per cent.
+    np.testing.assert_allclose(np.sort(rates.real), -np.sort(np.repeat(speeds, 2))[::-1], rtol=0.1)

@@ -1,0 +1,160 @@
+"""A candidate fitted with everything else, and what runs that were never fitted say of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from freeswing.cdpr.driven.model import DrivenModel
+from freeswing.ident.drive.diagnose.candidates import CENTRE, Candidate
+from freeswing.ident.drive.diagnose.screen import Screened, grown
+from freeswing.ident.drive.identify import DriveSession, RunFit, predict
+from freeswing.ident.drive.joint import Estimate, Premise, Problem, estimate
+from freeswing.ident.drive.unknowns import Asked, Group
+
+Array = NDArray[np.float64]
+
+# What is missing leaves a sum of squares that no search brings down: more steps do not help.
+MOST_STEPS = 14
+WEIGHTS_KG = (0.02, 0.05, 0.1, 0.2)  # tried for an undeclared weight whose moment is known
+
+
+@dataclass(frozen=True, slots=True)
+class HeldOut:
+    """Runs that were not fitted, predicted from their starts.
+
+    Attributes:
+        fits: of the runs.
+        rms_rad: of all motor angles.
+        times_noise: that over what encoder counts leave.
+        poses_m: rms of the measured positions' differences.
+        poses_rad: of the measured orientations'.
+    """
+
+    fits: tuple[RunFit, ...]
+    rms_rad: float
+    times_noise: float
+    poses_m: float
+    poses_rad: float
+
+
+@dataclass(frozen=True, slots=True)
+class Fitted:
+    """A model fitted to the runs to identify from.
+
+    Attributes:
+        candidate: what it has more than the one before, or None.
+        given: its premise.
+        found: the estimate.
+        held_out: how it predicts; None where it cannot follow the runs at all.
+    """
+
+    candidate: Candidate | None
+    given: Premise
+    found: Estimate
+    held_out: HeldOut | None
+
+    @property
+    def chi_square(self) -> float:
+        """Sum of squared residuals over their variances."""
+        return 2.0 * self.found.found.normal.cost
+
+    @property
+    def n(self) -> int:
+        """Number of residuals."""
+        return self.found.found.normal.n
+
+    @property
+    def times_noise(self) -> float:
+        """Of the held-out runs; infinite where they cannot be followed."""
+        return np.inf if self.held_out is None else self.held_out.times_noise
+
+    def bic_beside(self, other: Fitted) -> float:
+        """BIC less that of a smaller model, the residuals' scale unknown."""
+        more = len(self.found.asked.groups) - len(other.found.asked.groups)
+        worse = np.log(self.chi_square / other.chi_square)
+        return float(self.n * worse + more * np.log(self.n))
+
+
+def fitted(session: DriveSession, given: Premise, asked: Asked, candidate=None) -> Fitted:
+    """Fit, then predict the runs kept apart."""
+    found = estimate(given, asked, MOST_STEPS)
+    return Fitted(candidate, given, found, _held_out(session, given.model, found))
+
+
+def _held_out(session: DriveSession, model: DrivenModel, found: Estimate) -> HeldOut | None:
+    session, noise = replace(session, model=model), session.noise
+    try:
+        fits = tuple(
+            predict(session, run, found.theta, found.offsets) for run in session.of("validate")
+        )
+    except ValueError:
+        return None
+    rms = float(np.sqrt(np.mean([fit.rms_rad**2 for fit in fits])))
+    gaps = np.concatenate([fit.pose_gaps for fit in fits])
+    return HeldOut(
+        fits,
+        rms,
+        rms / noise.angle_std_rad,
+        float(np.sqrt(np.mean(gaps[:, :3] ** 2))) if len(gaps) else np.nan,
+        float(np.sqrt(np.mean(gaps[:, 3:] ** 2))) if len(gaps) else np.nan,
+    )
+
+
+def with_candidate(
+    session: DriveSession, base: Fitted, screened: Screened, starts: dict[str, float]
+) -> Fitted:
+    """The base with one candidate more, begun where the screen puts it.
+
+    Raises:
+        ValueError: when the runs cannot be simulated from there.
+    """
+    candidate, found = screened.candidate, base.found
+    larger = grown(base.given.model, found.theta, (candidate.effect,))
+    model, theta = larger.model, larger.theta
+    for name, value in starts.items():
+        if name in model.names:
+            theta[model.index(name)] = value
+    asked = Asked((*found.asked.groups, *candidate.groups), found.asked.n_kinematic)
+    given = replace(base.given, model=model, theta=theta, offsets=found.offsets)
+    if candidate.screened[0] in CENTRE:
+        return fitted(session, _weighted(given, base, candidate), asked, candidate)
+    for name, value in zip(candidate.screened, screened.values, strict=True):
+        limits = model.parameters[model.index(name) - len(model.numbers.names)]
+        theta[model.index(name)] = np.clip(value, limits.low, limits.high)
+    return fitted(session, given, asked, candidate)
+
+
+def _weighted(given: Premise, base: Fitted, candidate: Candidate) -> Premise:
+    """Where a weight's fit begins: the moment of a displaced centre, and the best of some masses.
+
+    Products of inertia alone tell a light weight far out from a heavy one near the centre: from a
+    wrong one the search goes astray.
+    """
+    found = base.found
+    names = [name for name in CENTRE if name not in found.asked.members]
+    asked = Asked(
+        (*found.asked.groups, *(Group(name, (name,)) for name in names)), found.asked.n_kinematic
+    )
+    centred = estimate(given, asked, MOST_STEPS)
+    model, best, theta = given.model, np.inf, given.theta
+    mass = centred.theta[model.index("mass_kg")]
+    places = [model.index(name) for name in CENTRE]
+    moment = mass * (centred.theta[places] - given.theta[places])
+    for weight in WEIGHTS_KG:
+        trial = centred.theta.copy()
+        trial[places] = given.theta[places]
+        trial[model.index("mass_kg")] = mass - weight
+        for group, value in zip(candidate.groups, (weight, *(moment / weight)), strict=True):
+            limits = model.parameters[model.index(group.name) - len(model.numbers.names)]
+            trial[model.index(group.name)] = np.clip(value, limits.low, limits.high)
+        problem = Problem(replace(given, theta=trial), found.asked)
+        try:
+            cost = problem.normal(problem.start()).cost
+        except ValueError:
+            continue
+        if cost < best:
+            best, theta = cost, trial
+    return replace(given, theta=theta)
