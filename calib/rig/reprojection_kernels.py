@@ -33,7 +33,7 @@ class View(NamedTuple):
     is_fisheye: bool
     full: Array
     columns: Ints
-    count: int
+    n_lens: int
     R_camera: Array
     t_camera: Array
     clock: Array
@@ -171,7 +171,7 @@ def _fill_row(
     view: View, at: _Carried, s: float, p: int, seen: _Point, axis: int, row: Array
 ) -> None:
     """Derivatives of one coordinate of corner p by the view's local unknowns."""
-    k, R, R_camera = view.count, at.R, view.R_camera
+    k, R, R_camera = view.n_lens, at.R, view.R_camera
     arm, arm_camera, modes = seen.arm, seen.arm_camera, view.shape.modes
     row[:] = 0.0
     for j in range(12):
@@ -267,7 +267,7 @@ def new_spare() -> Spare:
 def local_rows(views: ViewArrays, estimate: Estimate, v: int) -> Array:
     """Minus the derivatives of view v by its local unknowns, (2 n_points, n_local)."""
     view = view_of(views, estimate, v)
-    columns = view.count + POSE + CLOCK + WARP + 6 * (1 + view.motion.shape[0])
+    columns = view.n_lens + POSE + CLOCK + WARP + 6 * (1 + view.motion.shape[0])
     n = 2 * views.pixels.shape[1]
     return view_rows(view, True, np.zeros((n, columns)), np.zeros(n), new_spare())[0]
 

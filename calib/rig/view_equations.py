@@ -144,7 +144,7 @@ def view_equations(
     cost = 0.0
     for v in range(len(views.camera)):
         c = views.camera[v]
-        own = estimate.lenses.counts[c] + POSE + CLOCK
+        own = int(estimate.lenses.counts[c]) + POSE + CLOCK
         wide = own + WARP + width + 1
         if wide != rows.shape[1]:
             rows, spare = np.zeros((2 * n_points, wide)), np.zeros(wide)
@@ -154,6 +154,6 @@ def view_equations(
         if not math.isfinite(cost):
             break
         some = rows[:used]
-        target = _targets(estimate.lenses.first[c], own, warp_at)
+        target = _targets(int(estimate.lenses.first[c]), own, warp_at)
         _add_gram(np.dot(some.T, some), target, views.piece[v], found)
     return Normal(shared, cross, boards, slope, found.board_slopes, cost)

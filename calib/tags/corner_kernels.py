@@ -61,7 +61,7 @@ class Pass(NamedTuple):
         histogram: counts of |residual| in 256 bins of one grey level / 4.
         squares: sum of weighted squared residuals.
         weights: their sum.
-        count: of pixels.
+        pixels: that took part.
         spread: sum of squares about the mean grey.
     """
 
@@ -70,7 +70,7 @@ class Pass(NamedTuple):
     histogram: NDArray[np.int64]
     squares: float
     weights: float
-    count: float
+    pixels: float
     spread: float
 
 
@@ -296,7 +296,7 @@ def accumulate(
             if _is_flat(c, r, k, m, n, flat_c, flat_r):
                 if (u + 2 * v) & 3:  # inside a cell a quarter of the pixels says as much
                     continue
-                seen, steep = _Blurred(cells[m, k], 0.0, 0.0, 0.0), False
+                seen, steep = _Blurred(float(cells[m, k]), 0.0, 0.0, 0.0), False
             else:
                 cu, cv, ru, rv = _slopes(h, ray_step, c, r, w)
                 blur_c = blur * math.sqrt(cu * cu + cv * cv)

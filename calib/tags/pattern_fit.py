@@ -144,7 +144,7 @@ def fit_pattern(tag: TagImage, pattern_from_ray: Array, search: Search) -> Patte
     half = (tag.cells.shape[0] - 2) / 2.0
     blurs, guess = search.blurs, search.guess
     state = np.array([FIRST_BLACK, FIRST_CONTRAST, blurs[0]])
-    covariance, arrays = np.zeros((8, 8)), new_arrays()
+    covariance, change, arrays = np.zeros((8, 8)), np.zeros(UNKNOWNS), new_arrays()
     fine, coarse = _strides(tag.box, search.most_pixels)
     scale, predicted = ANY_RESIDUAL, guess[1] > 0.0
     if predicted:
@@ -162,11 +162,11 @@ def fit_pattern(tag: TagImage, pattern_from_ray: Array, search: Search) -> Patte
         if iteration == 0 and not predicted:
             state = _levels(accumulate(tag, h, state, stride, ANY_RESIDUAL, arrays), state)
         seen = accumulate(tag, h, state, stride, scale, arrays)
-        if seen.count < 4 * UNKNOWNS:
+        if seen.pixels < 4 * UNKNOWNS:
             return PatternFit(h, covariance, state, 0.0, 0.0, pixels, last)
         at_least = state[2] <= LEAST_BLUR and seen.right[BLUR] < 0.0
         normal, right = _solvable(seen, not free or at_least)
-        change = np.linalg.solve(normal, right)
+        change[:] = np.linalg.solve(normal, right)
         state, blur_change = _moved(state, change)
         largest = _length(change)
         if largest > FARTHEST:
@@ -174,13 +174,13 @@ def fit_pattern(tag: TagImage, pattern_from_ray: Array, search: Search) -> Patte
         h = compose(h, change, half)
         last = max(largest, 0.5 * abs(blur_change) / state[2] if free else 0.0)
         scale = max(
-            _noise_from(seen.histogram, seen.count), 0.5 * search.noise, LEAST_ERROR * state[1]
+            _noise_from(seen.histogram, seen.pixels), 0.5 * search.noise, LEAST_ERROR * state[1]
         )
         after = max(seen.squares - change @ right, 0.0)  # what the step leaves, to first order
         variance = after / max(seen.weights - UNKNOWNS, 1.0)
-        noise, pixels = math.sqrt(variance), seen.count
+        noise, pixels = math.sqrt(variance), seen.pixels
         if free and stride == fine and last < SETTLED:
-            explained = 1.0 - after / max(seen.spread, 1e-9)
+            explained = 1.0 - float(after) / max(seen.spread, 1e-9)
             inverse = np.linalg.inv(normal)
             covariance[:] = inverse[:8, :8] * max(variance, search.noise * search.noise)
             return PatternFit(h, covariance, state, noise, explained, pixels, last)

@@ -90,10 +90,10 @@ def fuse(
                 block, positions[span], rotations[span], poses.motions[span]
             )
             noise = floors / np.array([v.camera.focal_px.mean() for v in views])
-            start = block_poses(start_rotation, start_position, can, poses.motions[span])
+            begun = block_poses(start_rotation, start_position, can, poses.motions[span])
             seen = seen_by(block, views, lags(block, instants_s[span]))
-            found = solve_block(seen, whitened(block, noise), start, free_of(watch), _ROBUST_LIMIT)
-            account.add(block, views, found, linearise_block(seen, found.poses(start.motions)))
+            found = solve_block(seen, whitened(block, noise), begun, free_of(watch), _ROBUST_LIMIT)
+            account.add(block, views, found, linearise_block(seen, found.poses(begun.motions)))
             if kept:
                 covariances[span] = found.covariances
             can = found.known

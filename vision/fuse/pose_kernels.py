@@ -183,7 +183,7 @@ def carried_on(
 
 
 @numba.njit(cache=True, nogil=True)
-def _observe(seen: Seen, o: int, pose: MovingPose, into: Linear, at: int) -> bool:
+def _observe(seen: Seen, o: int, pose: MovingPose, into: Linear, at: int | np.int64) -> bool:
     """Row `at` of `into` from sighting o at a pose; False when a point is behind the camera."""
     residual, jacobian = into.residuals[at], into.jacobians[at]
     rates, places = into.rates[at], into.places[at]
@@ -292,7 +292,13 @@ def _equations(
 
 @numba.njit(cache=True, nogil=True)
 def solve_instant(
-    seen: Seen, whitening: Array, k: int, start: MovingPose, free: int, limit: float, passes: int
+    seen: Seen,
+    whitening: Array,
+    k: int,
+    start: MovingPose,
+    free: int,
+    limit: float,
+    passes: int | np.int64,
 ) -> SolvedPose:
     """Robust pose of instant k; `free` is 6, or 3 for the position alone.
 
