@@ -21,13 +21,16 @@ from freeswing.cdpr.files.documents import InputError, replace_file
 _LONGEST_S = 40.0
 # An image point takes 24 bytes, in text 40: what grows more is made up from a damaged count.
 _GROWTH, _HEADER_BYTES = 16, 2**20
-_CONVERT = """
+_GUARD = """
 import sys
-try:
+if sys.platform == "linux":
+    import ctypes
+    ctypes.CDLL(None).prctl(1, 9)  # PR_SET_PDEATHSIG: it ends with the process that started it
+if sys.platform != "win32":
     import resource
     resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[4]),) * 2)
-except ImportError:
-    pass
+"""
+_CONVERT = """
 import pycolmap
 model = pycolmap.Reconstruction()
 if sys.argv[3] == "text":
@@ -63,7 +66,15 @@ def write(path: Path, cameras: Sequence[Camera]) -> None:
 def _converted(source: Path, target: Path, kind: str) -> None:
     size = sum(file.stat().st_size for file in source.iterdir() if file.is_file())
     most = str(_GROWTH * size + _HEADER_BYTES)
-    words = [sys.executable, "-c", _CONVERT, str(source.resolve()), str(target), kind, most]
+    words = [
+        sys.executable,
+        "-c",
+        _GUARD + _CONVERT,
+        str(source.resolve()),
+        str(target),
+        kind,
+        most,
+    ]
     try:
         done = subprocess.run(words, capture_output=True, timeout=_LONGEST_S, check=False)
     except subprocess.TimeoutExpired as error:

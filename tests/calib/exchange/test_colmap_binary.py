@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import signal
+import subprocess
+import sys
+import time
+
 import numpy as np
 import pytest
 
 from freeswing.calib import exchange
+from freeswing.calib.exchange import colmap_binary
 from freeswing.cdpr.files.documents import InputError
 from freeswing.main import main
 from tests.calib.rigs import rig
@@ -78,3 +84,39 @@ def test_a_damaged_model_ends_in_a_sentence(tmp_path) -> None:
     path.write_bytes(path.read_bytes()[:40])
     with pytest.raises(InputError, match="COLMAP cannot read its binary model"):
         exchange.read(tmp_path)
+
+
+SLEEPS = """
+import sys
+from pathlib import Path
+from freeswing.calib.exchange import colmap_binary
+told = "import os, time; open(sys.argv[2], 'w').write(str(os.getpid()));"
+colmap_binary._CONVERT = told + "time.sleep(600)"
+colmap_binary._converted(Path(sys.argv[1]), Path(sys.argv[1], "pid"), "text")
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere it lasts for its time limit")
+def test_colmap_ends_with_a_killed_command(tmp_path) -> None:
+    with subprocess.Popen([sys.executable, "-c", SLEEPS, str(tmp_path)]) as process:
+        until = time.monotonic() + 60.0
+        while not (tmp_path / "pid").is_file() or not (tmp_path / "pid").read_text():
+            assert time.monotonic() < until
+            time.sleep(0.02)
+        process.send_signal(signal.SIGKILL)
+    pid = (tmp_path / "pid").read_text()
+    state = ["ps", "-o", "stat=", "-p", pid]
+    while time.monotonic() < until:
+        told = subprocess.run(state, capture_output=True, text=True).stdout.strip()
+        if told[:1] in ("", "Z"):
+            return
+        time.sleep(0.05)
+    pytest.fail("COLMAP's process lives on")
+
+
+def test_a_model_that_grows_without_end_is_refused(tmp_path, monkeypatch) -> None:
+    write = "open(sys.argv[2] + '/a', 'wb').write(bytes(2**24))"
+    monkeypatch.setattr(colmap_binary, "_CONVERT", write)
+    (tmp_path / "images.bin").write_bytes(bytes(100))
+    with pytest.raises(InputError, match="COLMAP cannot read its binary model"):
+        colmap_binary.read(tmp_path, str)
