@@ -79,6 +79,7 @@ class Search:
         executor: fits them instead, such as a cluster's; left open.
         progress: told a label and a fraction.
         kinematics: what cable lengths say, once they were asked.
+        pool: makes the fits while a search runs; its processes keep what they have built.
     """
 
     noise_scales: Array
@@ -88,20 +89,22 @@ class Search:
     progress: Progress | None = None
     rounds: list[Round] = field(default_factory=list)
     kinematics: Kinematics | None = None
+    pool: Executor | None = None
 
     def run(self, base: LikelihoodFit) -> Refit:
         """Add effects to a base fit until none passes; the last fit."""
         self._tell("base dynamics", 0.0)
         current = rescored(base, self.noise_scales, colour_of(base, self.noise_scales))
         current = self._geometry(current)
-        for index in range(MOST_ROUNDS):
-            if index and (excess_of(current) < LEAST_EXCESS_LATER or too_small(current.fit)):
-                break
-            done = self._round(current, index)
-            self.rounds.append(done)
-            if done.decision.winner is None:
-                break
-            current = done.after
+        with self._pool() as self.pool:
+            for index in range(MOST_ROUNDS):
+                if index and (excess_of(current) < LEAST_EXCESS_LATER or too_small(current.fit)):
+                    break
+                done = self._round(current, index)
+                self.rounds.append(done)
+                if done.decision.winner is None:
+                    break
+                current = done.after
         return current
 
     def _geometry(self, current: Refit) -> Refit:
@@ -199,22 +202,27 @@ class Search:
         index: int,
         colour: float,
     ) -> dict[str, Refit]:
-        jobs = [
-            (current, name, _start_of(screens[name], name), self.noise_scales, colour)
+        jobs = {
+            name: (current, name, _start_of(screens[name], name), self.noise_scales, colour)
             for name in names
-        ]
+        }
         share = 1.0 / MOST_ROUNDS
         found: dict[str, Refit] = {}
         if not jobs:
             return found
-        with self._pool() as pool:
-            calls = [
-                pool.submit(_job, *job).result if pool else partial(_job, *job) for job in jobs
-            ]
-            for k, (name, call) in enumerate(zip(names, calls, strict=True)):
-                self._tell(f"round {index + 1}: {name}", (index + k / len(jobs)) * share)
-                result = call()
-                found |= {} if result is None else {name: result}
+        # Stretch takes longest: begun last, it would keep one process busy alone.
+        longest_first = sorted(
+            jobs, key=lambda name: not effect_named(effect_of(name)).needs_tension
+        )
+        pool = self.pool
+        calls = {
+            name: pool.submit(_job, *jobs[name]).result if pool else partial(_job, *jobs[name])
+            for name in longest_first
+        }
+        for k, name in enumerate(names):
+            self._tell(f"round {index + 1}: {name}", (index + k / len(jobs)) * share)
+            result = calls[name]()
+            found |= {} if result is None else {name: result}
         return found
 
     def _pool(self) -> AbstractContextManager[Executor | None]:
