@@ -54,6 +54,11 @@ BENCH = "tests/ident/bench/test_bench_limits.py"
 
 HELD = (
     Held(
+        "ident/likelihood/minimise.py",
+        ("SHORTER", "MOST_RISES"),
+        "tests/ident/likelihood/test_minimise.py",
+    ),
+    Held(
         "calib/verdict/grades.py",
         (
             "LEAST_VIEWS", "GOOD_VIEWS", "LEAST_TILT_DEG", "GOOD_TILT_DEG", "LEAST_FILLED",

@@ -106,3 +106,52 @@ def test_where_nothing_lowers_the_cost_it_says_so() -> None:
     state, _, _, reason = minimised(valley, started(0.0, 0.0), 60, 1e-8)  # type: ignore[arg-type]
     assert reason == "stopped: no step lowers the cost"
     assert np.abs(state.values).max() < 1e-3
+
+
+@dataclass
+class Told:
+    """A problem whose costs and lengths of undamped steps are told; damped ones lead nowhere."""
+
+    costs: list[float]
+    lengths: list[float]
+    damped: int = 0
+
+    def begun(self, state: State) -> State:
+        return state
+
+    rescaled = begun
+
+    def cost(self, state: State) -> float:
+        return self.costs[int(state.values[0])]
+
+    def linear(self, state: State) -> Any:
+        return Known(None, None)
+
+    def step(self, state: State, linear: Any, damping: float) -> Step:
+        place = int(state.values[0])
+        left = 0.0 if place == len(self.costs) - 1 else 100.0
+        self.damped += damping > 0.0
+        length = self.lengths[min(place, len(self.lengths) - 1)]
+        return Step(np.ones(1), (), (), np.eye(1), np.ones(1), 1, left, length, (), np.eye(1))
+
+    def moved(self, state: State, step: Step, near: Any) -> State | None:
+        return None if self.damped else replace(state, values=state.values + step.shared)
+
+
+@pytest.mark.parametrize(
+    ("costs", "lengths", "arrives"),
+    [
+        ([10.0, 11.0, 12.0, 13.0, 1.0], [1.0, 0.9, 0.8, 0.7, 0.6], True),
+        ([10.0, 11.0, 12.0, 13.0, 14.0, 1.0], [1.0, 0.9, 0.8, 0.7, 0.6, 0.5], False),
+        ([10.0, 11.0, 1.0], [1.0, 0.94, 0.5], True),
+        ([10.0, 11.0, 1.0], [1.0, 0.96, 0.5], False),
+    ],
+)
+def test_a_search_climbs_three_steps_while_they_become_shorter(
+    costs: list[float], lengths: list[float], arrives: bool
+) -> None:
+    told = Told(costs, lengths)
+    state, _, _, reason = minimised(told, started(0.0), 60, 0.01)  # type: ignore[arg-type]
+    assert told.cost(state) == (1.0 if arrives else 10.0)
+    assert (told.damped == 0) == arrives
+    assert reason.startswith("converged") == arrives
