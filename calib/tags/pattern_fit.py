@@ -111,7 +111,7 @@ def _solvable(seen: Pass, held: bool) -> tuple[Array, Array]:
 
 
 @numba.njit(cache=True, nogil=True)
-def _moved(state: Array, change: Array) -> tuple[Array, float]:
+def _moved(state: Array, change: NDArray[np.floating]) -> tuple[Array, float]:
     """The state after a step; and how its blur changed, by half of itself at the most."""
     blur = state[2]
     blur_change = min(max(change[BLUR], -0.3 * blur), 0.5 * blur)
@@ -176,7 +176,8 @@ def fit_pattern(tag: TagImage, pattern_from_ray: Array, search: Search) -> Patte
         scale = max(
             _noise_from(seen.histogram, seen.pixels), 0.5 * search.noise, LEAST_ERROR * state[1]
         )
-        after = max(seen.squares - change @ right, 0.0)  # what the step leaves, to first order
+        # What the step leaves, to first order.
+        after = max(seen.squares - float(change @ right), 0.0)
         variance = after / max(seen.weights - UNKNOWNS, 1.0)
         noise, pixels = math.sqrt(variance), seen.pixels
         if free and stride == fine and last < SETTLED:

@@ -29,7 +29,7 @@ def blur_at_centre(h: Array, ray_step: Array, half: float, blur: float) -> tuple
 
 
 @numba.njit(cache=True, nogil=True)
-def compose(pattern_from_ray: Array, e: Array, half: float) -> Array:
+def compose(pattern_from_ray: Array, e: NDArray[np.floating], half: float) -> Array:
     """The pattern's map after the small homography `e`, which acts on (q - half) / half."""
     change = np.eye(3)
     change[0, :] += e[0:3] / half

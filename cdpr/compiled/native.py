@@ -71,9 +71,8 @@ def _machine() -> Any:
     return target.create_target_machine(cpu=cpu, features=features, opt=OPTIMISED)
 
 
-@intrinsic
-def call_at(typing_context, address, inputs, outputs):
-    """In a kernel: call `Native.address` with the addresses of two contiguous arrays."""
+def _call_at(typing_context, address, inputs, outputs):
+    """`call_at` in a kernel calls `Native.address` with the addresses of two contiguous arrays."""
 
     def generate(context, builder, signature, arguments):
         pointer = ir.PointerType(ir.DoubleType())
@@ -84,3 +83,7 @@ def call_at(typing_context, address, inputs, outputs):
 
     whole = types.none(types.intp, types.intp, types.intp)
     return whole, generate
+
+
+# Type checkers take the typing context for an argument of each call: to them this is any function.
+call_at: Any = intrinsic(_call_at)

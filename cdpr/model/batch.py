@@ -306,7 +306,7 @@ def jacobians_about(function: Any, still: tuple[float, ...]) -> tuple[Any, Any]:
     by_others = ca.jacobian(there, ca.vertcat(*symbols[1:-1], known))
     by_fixed = ca.jacobian(function.call(symbols)[0], fixed)
     by_fixed = ca.substitute(by_fixed, ca.vertcat(moving, fixed), ca.vertcat(known, numbers))
-    return tuple(
+    one, other = (
         ca.Function(
             f"{function.name()}_{name}",
             [*symbols[:-1], known],
@@ -316,6 +316,7 @@ def jacobians_about(function: Any, still: tuple[float, ...]) -> tuple[Any, Any]:
         )
         for name, slopes in (("by_others", by_others), ("by_fixed", by_fixed))
     )
+    return one, other
 
 
 @lru_cache(maxsize=256)

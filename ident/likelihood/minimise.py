@@ -49,7 +49,7 @@ def minimised(
         ValueError: when the start cannot be simulated, naming the run.
     """
     here = best = _place(problem, problem.rescaled(problem.begun(state)))
-    damping, rises, falls = 0.0, 0, False
+    damping, rises, taken, falls = 0.0, 0, 0, False
     for taken in range(1, steps + 1):
         step = problem.step(here.state, here.linear, damping)
         if falls and damping > 0.0 and step.decrease < tolerance:

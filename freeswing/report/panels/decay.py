@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from freeswing.report.figures import AFTER, BEFORE, INK, figure
 from freeswing.report.material import Material
 from freeswing.report.words import number
+from freeswing.results.codec import Numbers
 from freeswing.results.diagnosis import Decay
 
 MOST_SHOWN = 6
@@ -35,7 +37,7 @@ class SwingDecay:
 
 
 def _start(one: Decay) -> float:
-    return (one.measured_m_s and one.measured_m_s[0]) or 0.0
+    return (one.measured_m_s[0] or 0.0) if one.measured_m_s else 0.0
 
 
 def _row(one: Decay) -> dict[str, str]:
@@ -53,6 +55,11 @@ def _lost(speeds: tuple[float | None, ...]) -> str:
     return number(100.0 * (1.0 - last / first), 2) if first and last is not None else "–"
 
 
+def _drawn(numbers: Numbers) -> np.ndarray:
+    """NaN, which leaves a gap, where a number is not known."""
+    return np.array(numbers, dtype=np.float64)
+
+
 def _chart(runs: list[Decay]) -> object:
     """Runs from the slowest to the fastest, evenly chosen: what amplitude does meets the eye."""
     step = max(len(runs) - 1, 1) / max(min(len(runs), MOST_SHOWN) - 1, 1)
@@ -61,9 +68,10 @@ def _chart(runs: list[Decay]) -> object:
     def draw(sheet: Figure) -> None:
         axes = sheet.subplots()
         for one in shown:
-            axes.plot(one.times_s, one.before_m_s, "--", color=BEFORE, lw=1.0)
-            axes.plot(one.times_s, one.after_m_s, "-", color=AFTER, lw=1.0)
-            axes.plot(one.times_s, one.measured_m_s, "o", color=INK, ms=3)
+            times = _drawn(one.times_s)
+            axes.plot(times, _drawn(one.before_m_s), "--", color=BEFORE, lw=1.0)
+            axes.plot(times, _drawn(one.after_m_s), "-", color=AFTER, lw=1.0)
+            axes.plot(times, _drawn(one.measured_m_s), "o", color=INK, ms=3)
         axes.set_yscale("log")
         axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         axes.yaxis.set_minor_formatter(NullFormatter())
