@@ -26,7 +26,7 @@ from freeswing.homing.rest_readings import RestModel
 
 Array = NDArray[np.float64]
 
-LOSS_LIMIT = 3.0
+LOSS_LIMIT = 3.0  # deviations: Huber's loss keeps 95 % of efficiency at 1.3, all of it at 3
 GOOD_FIT = 9.0  # mean squares over the noise's that readings of some start pose leave at most
 _SMALLEST_NOISE = 1e-7
 _SCALE_ROUNDS = 3

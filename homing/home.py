@@ -30,6 +30,7 @@ from freeswing.homing.many_starts import many_starts
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
 
+# Chi-square a degree of freedom: more than unlucky readings leave.
 _DOUBTFUL_FIT = 4.0
 _WEIGHTS_OF_A_GUESS = 1.5
 

@@ -35,9 +35,9 @@ Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
 
 _POSES = 25
-_SMALLEST_ARM_RADII = 3.0
-_SMALLEST_ARM_SHARE = 0.15
-_WORTHWHILE = 0.99
+_SMALLEST_ARM_RADII = 3.0  # a cable nearer to its swivel axis jumps round the pulley
+_SMALLEST_ARM_SHARE = 0.15  # of its length: nearer, the swivel turns faster than it is read
+_WORTHWHILE = 0.99  # an axis is turned for one per cent, not for rounding
 _SWEEPS = 3
 
 

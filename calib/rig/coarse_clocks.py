@@ -13,12 +13,12 @@ from freeswing.calib.camera.intrinsics import CameraStart
 from freeswing.calib.camera.lens_models import Array
 from freeswing.cdpr.rotation import log_rotation
 
-MOST_OFFSET_S = 5.0
-LEAST_OVERLAP = 20
-LEAST_CORRELATION = 0.8
-LEAST_SPEED_PX_S = 20.0
-LEAST_MOVING = 8
-_MOST_GAP = 2.5
+MOST_OFFSET_S = 5.0  # recordings are started by hand within seconds
+LEAST_OVERLAP = 20  # speeds: fewer correlate by chance
+LEAST_CORRELATION = 0.8  # one board turns alike for all cameras, other motions of a hand do not
+LEAST_SPEED_PX_S = 20.0  # slower corners hardly tell a clock
+LEAST_MOVING = 8  # views a camera: fewer do not tell its clock
+_MOST_GAP = 2.5  # usual steps: over a longer gap a speed is a mean of something else
 
 
 def coarse_offsets_s(starts: tuple[CameraStart, ...], stamps_s: tuple[Array, ...]) -> Array:

@@ -32,9 +32,10 @@ from freeswing.calib.rig.views import FixedPoints, Views
 
 Progress = Callable[[str, float], None]
 
+# Of its camera's usual error: a moved or misread board leaves more.
 VIEW_OUTLIER_SIGMAS = 5.0
-VIEW_OUTLIER_FLOOR_PX = 0.5
-CORNER_SIGMAS = 6.0
+VIEW_OUTLIER_FLOOR_PX = 0.5  # below half a pixel nothing was misread, whatever the others reach
+CORNER_SIGMAS = 6.0  # one in 1e8 by chance: none of a session's 1e5 corners
 # share of normal errors within the limit of a corner's on its own, as large for corners together
 CORNER_WITHIN = 1.0 - np.exp(-0.5 * CORNER_SIGMAS**2)
 _LEAST_CORNERS = 4

@@ -10,7 +10,7 @@ from freeswing.calib.camera.camera import Camera
 from freeswing.calib.camera.lens_models import Array
 
 _STEPS = 5
-_LEAST_ANGLE_RAD = 0.01
+_LEAST_ANGLE_RAD = 0.01  # on flatter rays depth is a hundred times worse than width
 _LEAST_CURVATURE = 1e-12
 
 

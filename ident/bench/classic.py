@@ -17,7 +17,7 @@ from freeswing.ident.bench.objects import moments
 from freeswing.ident.bench.solve import Solved
 from freeswing.ident.bench.swing import IZZ, BenchSwing, Column
 
-LEAST_PERIODS = 2.0
+LEAST_PERIODS = 2.0  # in a record: a sine and a slow drift look alike on fewer
 BESIDE = "centre of mass beside the middle: yaw moves it along"
 LEANING_PERCENT = 1.0  # of Izz: what a bench is asked for
 

@@ -16,13 +16,14 @@ def test_each_is_named_once() -> None:
 
 @pytest.mark.parametrize(("file", "name", "tests"), NAMED)
 def test_a_held_constant_says_why_it_is_what_it_is(file: str, name: str, tests: str) -> None:
-    """A comment stands at its line, or above the block of constants that it belongs to."""
+    """At its line, below it, or above the block of constants that it belongs to."""
     lines = (ROOT / file).read_text(encoding="utf-8").splitlines()
     (place,) = [k for k, line in enumerate(lines) if line.startswith(f"{name} = ")]
     above = place
-    while above > 0 and " = " in lines[above - 1] and lines[above - 1][0].isupper():
+    while above > 0 and " = " in lines[above - 1] and lines[above - 1].lstrip("_")[0].isupper():
         above -= 1
-    assert "  # " in lines[place] or lines[above - 1].startswith("# "), lines[place]
+    told = "  # " in lines[place] or lines[above - 1].startswith("# ")
+    assert told or lines[place + 1].startswith('"""'), lines[place]
     for path in tests.split():
         assert (ROOT / path.partition("::")[0]).is_file(), path
 

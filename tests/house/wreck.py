@@ -99,11 +99,6 @@ HELD = (
         "ident/judge/far_samples.py", ("FAR", "MOST_FAR"), "tests/ident/judge/test_far_samples.py"
     ),
     Held(
-        "cdpr/measured/sound_samples.py",
-        ("STEP_DEVIATIONS", "LONGEST_WILD_S", "BACK_WITHIN"),
-        "tests/cdpr/measured/test_sound_samples.py",
-    ),
-    Held(
         "calib/verdict/survey_check.py",
         ("SCALE_LIMIT", "TAG_LIMIT_M"),
         "tests/calib/verdict/test_survey_limits.py",

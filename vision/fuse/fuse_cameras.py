@@ -26,9 +26,9 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 START_FLOOR_PX = 0.15
-LEAST_FLOOR_PX = 0.002
+LEAST_FLOOR_PX = 0.002  # no lens is known better
 _ROBUST_LIMIT = 9.0
-_REJECT = 16.0
+_REJECT = 16.0  # mean square: four deviations in all numbers of a sighting
 _MOTION_PASSES = 3
 
 

@@ -44,12 +44,12 @@ STATUS_NAMES = (
     "no time stamp",
 )
 
-_BASE_EVERY = 40
-_SEARCH_EVERY = 10
-_EAGER_SEARCHES = 5
-_FACING = 0.25
-_DARK_SPREAD = 5.0
-_SATURATED = 253.0
+_BASE_EVERY = 40  # frames: cameras are knocked once, not forty times a second
+_SEARCH_EVERY = 10  # frames: searches of the whole image are slow
+_EAGER_SEARCHES = 5  # a platform that was hidden for a moment comes back at once
+_FACING = 0.25  # cosine: a tag seen from 75 degrees is a few pixels wide
+_DARK_SPREAD = 5.0  # grey levels: a room has more, a covered lens only its noise
+_SATURATED = 253.0  # of 255: what is brighter has been cut off
 _BRIGHT_SHARE = 0.3  # of an image: a lamp and its reflections cover less
 _KEPT_POSES = 3
 

@@ -31,11 +31,11 @@ Ints = NDArray[np.int64]
 
 _GATE_M = 0.03  # a marker may be this far from its prediction
 _CLEAR = 0.5  # the second nearest must be at least 1 / _CLEAR times as far
-_MATCH_M = 0.008
-_RAYS_MEET_M = 0.006
+_MATCH_M = 0.008  # a measured target and triangulated markers together
+_RAYS_MEET_M = 0.006  # rays of one marker pass each other by less than its radius
 _MOST_SPOTS = 14
-_FORGET = 10
-_START_EVERY = 10
+_FORGET = 10  # frames: after longer a prediction leads nowhere
+_START_EVERY = 10  # frames: the search from nothing is slow
 
 
 @dataclass(slots=True)

@@ -13,13 +13,13 @@ from freeswing.calib.camera.camera import Camera
 Array = NDArray[np.float64]
 Image = NDArray[np.uint8]
 
-_MARGIN = 3
-_NEAR_PX = 24
-_LEAST_PIXELS = 4
-_MOST_SIDE_PX = 80
-_LEAST_CONTRAST = 30.0
-_LEAST_FILL = 0.55
-_LEAST_ASPECT = 0.5
+_MARGIN = 3  # px around a spot from which its background is read
+_NEAR_PX = 24  # a swing leaves its prediction by a few pixels; other lamps are further
+_LEAST_PIXELS = 4  # fewer have no centre to speak of
+_MOST_SIDE_PX = 80  # larger than any marker at arm's length: a lamp or a window
+_LEAST_CONTRAST = 30.0  # grey levels: above noise and texture of dim footage
+_LEAST_FILL = 0.55  # of its box: a disc fills 0.79, a sickle of glare half
+_LEAST_ASPECT = 0.5  # short over long side: a disc seen from 60 degrees
 _EDGE_LEVEL = 0.35
 _CENTRE_FLOOR_PX = 0.01
 

@@ -26,14 +26,14 @@ Array = NDArray[np.float64]
 
 _EVERY = 20
 _FRAMES = 5
-_LEAST_FRAMES = 2
+_LEAST_FRAMES = 2  # one image may hold a misread tag
 WRONG_SHARE = 0.05
 """Corners are found to a hundredth of a pixel; a target measured with a ruler is off by 1 % of a
 tag's side. One that is off by more than this is not the one in the picture."""
 _FITS_SHARE = 0.4
 """A mistake is named where undoing it leaves less than this share of the miss."""
 _SIZES = np.geomspace(0.4, 2.5, 184)
-_SAME_SIZE = 0.03
+_SAME_SIZE = 0.03  # rulers and printers are good to one or two per cent
 
 
 @dataclass(frozen=True, slots=True)

@@ -28,15 +28,15 @@ Array = NDArray[np.float64]
 
 MOST_TURN_RAD = 0.15
 """A clamp that gives way lets a camera turn by a few degrees before it falls; 0.15 is 9."""
-MOST_SHIFT_M = 0.2
+MOST_SHIFT_M = 0.2  # a tripod that slid by more was moved, not knocked
 MOST_APART_M = 0.06
 """Two cameras without base tags that see the platform so far apart: one of them moved."""
 MOST_FLOOR_PX = 1.0
 """Cameras of one rig leave 0.02 to 0.5 px beyond the pixels' noise; a wrong rig more."""
-MOST_REJECTED = 0.5
-_SAME_TURN_RAD = 0.05
+MOST_REJECTED = 0.5  # of a camera's sightings: then it is the camera, not the tags
+_SAME_TURN_RAD = 0.05  # good calibrations turn cameras by thousandths
 _SIZE_RANGE = (0.3, 3.0)
-_SAME_SIZE = 0.03
+_SAME_SIZE = 0.03  # distances between cameras are known to one per cent or two
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,8 +18,8 @@ from freeswing.cdpr.rotation import log_rotation
 
 Array = NDArray[np.float64]
 
-MOST_LAG_S = 10.0
-LEAST_OVERLAP_S = 1.0
+MOST_LAG_S = 10.0  # people start several cameras by hand within that
+LEAST_OVERLAP_S = 1.0  # less than a swing is no motion to compare
 OVERLAP_SHARE = 0.5
 """Recordings of one run share at least so much of the shorter one: on less, a swing that nearly
 repeats itself fits itself by chance."""
