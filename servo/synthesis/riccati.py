@@ -51,6 +51,7 @@ class Normalised:
     measured_in: Array  # y_normalised = measured_in @ y
     D22: Array
     state_scale: Array  # x = state_scale * x_normalised
+    least: float  # no controller does better: the part of D11 that it cannot reach
 
     @property
     def n_controls(self) -> int:
@@ -79,17 +80,20 @@ def normalise(problem: StandardProblem) -> Normalised:
     U, control_back = _to_lower_identity(D12, "D12", "a control")
     V, measured_back = _to_lower_identity(D21.T, "D21", "a measurement")
     measured_in = measured_back.T
+    direct = U.T @ D11 @ V
+    reachable = direct.shape[0] - n_u, direct.shape[1] - n_y
     return Normalised(
         A=A,
         B1=B[:, :n_w] @ V,
         B2=B[:, n_w:] @ control_back,
         C1=U.T @ C[:n_z],
         C2=measured_in @ C[n_z:],
-        D11=U.T @ D11 @ V,
+        D11=direct,
         control_back=control_back,
         measured_in=measured_in,
         D22=D22,
         state_scale=scale,
+        least=max(_norm(direct[: reachable[0]]), _norm(direct[:, : reachable[1]])),
     )
 
 
@@ -123,26 +127,28 @@ def _to_lower_identity(D: Array, name: str, what: str) -> tuple[Array, Array]:
 
 @dataclass(frozen=True, slots=True)
 class Solution:
-    """What the two equations give at one gamma; `why` says what fails, None where nothing does."""
+    """What the two equations give at one gamma.
+
+    Attributes:
+        gamma: where.
+        X: of the control equation, empty where there is none.
+        Y: of the filter equation.
+        why: what fails, None where nothing does.
+        coupling: spectral radius of X Y over gamma squared, infinite where one of them is missing.
+    """
 
     gamma: float
     X: Array
     Y: Array
     why: str | None
-    defect: float
-
-
-def least_gamma(n: Normalised) -> float:
-    """No controller does better than this: the part of D11 that it cannot reach."""
-    rows, columns = n.D11.shape[0] - n.n_controls, n.D11.shape[1] - n.n_measured
-    return max(_norm(n.D11[:rows]), _norm(n.D11[:, :columns]))
+    coupling: float = np.inf
 
 
 def solve_at(n: Normalised, gamma: float) -> Solution:
     """Solve both equations at one gamma and test (i) to (iv) of the theorem."""
     empty = np.zeros((0, 0))
-    if gamma <= least_gamma(n):
-        return Solution(gamma, empty, empty, "gamma is below the norm of the direct part", 0.0)
+    if gamma <= n.least:
+        return Solution(gamma, empty, empty, "gamma is below the norm of the direct part")
     B = np.hstack([n.B1, n.B2])
     D1 = np.hstack(
         [
@@ -154,7 +160,7 @@ def solve_at(n: Normalised, gamma: float) -> Solution:
     )
     X = _stabilising(n.A, B, n.C1, D1, gamma, n.B1.shape[1])
     if isinstance(X, str):
-        return Solution(gamma, empty, empty, f"control equation: {X}", 0.0)
+        return Solution(gamma, empty, empty, f"control equation: {X}")
     C = np.vstack([n.C1, n.C2])
     Dt = np.hstack(
         [
@@ -166,7 +172,7 @@ def solve_at(n: Normalised, gamma: float) -> Solution:
     )
     Y = _stabilising(n.A.T, C.T, n.B1.T, Dt, gamma, n.C1.shape[0])
     if isinstance(Y, str):
-        return Solution(gamma, X, empty, f"filter equation: {Y}", 0.0)
+        return Solution(gamma, X, empty, f"filter equation: {Y}")
     coupling = float(np.abs(np.linalg.eigvals(X @ Y)).max(initial=0.0))
     why = None if coupling < gamma**2 else "the spectral radius of X Y is not below gamma squared"
     return Solution(gamma, X, Y, why, coupling / gamma**2)
@@ -177,7 +183,8 @@ def _stabilising(A: Array, B: Array, C: Array, D: Array, gamma: float, n_w: int)
     R = D.T @ D
     R[:n_w, :n_w] -= gamma**2 * np.eye(n_w)
     S = C.T @ D
-    RinvS, RinvB = np.linalg.solve(R, S.T), np.linalg.solve(R, B.T)
+    both = np.linalg.solve(R, np.hstack([S.T, B.T]))
+    RinvS, RinvB = both[:, : len(A)], both[:, len(A) :]
     F = A - B @ RinvS
     G = B @ RinvB
     Q = C.T @ C - S @ RinvS
@@ -219,9 +226,9 @@ def _stable_subspace(H: Array) -> Array | None:
         T, Z, n_stable = _sorted_schur(H, "complex")
     if n_stable != size:
         return None
-    rates = np.diag(T)[:size] if np.iscomplexobj(T) else scipy.linalg.eigvals(T[:size, :size])
-    # Closer to the axis than rounding can tell from on it.
-    if -np.asarray(rates, dtype=np.complex128).real.max() <= 1e-13 * np.abs(T).max():
+    # Pairs stand in blocks of two whose diagonal is their real part twice (LAPACK's form). Closer
+    # to the axis than this, rounding cannot tell a rate from one on it.
+    if -np.diag(T)[:size].real.max() <= 1e-13 * np.abs(T).max():
         return None
     if not np.iscomplexobj(Z):
         return Z[:, :size]
