@@ -6,12 +6,10 @@ import numpy as np
 import pytest
 
 from freeswing.cdpr.files.problems import InputError
-from freeswing.servo.design.draws import LEAST_SHARE, Cloud, by_identified, by_table_1
+from freeswing.servo.design.draws import Cloud, by_identified, by_table_1
 from freeswing.servo.design.offer import Order, offer
 from freeswing.servo.design.plant import plant_at
 from freeswing.servo.design.robustness import (
-    FAILING,
-    WORTH,
     Examiner,
     Found,
     _first_failure,
@@ -71,7 +69,7 @@ def test_wide_draws_stay_robots(model):
     cloud = Cloud("", (("mass_kg",),), np.array([0.3]), np.array([[1.0]]))
     rng = np.random.default_rng(0)
     least = min(cloud.draw(model, rng)[1]["mass_kg"] for _ in range(50))
-    assert least == pytest.approx(LEAST_SHARE * 0.3)
+    assert least == pytest.approx(0.03)
     table = by_table_1(model)
     assert table.covariance[0, 0] == pytest.approx((0.068 * 2.5) ** 2)
 
@@ -128,12 +126,12 @@ def test_a_ray_is_followed_to_the_first_failure():
 
 
 def test_failing_has_two_sides():
-    assert Found(True, FAILING + 0.01, 0.9).fails is False
-    assert Found(True, FAILING - 0.01, 0.9).fails is True
+    assert Found(True, 0.21, 0.9).fails is False
+    assert Found(True, 0.19, 0.9).fails is True
     assert Found(False, 0.9, 0.9).fails is True
-    assert "does not pay" in _pays(0.4, 0.4 + 0.9 * WORTH)
-    assert "keeps" in _pays(0.4, 0.4 + 1.1 * WORTH)
-    assert "keeps" in _pays(0.9 * FAILING, 0.9 * FAILING)
+    assert "does not pay" in _pays(0.4, 0.49)
+    assert "keeps" in _pays(0.4, 0.51)
+    assert "keeps" in _pays(0.19, 0.19)
 
 
 def test_held_places_are_those_that_a_task_may_visit(model):
