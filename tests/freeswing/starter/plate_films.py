@@ -28,6 +28,7 @@ SECOND_TAG_M = (1.2, 0.0, 0.1)
 MIDDLE_M = np.array([0.6, -0.9, -0.25])  # of the plate
 SHEET_M = np.array([0.0, -0.15, 0.0])  # its cross from the plate's middle, on the front
 SIZE_PX, RATE_HZ, SECONDS = (1024, 576), 20.0, 5.0
+BOARD_SECONDS = 12.0
 LOOK = Look(psf_px=0.6, noise=1.5, texture=8.0)
 # Axes of the sheet in the plate's at rest: x to the right, y up, z towards the cameras.
 SHEET_AXES = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
@@ -84,7 +85,13 @@ def fill_in(folder: Path, robot: Robot) -> None:
 def film_everything(folder: Path) -> None:
     """The board and all runs, by the files that `new` wrote and a person filled in."""
     session, body = read_session(folder), plate()
-    record(folder / "calibration", _cameras(), _board_scene(session), _stamps(0.0, 6.0, 10.0), LOOK)
+    record(
+        folder / "calibration",
+        _cameras(),
+        _board_scene(session),
+        _stamps(0.0, BOARD_SECONDS, 10.0),
+        LOOK,
+    )
     sheet = [
         tag_patch(tag.family, tag.id, tag.size_m, tag.T_platform_tag)
         for tag in read_target(folder / "target.toml").tags
@@ -149,8 +156,9 @@ def _board_scene(session: Session) -> Scene:
 
     def carried(times_s: Array) -> tuple[Array, Array]:
         t = np.asarray(times_s)
-        way = [0.25 * np.sin(1.3 * t), 0.2 * np.sin(0.9 * t + 1.0), 0.15 * np.sin(2.1 * t + 0.5)]
-        tilt = [0.5 * np.sin(1.7 * t), 0.3 * np.sin(1.1 * t + 2.0), 0.5 * np.sin(0.8 * t + 0.3)]
+        way = [0.2 * np.sin(1.3 * t), 0.2 * np.sin(0.9 * t + 1.0), 0.15 * np.sin(2.1 * t + 0.5)]
+        # Turned little about the vertical: each camera sees it from 30 degrees aside already.
+        tilt = [0.5 * np.sin(1.7 * t), 0.3 * np.sin(1.1 * t + 2.0), 0.2 * np.sin(0.8 * t + 0.3)]
         middle = MIDDLE_M + np.array([0.0, -0.7, 0.15])
         return middle + np.stack(way, axis=1), exp_rotation(np.stack(tilt, axis=1))
 
