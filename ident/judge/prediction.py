@@ -115,7 +115,7 @@ def _followed(model: Model, samples: Samples, state: State) -> LikelihoodFit:
         return _fitted(model, samples, state, grow=True)
     spread = np.sqrt(np.mean((samples.values - samples.values.mean(axis=0)) ** 2))
     error = np.sqrt(np.mean((_seen(quick) - samples.values) ** 2))
-    if quick.reason.startswith("converged") and error <= _ASTRAY * spread:
+    if quick.stop.converged and error <= _ASTRAY * spread:
         return quick
     careful = _fitted(model, samples, state, grow=True)
     return min(quick, careful, key=lambda one: one.deviance)

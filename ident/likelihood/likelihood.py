@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from freeswing.cdpr.descent import Stop
 from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.robot import Array
 from freeswing.cdpr.simulation.free_swing import Motion
@@ -70,7 +71,7 @@ class LikelihoodFit:
         singular_values: of the whitened, column-scaled joint problem, descending.
         rank: how many of them count.
         steps: Gauss-Newton steps taken.
-        reason: why the iteration stopped, a sentence.
+        stop: why the iteration ended.
         between: standard deviations of the shared unknowns by leaving out one run at a time,
             (9 + k + u,), zero where not estimated or where there are fewer than three runs.
     """
@@ -91,8 +92,13 @@ class LikelihoodFit:
     singular_values: Array
     rank: int
     steps: int
-    reason: str
+    stop: Stop
     between: Array
+
+    @property
+    def reason(self) -> str:
+        """Why the iteration ended, a sentence."""
+        return self.stop.sentence
 
     @property
     def std(self) -> Array:
@@ -204,10 +210,10 @@ def fit(
                 problem = Problem(model, loose, free, estimate_scales, consistent=consistent)
                 state = minimised(problem, state, STEPS, ROUGH_DECREASE)[0]
     problem = Problem(model, samples, free, estimate_scales, accuracy_m, consistent)
-    state, step, taken, reason = minimised(problem, state, steps, tolerance)
+    state, step, taken, stop = minimised(problem, state, steps, tolerance)
     if progress:
         progress("maximum likelihood", 1.0)
-    return _packed(problem, state, step, taken, reason)
+    return _packed(problem, state, step, taken, stop)
 
 
 def stretches(samples: Sequence[Samples]) -> list[float]:
@@ -220,7 +226,7 @@ def stretches(samples: Sequence[Samples]) -> list[float]:
     return lengths
 
 
-def _packed(problem: Problem, state: State, step: Step, taken: int, reason: str) -> LikelihoodFit:
+def _packed(problem: Problem, state: State, step: Step, taken: int, stop: Stop) -> LikelihoodFit:
     correlation = correlation_factor(state.motions, problem.samples, state.scales)
     squares, counts = np.zeros(2), np.zeros(2)
     for motion, samples in zip(state.motions, problem.samples, strict=True):
@@ -248,7 +254,7 @@ def _packed(problem: Problem, state: State, step: Step, taken: int, reason: str)
         singular_values=step.singular_values,
         rank=step.rank,
         steps=taken,
-        reason=reason,
+        stop=stop,
         between=jackknife_std(step.runs, step.priors, problem.free, problem.unit),
     )
 

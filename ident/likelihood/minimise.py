@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from freeswing.cdpr.descent import STUCK, converged, out_of_steps
+from freeswing.cdpr.descent import STUCK, Stop, converged, out_of_steps
 from freeswing.ident.likelihood.joint_problem import Linear, Problem, State, Step
 
 FIRST_DAMPING = 1e-7  # of the largest curvature: below, a damped step is the full one
@@ -34,7 +34,7 @@ class Place:
 
 def minimised(
     problem: Problem, state: State, steps: int, tolerance: float
-) -> tuple[State, Step, int, str]:
+) -> tuple[State, Step, int, Stop]:
     """The state of least cost, the step that led to it, how many were taken, and why it stopped.
 
     Of the step, what counts is its triangle.
@@ -81,12 +81,12 @@ def minimised(
     step = problem.step(best.state, best.linear, 0.0)
     failed = damping > LARGEST_DAMPING
     stop = STUCK if failed else out_of_steps(steps)
-    return best.state, step, taken, stop.sentence
+    return best.state, step, taken, stop
 
 
 def _place(problem: Problem, state: State) -> Place:
     return Place(state, problem.cost(state), problem.linear(state))
 
 
-def _converged(gain: float) -> str:
-    return converged(f"the last step lowered the cost by {max(gain, 0.0):.2g}").sentence
+def _converged(gain: float) -> Stop:
+    return converged(f"the last step lowered the cost by {max(gain, 0.0):.2g}")

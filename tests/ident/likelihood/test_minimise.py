@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from freeswing.cdpr.descent import STUCK
 from freeswing.ident.likelihood.joint_problem import State, Step
 from freeswing.ident.likelihood.minimise import minimised
 
@@ -70,9 +71,9 @@ def rosenbrock() -> Valley:
 def test_a_step_that_climbs_out_of_a_curved_valley_stands_when_it_leads_on() -> None:
     """Rosenbrock: the full step raises the cost a million times, the next one ends at 1, 1."""
     valley = rosenbrock()
-    state, _, taken, reason = minimised(valley, started(-1.2, 1.44), 30, 1e-6)  # type: ignore[arg-type]
+    state, _, taken, stop = minimised(valley, started(-1.2, 1.44), 30, 1e-6)  # type: ignore[arg-type]
     np.testing.assert_allclose(state.values, [1.0, 1.0], atol=1e-9)
-    assert reason.startswith("converged")
+    assert stop.converged, stop
     assert (taken, valley.linearised) == (3, 3)
 
 
@@ -82,9 +83,9 @@ def test_what_does_not_lead_on_is_damped_and_ends_no_worse() -> None:
         lambda x, y: np.array([np.arctan(x), y]),
         lambda x, y: np.array([[1.0 / (1.0 + x * x), 0.0], [0.0, 1.0]]),
     )
-    state, _, _, reason = minimised(valley, started(3.0, 0.5), 60, 1e-8)  # type: ignore[arg-type]
+    state, _, _, stop = minimised(valley, started(3.0, 0.5), 60, 1e-8)  # type: ignore[arg-type]
     np.testing.assert_allclose(state.values, [0.0, 0.0], atol=1e-3)
-    assert reason.startswith("converged")
+    assert stop.converged, stop
 
 
 @pytest.mark.parametrize(("start", "most"), [((0.7, 0.1), 2), ((1.0, 1.0), 1)])
@@ -92,9 +93,9 @@ def test_a_linear_problem_takes_one_step_and_what_is_solved_none(
     start: tuple[float, float], most: int
 ) -> None:
     valley = Valley(lambda x, y: np.array([x - 1.0, y - 1.0]), lambda x, y: np.eye(2))
-    state, _, _, reason = minimised(valley, started(*start), 30, 0.01)  # type: ignore[arg-type]
+    state, _, _, stop = minimised(valley, started(*start), 30, 0.01)  # type: ignore[arg-type]
     np.testing.assert_allclose(state.values, [1.0, 1.0], atol=1e-12)
-    assert reason.startswith("converged")
+    assert stop.converged, stop
     assert valley.linearised == most
     assert valley.moves == most - 1
 
@@ -103,8 +104,8 @@ def test_where_nothing_lowers_the_cost_it_says_so() -> None:
     valley = Valley(
         lambda x, y: np.array([1.0 + x * x, y]), lambda x, y: np.array([[1e-3, 0], [0, 1]])
     )
-    state, _, _, reason = minimised(valley, started(0.0, 0.0), 60, 1e-8)  # type: ignore[arg-type]
-    assert reason == "stopped: no step lowers the cost"
+    state, _, _, stop = minimised(valley, started(0.0, 0.0), 60, 1e-8)  # type: ignore[arg-type]
+    assert stop is STUCK
     assert np.abs(state.values).max() < 1e-3
 
 
