@@ -173,11 +173,6 @@ def diagnose(
     begun = search.rounds[0].before if accepted else last
     first = final if not accepted else _with_own_noise(begun.fit, fitted)
     groups = {effect_of(one.decision.key): one.decision.group for one in accepted}
-    apart = {
-        effect_of(one.decision.key): next_swing(one.after, one.decision.rival, noise_scales)
-        for one in accepted
-        if one.decision.rival is not None
-    }
     if progress:
         progress("diagnosis", 1.0)
     return Diagnosis(
@@ -190,8 +185,18 @@ def diagnose(
         search.kinematics,
         rest,
         tuple(notes),
-        {name: one for name, one in apart.items() if one is not None},
+        _next_swings(accepted, noise_scales),
     )
+
+
+def _next_swings(accepted: list[Round], noise_scales: Array) -> dict[str, NextSwing]:
+    """The swing that parts each accepted effect from its best rival, where there is one."""
+    swings = {
+        effect_of(one.decision.key): next_swing(one.after, one.decision.rival, noise_scales)
+        for one in accepted
+        if one.decision.rival is not None
+    }
+    return {name: one for name, one in swings.items() if one is not None}
 
 
 def _believed(
