@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from freeswing.cdpr.driven.behaviour import readings_of, simulate, stretch_of
 from freeswing.cdpr.driven.model import DrivenModel
-from freeswing.cdpr.driven.motion import DrivenMotion, simulate_driven
+from freeswing.cdpr.driven.motion import DrivenMotion
 from freeswing.cdpr.driven.record import DriveRecord, poses_at
 from freeswing.cdpr.driven.sensitivity import N_POSE, state_slopes
-from freeswing.cdpr.driven.slopes import length_slope, turn_map
+from freeswing.cdpr.driven.slopes import length_slope, moved, turn_map
 from freeswing.cdpr.effects import effect_named
 from freeswing.cdpr.model.batch import evaluate
 from freeswing.ident.drive.direct_kinematics import poses_from_turns
@@ -24,6 +24,9 @@ Array = NDArray[np.float64]
 SCORE_WINDOW_S = 0.1
 # Of an effect's typical size: what elastic cables and instruments answer is a difference over it.
 DIFFERENCE = 0.02
+NUMBER_STEP = 1e-4  # of a number itself
+POSE_STEP = 1e-5  # metres and radians
+CURRENT_STEP_A = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,10 +133,13 @@ def compared(
     gaps = (zero - told.turns - record.angles_rad) / noise.angle_std_rad
     if asked is None:
         return Seen(motion, gaps, pose_gaps, rows, None, None)
-    rigid = _rigid(motion, run.rate_hz)
+    if motion.lengths_out_m is not None:
+        turns, poses = _elastic_slopes(run, motion, noise, asked, told)
+        by_pose = poses / noise.pose_std[:, None]
+        return Seen(motion, gaps, pose_gaps, rows, -turns / noise.angle_std_rad, by_pose)
     spread = _spread(asked, motion.model.n_cables)
-    states = state_slopes(rigid, asked.members) @ spread
-    turns = _turn_slopes(rigid, asked, states)
+    states = state_slopes(motion, asked.members) @ spread
+    turns = _turn_slopes(motion, asked, states)
     poses = _between(motion.times_s, _tangents(motion, states), told.times_s)
     n_start = N_POSE + motion.model.n_cables
     for k, name in enumerate(asked.members):
@@ -169,13 +175,47 @@ def _told(run: DriveRun, motion: DrivenMotion, noise: Noise, theta: Array | None
     return _Told(motion.turns - errors.offsets_rad, poses, wanted)
 
 
-def _rigid(motion: DrivenMotion, rate_hz: float) -> DrivenMotion:
-    """The motion of rigid cables from the same start: elastic ones answer to numbers alike."""
-    if motion.lengths_out_m is None:
-        return motion
-    start, first = motion.states[0], motion.currents_A[0]
-    references = motion.references_A
-    return simulate_driven(motion.model, start, references, rate_hz, motion.theta, currents_A=first)
+def _elastic_slopes(
+    run: DriveRun, motion: DrivenMotion, noise: Noise, asked: Asked, told: _Told
+) -> tuple[Array, Array]:
+    """Slopes of turns (n_t, n, s + k) and poses (n_p, 6, s + k) by differences of simulations.
+
+    The steps of elastic cables are the same on both sides: differences see no switch.
+    """
+    model, start, first = motion.model, motion.states[0], motion.currents_A[0]
+    n = model.n_cables
+
+    def ahead(shift: Array, current: Array, theta: Array) -> _Told:
+        state = np.concatenate([moved(start[:7], shift), start[7:]])
+        other = simulate(
+            model, state, motion.references_A, run.rate_hz, theta, currents_A=first + current
+        )
+        return _told(run, other, noise, theta)
+
+    columns = []
+    for k in range(N_POSE):
+        there = ahead(POSE_STEP * np.eye(N_POSE)[k], np.zeros(n), motion.theta)
+        columns.append((there, POSE_STEP))
+    for k in range(n):
+        there = ahead(np.zeros(N_POSE), CURRENT_STEP_A * np.eye(n)[k], motion.theta)
+        columns.append((there, CURRENT_STEP_A))
+    for group in asked.groups:
+        theta, step = motion.theta.copy(), _step_of(model, motion.theta, group.name)
+        for member in group.members:
+            theta[model.index(member)] += step
+        columns.append((ahead(np.zeros(N_POSE), np.zeros(n), theta), step))
+    turns = [(there.turns - told.turns) / step for there, step in columns]
+    poses = [_pose_gaps(there.poses, told.poses) / step for there, step in columns]
+    return np.stack(turns, axis=-1), np.stack(poses, axis=-1)
+
+
+def _step_of(model: DrivenModel, theta: Array, name: str) -> float:
+    """By how much a number changes for a difference."""
+    place = model.index(name)
+    first = len(model.numbers.names)
+    if place >= first:
+        return DIFFERENCE * model.parameters[place - first].scale
+    return NUMBER_STEP * abs(float(theta[place])) or NUMBER_STEP
 
 
 def _is_beside(model: DrivenModel, name: str) -> bool:
@@ -189,9 +229,7 @@ def _differences(
 ) -> tuple[Array, Array]:
     """How turns (n_t, n) and poses (n_p, 6) answer to a number beside the rigid equations."""
     model, place = motion.model, motion.model.index(name)
-    first = len(model.numbers.names)
-    step = DIFFERENCE * model.parameters[place - first].scale
-    theta = motion.theta.copy()
+    theta, step = motion.theta.copy(), _step_of(model, motion.theta, name)
     theta[place] += step
     other = motion
     if stretch_of(model, theta) != stretch_of(model, motion.theta):

@@ -77,6 +77,28 @@ def test_the_linear_model_is_written(tmp_path):
     assert b"polyline" in (tmp_path / "linear.svg").read_bytes()
 
 
+def test_where_it_rests_under_currents_and_what_holds_it_there(tmp_path, capsys):
+    flags = ["--results", str(tmp_path), "--quiet"]
+    assert main(["linearise", str(INCA), "--currents-a", *["0"] * 8, *flags]) == 0
+    found = json.loads((tmp_path / "linear.json").read_text())
+    assert abs(found["at"][2] + 0.2093) < 1e-4, found["at"]
+    held = [f"{value:.12f}" for value in found["currents_A"]]
+    assert main(["linearise", str(INCA), "--currents-a", *held, *flags]) == 0
+    again = json.loads((tmp_path / "linear.json").read_text())
+    assert np.abs(np.array(again["at"]) - found["at"]).max() < 1e-6
+    turned = ["--at", "0.05", "-0.02", "-0.1", "0.02", "-0.01", "0.03"]
+    assert main(["linearise", str(INCA), *turned, *flags]) == 0
+    found = json.loads((tmp_path / "linear.json").read_text())
+    held = [f"{value:.12f}" for value in found["currents_A"]]
+    assert main(["linearise", str(INCA), "--currents-a", *held, *flags]) == 0
+    again = json.loads((tmp_path / "linear.json").read_text())
+    assert np.abs(np.array(again["at"]) - found["at"]).max() < 1e-6, again["at"]
+    assert main(["linearise", str(INCA), "--currents-a", "1", "1", *flags]) == 2
+    assert "2 numbers for 8 motors" in capsys.readouterr().err
+    assert main(["linearise", str(INCA), "--currents-a", "9", *["0"] * 7, *flags]) == 2
+    assert "9 A in motor 1, limits 0 to 3 A" in capsys.readouterr().err
+
+
 def test_a_pose_outside_the_frame(tmp_path, capsys):
     flags = ["--at", "300", "0", "0", "0", "0", "0", "--results", str(tmp_path)]
     assert main(["linearise", str(INCA), *flags]) == 2

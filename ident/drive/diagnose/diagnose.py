@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from freeswing.ident.drive.diagnose.candidates import Candidate, candidates
-from freeswing.ident.drive.diagnose.refit import Fitted, fitted, with_candidate
+from freeswing.ident.drive.diagnose.refit import Fitted, fitted, settled, with_candidate
 from freeswing.ident.drive.diagnose.screen import Screened, jump_start, screen
 from freeswing.ident.drive.identify import (
     DriveSession,
@@ -150,6 +150,7 @@ def _climb(search: _Search, only: Collection[str] | None) -> bool:
     if not tried:
         return False
     tried.sort(key=lambda fit: fit.bic_beside(base))
+    tried[0] = settled(search.session, tried[0])
     best, others = tried[0], tried[1:]
     for fit in tried:
         told_bic, gain = fit.bic_beside(base), share_closed(base, fit)
