@@ -30,7 +30,7 @@ class Native:
         n_in: entries of all inputs.
         n_out: entries of all outputs.
         lanes: instants a call.
-        engine: keeps the code in memory.
+        engine: keeps the code in memory: whoever keeps an address must keep this too.
     """
 
     address: int
@@ -62,9 +62,14 @@ def native(function: Any, lanes: int = 1) -> Native:
 
 
 @cache
-def _machine() -> Any:
+def _initialised() -> None:
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
+
+
+def _machine() -> Any:
+    """A description of this processor; an engine owns its own, and frees it."""
+    _initialised()
     features = llvm.get_host_cpu_features().flatten()
     cpu = llvm.get_host_cpu_name()
     target = llvm.Target.from_default_triple()

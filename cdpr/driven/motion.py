@@ -121,6 +121,7 @@ class Stepper:
     def __init__(
         self, model: DrivenModel, theta: Array, period_s: float, least: int | None = None
     ) -> None:
+        self._code = native(model.motion)  # a machine holds its address alone
         self.machine = machine_of(model, theta)
         self.pace = pace_of(model, theta, period_s, least)
         self._unused = np.empty(model.n_cables)

@@ -1,5 +1,7 @@
 """Machine code against CasADi's interpreter: the same bits."""
 
+import gc
+
 import casadi as ca
 import numba
 import numpy as np
@@ -65,6 +67,19 @@ def test_every_operation_is_the_interpreters(lanes):
         inputs = np.tile(first, (lanes, 1))
         found, expected = results(function, inputs, lanes), interpreted(function, inputs)
         assert np.array_equal(found, expected, equal_nan=True), first
+
+
+def test_code_that_is_given_up_leaves_the_rest_alone():
+    x = ca.SX.sym("x")
+    kept = native(ca.Function("kept", [x], [ca.sin(x)]))
+    for k in range(80):  # more than are kept: engines come and go
+        code = native(ca.Function("passing", [x], [x + k]))
+        gc.collect()
+        outputs = np.zeros(1)
+        called(code.address, np.ones(1), outputs)
+        assert outputs[0] == 1.0 + k
+    called(kept.address, np.ones(1), outputs)
+    assert outputs[0] == np.sin(1.0)
 
 
 def test_what_is_not_of_scalars_is_refused():
