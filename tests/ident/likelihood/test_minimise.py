@@ -152,7 +152,7 @@ def test_a_search_climbs_three_steps_while_they_become_shorter(
     costs: list[float], lengths: list[float], arrives: bool
 ) -> None:
     told = Told(costs, lengths)
-    state, _, _, reason = minimised(told, started(0.0), 60, 0.01)  # type: ignore[arg-type]
+    state, _, _, stop = minimised(told, started(0.0), 60, 0.01)  # type: ignore[arg-type]
     assert told.cost(state) == (1.0 if arrives else 10.0)
     assert (told.damped == 0) == arrives
-    assert reason.startswith("converged") == arrives
+    assert stop.converged == arrives
