@@ -64,8 +64,8 @@ def minimised(
         if trial is not None and settled and abs(gain) < tolerance:
             kept = problem.rescaled(trial) if gain >= 0.0 else best.state
             return kept, step, taken, _converged(gain)
-        falls = trial is not None and gain > 0.0
-        if falls:
+        falls = gain > 0.0
+        if trial is not None and falls:
             here = best = _place(problem, problem.rescaled(trial))
             damping, rises = (0.0 if damping < FIRST_DAMPING / 10.0 else damping / 4.0), 0
             continue
