@@ -29,8 +29,8 @@ LOOSENED = {
 }
 
 
-def told(folder, effects, seed, **options):
-    make_session(folder, seed, "bologna-4", effects, n_runs=4, duration_s=2.0, **options)
+def told(folder, effects, seed, n_runs=4, duration_s=2.0):
+    make_session(folder, seed, "bologna-4", effects, n_runs=n_runs, duration_s=duration_s)
     session = read_session(folder)
     robot = load_robot(session)
     return list(load_swings(session, robot, load_target(session))), robot
@@ -74,18 +74,32 @@ def test_with_loosened_rules_something_is_claimed(clean_runs, monkeypatch):
     assert diagnose(*clean_runs, workers=1).final.model.effects != ()
 
 
-def test_prediction_comes_down_to_the_noise(tilted):
-    document = tilted.document()
-    before, after = document["before"], document["after"]
+def check_after(document):
+    after = document["after"]
     ratio = after["prediction_rmse_m"] / after["noise_floor_m"]
     assert ratio < 1.2, ratio
-    assert before["prediction_rmse_m"] > 1.5 * after["prediction_rmse_m"], (before, after)
     assert not document["unexplained"]["present"], document["unexplained"]
+
+
+def test_prediction_is_at_the_noise_afterwards(tilted):
+    check_after(tilted.document())
+
+
+@pytest.mark.slow
+def test_prediction_comes_down_to_the_noise(tmp_path):
+    """Swings long enough that a tilt leads a prediction astray: two seconds of it do not."""
+    runs, robot = told(tmp_path, {"gravity_tilt": "large"}, 5, n_runs=6, duration_s=4.0)
+    few = ("gravity_tilt", "translational_drag", "constant_force")
+    document = diagnose(runs, robot, workers=1, candidates=few).document()
+    before, after = document["before"], document["after"]
+    check_after(document)
+    assert before["prediction_rmse_m"] > 1.5 * after["prediction_rmse_m"], (before, after)
 
 
 def test_every_candidate_has_a_verdict_and_a_reason(tilted):
     document = tilted.document()
-    assert {c["effect"] for c in document["candidates"]} == set(catalogue())
+    claims = {name for name, effect in catalogue().items() if not effect.nuisance}
+    assert {c["effect"] for c in document["candidates"]} == claims
     assert all(c["reason"] for c in document["candidates"]), document["candidates"]
     assert len(document["ladder"]) == 2, document["ladder"]
 
