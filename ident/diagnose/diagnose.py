@@ -13,12 +13,13 @@ from freeswing.cdpr.effects import Recorded, catalogue, effect_named
 from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.model.equations import build_model
 from freeswing.cdpr.robot import INERTIA_NAMES, POSE_COORDINATES, Array, Robot
+from freeswing.ident.diagnose.answer.cut import cut, settled_places, with_settled
 from freeswing.ident.diagnose.answer.decay import swing_decay
-from freeswing.ident.diagnose.answer.deviations import directions, honest_covariance
+from freeswing.ident.diagnose.answer.deviations import honest_covariance
+from freeswing.ident.diagnose.answer.entries import accepted_entries, candidate_entry, claims
 from freeswing.ident.diagnose.answer.next_swing import NextSwing, next_swing
 from freeswing.ident.diagnose.base import base_fit, refuse_few
 from freeswing.ident.diagnose.decision import LEAST_SHARE_EXPLAINED, Candidate, excess_of
-from freeswing.ident.diagnose.experiments import separating_experiment
 from freeswing.ident.diagnose.heldout import HeldOut, held_out
 from freeswing.ident.diagnose.lengths.wrong_places import Kinematics
 from freeswing.ident.diagnose.refit import Refit
@@ -39,6 +40,10 @@ from freeswing.ident.signals.prepare import PreparedRun, prepare_runs
 Progress = Callable[[str, float], None]
 
 FORMAT = "freeswing-diagnosis/1"
+KEPT_FROM_DYNAMICS = (
+    "something that follows the motion is still missing: the geometry is what cable lengths say, "
+    "not what the forces found would make of it; what lengths leave open widens all else"
+)
 # What is not the cause shows in the residuals, or in runs left out although each run by itself is
 # followed well.
 LARGEST_EXCESS_LEFT = 0.5
@@ -87,8 +92,8 @@ class Diagnosis:
         return {
             "format": FORMAT,
             "before": before,
-            "candidates": [_candidate_entry(one, self.apart) for one in self.candidates],
-            "accepted": _accepted(self.final, self.spreads[1], self.groups),
+            "candidates": [candidate_entry(one, self.apart) for one in self.candidates],
+            "accepted": accepted_entries(self.final, self.spreads[1], self.groups),
             "after": after,
             "share_closed": _share_closed(before, after),
             "parameters_before": _parameters(self.first, self.spreads[0]),
@@ -168,10 +173,15 @@ def diagnose(
     notes = [*session_notes(model, prepared, {}), *dropped]
     notes += search.kinematics.notes() if search.kinematics else []
     last, accepted, rest = _believed(search, last, fitted, full, notes)
-    ladder = _ladder(search, accepted, checked, free, _part(progress, 0.85, 0.95))
+    bent = bool(len(settled_places(last.fit.model))) and _follows_badly(last, rest)
+    if bent:
+        last = cut(last, noise_scales)
+        notes.append(KEPT_FROM_DYNAMICS)
+    ladder = _ladder(search, accepted, last, checked, free, _part(progress, 0.85, 0.95))
     final = _with_own_noise(last.fit, fitted)
     begun = search.rounds[0].before if accepted else last
     first = final if not accepted else _with_own_noise(begun.fit, fitted)
+    spread = honest_covariance(final, last)
     groups = {effect_of(one.decision.key): one.decision.group for one in accepted}
     if progress:
         progress("diagnosis", 1.0)
@@ -181,7 +191,7 @@ def diagnose(
         groups,
         first,
         final,
-        (honest_covariance(first, begun), honest_covariance(final, last)),
+        (honest_covariance(first, begun), with_settled(spread, last) if bent else spread),
         search.kinematics,
         rest,
         tuple(notes),
@@ -210,7 +220,7 @@ def _believed(
     rest = unexplained(last.fit, fitted, full, search.noise_scales)
     accepted = [one for one in search.rounds if one.decision.winner is not None]
     settled = [one for one in accepted if one.by_lengths]
-    follows_badly = rest.present or excess_of(last) > LARGEST_EXCESS_LEFT
+    follows_badly = _follows_badly(last, rest)
     if len(accepted) == len(settled) or not follows_badly or share >= LEAST_SHARE_EXPLAINED:
         return last, accepted, rest
     doubtful = [effect_of(one.decision.key) for one in accepted if not one.by_lengths]
@@ -222,9 +232,9 @@ def _believed(
     return last, settled, unexplained(last.fit, fitted, full, search.noise_scales)
 
 
-def claims(effects: tuple[str, ...]) -> tuple[str, ...]:
-    """Those that say something of the robot, without nuisances of the measurement."""
-    return tuple(name for name in effects if not effect_named(name).nuisance)
+def _follows_badly(last: Refit, rest: Unexplained) -> bool:
+    """Whether something that follows the motion is still missing."""
+    return rest.present or excess_of(last) > LARGEST_EXCESS_LEFT
 
 
 def _part(progress: Progress | None, low: float, high: float) -> Progress | None:
@@ -283,6 +293,7 @@ def _share_explained(search: Search, last: Refit) -> float:
 def _ladder(
     search: Search,
     accepted: list[Round],
+    last: Refit,
     runs: list[PreparedRun],
     free: tuple[str, ...] | None,
     progress: Progress | None,
@@ -292,7 +303,8 @@ def _ladder(
     The search fits without the errors of the cameras' calibration: its inertias belong to samples
     that still contain them.
     """
-    stages: list[Refit] = [search.rounds[0].before, *(one.after for one in accepted)]
+    stages: list[Refit] = [search.rounds[0].before, *(one.after for one in accepted[:-1])]
+    stages += [last] if accepted else []
     rungs = []
     for k, stage in enumerate(stages):
         if progress:
@@ -328,50 +340,6 @@ def _last_words(
             words[name] = Candidate(name, "not_identifiable", 0.0, 0.0, (), why)
     order = {"accepted": 0, "confounded": 1, "rejected": 2, "not_identifiable": 3}
     return tuple(sorted(words.values(), key=lambda c: (order[c.verdict], c.delta_bic)))
-
-
-def _candidate_entry(one: Candidate, apart: dict[str, NextSwing]) -> dict[str, Any]:
-    entry: dict[str, Any] = {
-        "effect": one.effect,
-        "verdict": one.verdict,
-        "delta_bic": one.delta_bic,
-        "held_out_gain": one.held_out_gain,
-        "probability": one.probability,
-        "confounded_with": list(one.confounded_with),
-        "reason": one.reason,
-    }
-    if one.confounded_with:
-        entry["experiment"] = separating_experiment((one.effect, *one.confounded_with))
-        if one.effect in apart:
-            entry["experiment"] += f"; {apart[one.effect]}"
-            entry["next_swing"] = apart[one.effect].document()
-    return entry
-
-
-def _accepted(
-    final: LikelihoodFit, covariance: Array, groups: dict[str, tuple[str, ...]]
-) -> list[dict[str, Any]]:
-    entries, unknowns = [], final.unknowns
-    beside = {n for key, group in groups.items() for n in group if n != key} - set(groups)
-    for name in claims(final.model.effects):
-        if name in beside:  # in the model because nobody can tell it from the one named
-            continue
-        block, columns = unknowns.block(name), unknowns.columns(name)
-        together = covariance[np.ix_(columns, columns)]
-        parameters = final.model.parameters[final.model.place_of(name)]
-        rows = [
-            {"name": parameter.name, "value": float(value), "std": float(np.sqrt(variance))}
-            for parameter, value, variance, estimated in zip(
-                parameters, block.value, np.diag(together), block.mask, strict=True
-            )
-            if parameter.per_run or estimated
-        ]
-        group = [other for other in groups.get(name, ()) if other != name]
-        places = np.r_[final.model.place_of(name)][block.mask]
-        seen = directions(final.model, places, together[np.ix_(block.mask, block.mask)])
-        entry = {"effect": name, "parameters": rows, "confounded_with": group}
-        entries.append(entry | ({"directions": seen} if seen else {}))
-    return entries
 
 
 def _parameters(found: LikelihoodFit, covariance: Array) -> list[dict[str, Any]]:

@@ -1,0 +1,75 @@
+"""Entries of results/diagnosis.json: effects that were accepted, and all that were considered."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from freeswing.cdpr.effects import effect_named
+from freeswing.cdpr.robot import Array
+from freeswing.ident.diagnose.answer.cut import settled_places
+from freeswing.ident.diagnose.answer.deviations import directions
+from freeswing.ident.diagnose.answer.next_swing import NextSwing
+from freeswing.ident.diagnose.decision import Candidate
+from freeswing.ident.diagnose.experiments import separating_experiment
+from freeswing.ident.likelihood.likelihood import LikelihoodFit
+
+
+def claims(effects: tuple[str, ...]) -> tuple[str, ...]:
+    """Those that say something of the robot, without nuisances of the measurement."""
+    return tuple(name for name in effects if not effect_named(name).nuisance)
+
+
+def candidate_entry(one: Candidate, apart: dict[str, NextSwing]) -> dict[str, Any]:
+    """One of `candidates` of results/diagnosis.json, with what would part it from its rivals."""
+    entry: dict[str, Any] = {
+        "effect": one.effect,
+        "verdict": one.verdict,
+        "delta_bic": one.delta_bic,
+        "held_out_gain": one.held_out_gain,
+        "probability": one.probability,
+        "confounded_with": list(one.confounded_with),
+        "reason": one.reason,
+    }
+    if one.confounded_with:
+        entry["experiment"] = separating_experiment((one.effect, *one.confounded_with))
+        if one.effect in apart:
+            entry["experiment"] += f"; {apart[one.effect]}"
+            entry["next_swing"] = apart[one.effect].document()
+    return entry
+
+
+def accepted_entries(
+    final: LikelihoodFit, covariance: Array, groups: dict[str, tuple[str, ...]]
+) -> list[dict[str, Any]]:
+    """`accepted` of results/diagnosis.json: values that were estimated, or settled by lengths.
+
+    Args:
+        final: the fit with all accepted effects.
+        covariance: of the shared unknowns as it is told, (p, p).
+        groups: for each effect, those that stand in its group.
+    """
+    settled = settled_places(final.model)
+    entries, unknowns = [], final.unknowns
+    beside = {n for key, group in groups.items() for n in group if n != key} - set(groups)
+    for name in claims(final.model.effects):
+        if name in beside:  # in the model because nobody can tell it from the one named
+            continue
+        block, columns = unknowns.block(name), unknowns.columns(name)
+        together = covariance[np.ix_(columns, columns)]
+        where = np.r_[final.model.place_of(name)]
+        parameters = [final.model.parameters[k] for k in where]
+        told = block.mask | np.isin(where, settled)
+        rows = [
+            {"name": parameter.name, "value": float(value), "std": float(np.sqrt(variance))}
+            for parameter, value, variance, estimated in zip(
+                parameters, block.value, np.diag(together), told, strict=True
+            )
+            if parameter.per_run or estimated
+        ]
+        group = [other for other in groups.get(name, ()) if other != name]
+        seen = directions(final.model, where[told], together[np.ix_(told, told)])
+        entry = {"effect": name, "parameters": rows, "confounded_with": group}
+        entries.append(entry | ({"directions": seen} if seen else {}))
+    return entries
