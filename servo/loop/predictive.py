@@ -164,15 +164,10 @@ def solve_box(H: Array, f: Array, lower: Array, upper: Array) -> Array:
     """The least of x' H x / 2 + f' x between bounds, by daqp.
 
     Raises:
-        ValueError: where daqp is not installed or does not come to an end.
+        ValueError: where daqp does not come to an end.
     """
-    try:
-        import daqp
-    except ImportError as error:
-        raise ValueError(
-            "a predictive controller at the motors' limits needs daqp: pip install "
-            "'freeswing[control]'"
-        ) from error
+    import daqp
+
     n = len(f)
     sense = np.zeros(n, dtype=np.int32)
     x, _, flag, _ = daqp.solve(H, f, np.zeros((0, n)), upper, lower, sense)

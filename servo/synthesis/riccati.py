@@ -228,7 +228,7 @@ def _stable_subspace(H: Array) -> Array | None:
         return None
     # Pairs stand in blocks of two whose diagonal is their real part twice (LAPACK's form). Closer
     # to the axis than this, rounding cannot tell a rate from one on it.
-    if -np.diag(T)[:size].real.max() <= 1e-13 * np.abs(T).max():
+    if -float(np.real(np.diag(T)[:size]).max()) <= 1e-13 * np.abs(T).max():
         return None
     if not np.iscomplexobj(Z):
         return Z[:, :size]

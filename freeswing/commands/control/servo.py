@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -78,6 +79,11 @@ def run(options: Namespace, console: Console) -> None:
         raise InputError(f"{options.task}: {why}")
     files = options.controller or [folder / "controller.json"]
     controllers = [read_controller(file) for file in files]
+    if find_spec("daqp") is None and any(c.predictor is not None for c in controllers):
+        raise InputError(
+            "--controller: a predictive controller needs daqp at the motors' limits: "
+            "pip install 'freeswing[control]'"
+        )
     pairs = [(c, t) for c in controllers for t in _trials(model, task, options, c)]
     outcomes = []
     for k, (controller, trial) in enumerate(pairs):

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.io import loadmat
 
+from freeswing.commands.control import servo
 from freeswing.main import main
 from freeswing.servo.design import robustness
 from freeswing.servo.driven_file import read_driven
@@ -99,6 +100,15 @@ def test_a_short_task_is_run_and_told(designed, tmp_path, capsys):
     assert len(rows) == 1201
     assert rows[0].startswith("t_s,asked_x_m")
     assert (tmp_path / "servo-friction.svg").is_file()
+
+
+def test_a_predictive_controller_without_daqp_is_refused(tmp_path, monkeypatch, capsys):
+    words = ["--results", str(tmp_path)]
+    assert main(["design", str(INCA), "--method", "mpc", *words]) == 0
+    assert "mpc: speeds" in capsys.readouterr().out
+    monkeypatch.setattr(servo, "find_spec", lambda name: None)
+    assert main(["servo", str(INCA), "--task", str(INCA / "task.toml"), *words]) == 2
+    assert "pip install 'freeswing[control]'" in capsys.readouterr().err
 
 
 def test_a_task_outside_the_workspace_is_refused(designed, tmp_path, capsys):
