@@ -134,7 +134,8 @@ def test_impossible_deviations_are_wrong_usage(
     status = main(["identify", str(tmp_path), "--entry-std-m", std])
     said = capsys.readouterr().err
     assert status == 2, f"status {status}: {said}"
-    assert "--entry-std-m is" in said, said
+    assert "--entry-std-m" in said, said
+    assert "above 0" in said, said
 
 
 def test_the_corrected_robot_has_its_ends_moved():
