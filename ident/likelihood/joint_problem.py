@@ -173,8 +173,8 @@ class Problem:
         Raises:
             ValueError: when one cannot be followed, naming the run.
         """
-        runs = range(len(state.motions))
-        if state.motions and all(self._is_own(state, run) for run in runs):
+        runs = range(len(self.samples))
+        if len(state.motions) == len(runs) and all(self._is_own(state, run) for run in runs):
             return state
         return self.simulated(state)
 
