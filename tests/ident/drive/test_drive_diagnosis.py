@@ -25,7 +25,11 @@ FLAWS = {
     "drum_radius.added_4_m": 0.02 * 0.0175,
     "gravity_tilt.tilt_x_rad": 0.01,
     "pose_latency.added_s": 0.002,
-    "cable_elasticity.mass_over_stiffness_s2_m": 0.289 / 20000.0,
+}
+WEIGHT = {
+    "platform_payload.mass_kg": 0.05,
+    "platform_payload.x_m": 0.08,
+    "platform_payload.y_m": 0.03,
 }
 
 
@@ -101,6 +105,14 @@ def test_what_is_missing_is_found_with_its_part(tmp_path, name, truth):
     assert len(document["accepted"]) == 1, document["accepted"]
     after = document["after"]
     assert after["motor_rmse_rad"] < 1.2 * after["motor_noise_rad"], after
+
+
+@pytest.mark.slow
+def test_an_undeclared_weight_is_found_with_its_place(tmp_path):
+    document = diagnosed(write_flawed(tmp_path, 65, 2.0, WEIGHT))
+    for name, truth in WEIGHT.items():
+        value, std = value_of(document, name)
+        assert abs(value - truth) < max(3.0 * std, 0.05 * truth), (name, value, std)
 
 
 @pytest.mark.slow
