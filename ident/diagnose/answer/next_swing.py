@@ -146,4 +146,5 @@ def _apart(motion: Motion, samples: Samples, scales: Array, recorded: Array, bes
     new = reduce_run(linearise(motion), samples, scales).rows
     columns = np.append(np.flatnonzero(best.fit.free), new.shape[1] - 1)
     together = np.vstack([new, recorded])[:, columns]
-    return float(abs(np.linalg.qr(together, mode="r")[-1, -1]))
+    triangle = np.asarray(np.linalg.qr(together, mode="r"), dtype=np.float64)
+    return float(abs(triangle[-1, -1]))
