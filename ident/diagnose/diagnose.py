@@ -173,10 +173,7 @@ def diagnose(
     notes = [*session_notes(model, prepared, {}), *dropped]
     notes += search.kinematics.notes() if search.kinematics else []
     last, accepted, rest = _believed(search, last, fitted, full, notes)
-    bent = bool(len(settled_places(last.fit.model))) and _follows_badly(last, rest)
-    if bent:
-        last = cut(last, noise_scales)
-        notes.append(KEPT_FROM_DYNAMICS)
+    last, held = _kept_from_dynamics(last, rest, noise_scales, notes)
     ladder = _ladder(search, accepted, last, checked, free, _part(progress, 0.85, 0.95))
     final = _with_own_noise(last.fit, fitted)
     begun = search.rounds[0].before if accepted else last
@@ -191,12 +188,22 @@ def diagnose(
         groups,
         first,
         final,
-        (honest_covariance(first, begun), with_settled(spread, last) if bent else spread),
+        (honest_covariance(first, begun), with_settled(spread, last) if held else spread),
         search.kinematics,
         rest,
         tuple(notes),
         _next_swings(accepted, noise_scales),
     )
+
+
+def _kept_from_dynamics(
+    last: Refit, rest: Unexplained, noise_scales: Array, notes: list[str]
+) -> tuple[Refit, bool]:
+    """The last fit, its geometry held at what lengths say where forces are still missing."""
+    if not len(settled_places(last.fit.model)) or not _follows_badly(last, rest):
+        return last, False
+    notes.append(KEPT_FROM_DYNAMICS)
+    return cut(last, noise_scales), True
 
 
 def _next_swings(accepted: list[Round], noise_scales: Array) -> dict[str, NextSwing]:
