@@ -107,7 +107,8 @@ def test_slopes_of_the_loaded_inertia_are_those_of_differences():
         ends = [
             _loaded(loads, run, everything + s) - _loaded(loads, run, everything - s) for s in steps
         ]
-        gap = np.abs(np.array(ends).T / 2e-6 - loads.slopes(run, TRUE_INERTIA, unknowns)).max()
+        slopes = np.hstack(loads.slopes(run, TRUE_INERTIA, unknowns))
+        gap = np.abs(np.array(ends).T / 2e-6 - slopes).max()
         assert gap < 1e-8, f"run {run}: off by {gap}"
 
 

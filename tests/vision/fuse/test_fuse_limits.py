@@ -24,10 +24,9 @@ def account(scores, miss_px=0.0, noise_px=0.0) -> _Account:
     )  # fmt: skip
     camera = SimpleNamespace(focal_px=np.array([FOCAL, FOCAL]))
     made = _Account(1)
-    residuals = np.full((n, 8), miss_px / FOCAL)
-    known = np.ones(n, bool)
-    made.add(block, [SimpleNamespace(camera=camera)], np.array(scores), known, residuals,
-             np.ones((n, 4, 3)))  # fmt: skip
+    solved = SimpleNamespace(scores=np.array(scores), known=np.ones(1, bool))
+    linear = SimpleNamespace(residuals=np.full((n, 8), miss_px / FOCAL), places=np.ones((n, 4, 3)))
+    made.add(block, [SimpleNamespace(camera=camera)], solved, linear)
     return made
 
 
