@@ -40,6 +40,10 @@ from freeswing.ident.signals.prepare import PreparedRun, prepare_runs
 Progress = Callable[[str, float], None]
 
 FORMAT = "freeswing-diagnosis/1"
+NOTHING_TO_CHECK = (
+    "no usable run has role validate: before and after are measured on such runs alone; "
+    "give at least one run that role"
+)
 KEPT_FROM_DYNAMICS = (
     "something that follows the motion is still missing: the geometry is what cable lengths say, "
     "not what the forces found would make of it; what lengths leave open widens all else"
@@ -149,10 +153,7 @@ def diagnose(
     checked = _of_role(prepared.runs, "validate")
     refuse_few(fitted)
     if not checked:
-        raise DataError(
-            "no usable run has role validate: before and after are measured on such runs alone; "
-            "give at least one run that role"
-        )
+        raise DataError(NOTHING_TO_CHECK)
     noise_scales = _noise_scales([*fitted, *checked], free)
     barred = _barred(fitted, robot)
     nuisances = tuple(n for n, one in catalogue().items() if one.nuisance and n not in barred)
