@@ -120,10 +120,9 @@ def test_recorded_runs_load_fast_and_fit_to_their_noise():
         start = process_time()
         trajectory = read_trajectory(path, geometry, target)
         seconds[path.name] = process_time() - start
-        # Where a marker jumps while another is hidden or left out there is no pose: up to 15 %, and
-        # a fifth of nat-08, no marker of which agrees with another (docs/decisions/markers.md).
-        least = 0.75 if path.stem == "nat-08" else 0.85
-        assert trajectory.is_known.mean() > least, path
+        # Where a marker jumps or stands out while another is hidden or left out there is no pose:
+        # up to 21 % (docs/decisions/markers.md).
+        assert trajectory.is_known.mean() > 0.78, path
         std = np.nanmax(trajectory.standard_deviations()[:, :3])
         assert std < 1e-3, (path, std)
     assert len(seconds) == 36
