@@ -98,7 +98,7 @@ except Done as seconds:
 
 def main() -> int:
     """Take the times that are asked for."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description="Times of a diagnosis, beside their limits.")
     parser.add_argument("scratch", type=Path)
     names = ("sample", "screen", "bologna", "demo", *CASES)
     parser.add_argument("--only", nargs="+", choices=names, default=names)
