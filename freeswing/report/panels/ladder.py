@@ -37,7 +37,7 @@ class EffectLadder:
         return {
             "effects": [row for entry in diagnosis.accepted for row in effect_rows(entry)],
             "rivals": [_rival(one) for one in candidates if one.verdict == "confounded"],
-            "rows": [_row(entry) for entry in candidates],
+            "rows": _rows(candidates),
             "chart": _chart(candidates),
             "signature": remaining.signature if remaining and remaining.present else "",
             "evidence": evidence,
@@ -68,6 +68,13 @@ def _rival(entry: Candidate) -> str:
     others = ", ".join(plain(name) for name in entry.confounded_with)
     tail = f" {entry.experiment}" if entry.experiment else ""
     return f"{plain(entry.effect)} cannot be told from {others}.{tail}"
+
+
+def _rows(candidates: list[Candidate]) -> list[dict[str, str]]:
+    """A row a candidate, those with a probability and those without under the same headings."""
+    rows = [_row(entry) for entry in candidates]
+    keys = dict.fromkeys(key for row in sorted(rows, key=len, reverse=True) for key in row)
+    return [{key: row.get(key, "–") for key in keys} for row in rows]
 
 
 def _row(entry: Candidate) -> dict[str, str]:

@@ -94,6 +94,17 @@ def test_cameras_are_no_section_of_other_recordings() -> None:
     assert "The cameras" in render_page(nothing), "they may still come"
 
 
+def test_candidates_with_and_without_a_probability_share_a_table() -> None:
+    material = whole_material()
+    assert material.diagnosis is not None
+    first, *others = material.diagnosis.candidates
+    candidates = (dataclasses.replace(first, probability=0.9), *others)
+    for order in (candidates, candidates[::-1]):
+        mixed = dataclasses.replace(material.diagnosis, candidates=order)
+        page = render_page(dataclasses.replace(material, diagnosis=mixed))
+        assert "probability (%)" in page
+
+
 def test_paths_are_drawn_as_large_as_can_be_seen() -> None:
     entries = np.array([[0.0, 0.0, 0.0], [2.0, 1.0, 0.0]])
     for size_m, factor in ((0.5, 1.0), (0.079, 5.0), (0.081, 2.0), (0.001, 20.0)):
