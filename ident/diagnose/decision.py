@@ -24,6 +24,9 @@ NEARLY_AS_GOOD = 0.5
 LEAST_GAIN = 10.0
 # The threshold for accepting: that an effect is there rather than nothing.
 ACCEPTED = 0.95
+# Left-out runs this much better than their noise lack nothing: chance alone leaves a few per cent,
+# and what an effect takes there is a part of what cameras and markers share, not of the swing.
+MOST_BELOW_NOISE = 0.1
 # A cause helps wherever it shows; what trades small swings for large ones is a stand-in.
 MOST_WORSE = 0.25
 NO_WORSE = 0.01
@@ -268,6 +271,12 @@ def _complaint(current: Refit, one: Refit, name: str, noise_scales: Array, later
     outside = plausible(one, name)
     if outside:
         return "; ".join(outside)
+    excess, gain = excess_of(current), _gain(current, one.held_out)
+    if excess < -MOST_BELOW_NOISE:
+        return (
+            f"left-out runs are predicted without it, {-100 * excess:.0f} % below their noise: "
+            "nothing is missing there"
+        )
     chance = included(current, one, name, noise_scales)
     if chance <= ACCEPTED:
         return f"not sure: with probability {chance:.2g} it is there rather than nothing"
@@ -280,7 +289,6 @@ def _complaint(current: Refit, one: Refit, name: str, noise_scales: Array, later
             f"{worse} of {len(gains)} left-out runs are predicted worse with it, and its gain is "
             "within the scatter from run to run"
         )
-    excess, gain = excess_of(current), _gain(current, one.held_out)
     if later and (excess < LEAST_EXCESS_LATER or gain < LEAST_GAIN_LATER):
         return (
             f"it would remove {100 * gain:.0f} % of an excess of {100 * excess:.0f} % over the "

@@ -37,6 +37,4 @@ def test_from_an_empty_folder_to_an_answer(tmp_path: Path) -> None:
     assert np.abs(off[:3]).max() < 5e-4, f"centre of mass off by {1e3 * off[:3]} mm"
     assert np.abs(off / std).max() < LARGEST_Z, off / std
     diagnosis = json.loads((folder / "results" / "diagnosis.json").read_text(encoding="utf-8"))
-    after = {row["name"]: row["value"] for row in diagnosis["parameters_after"]}
-    moved = np.array([after[n] for n in INERTIA_NAMES]) - plate().inertia
-    assert np.abs(moved[:3]).max() < 5e-4, f"with effects off by {1e3 * moved[:3]} mm"
+    assert diagnosis["accepted"] == [], "nothing undeclared was there"

@@ -21,7 +21,6 @@ from freeswing.ident.diagnose.decision import (
 from freeswing.ident.diagnose.leave_one_out import Score
 
 NOTHING = np.zeros(0)
-WIDE = 1e6  # samples: what is left of a run's excess beside them is a share of nothing
 
 
 def score(held_out, cost: float = 0.0) -> Score:
@@ -55,11 +54,22 @@ def test_an_effect_is_there_rather_than_nothing(monkeypatch, chance, passes) -> 
     assert passes or "not sure: with probability 0.94" in text, text
 
 
+@pytest.mark.parametrize(("below", "passes"), [(0.09, True), (0.11, False)])
+def test_runs_that_are_predicted_better_than_their_noise_lack_nothing(below, passes) -> None:
+    count = 1e4
+    before = fitted([count * (1.0 - below) / 4] * 4, 1e4, count)
+    after = fitted([count * 0.5 / 4] * 4, 0.0, count)
+    text = _complaint(before, after, "effect", np.ones(2), later=False)
+    assert (text == "") == passes, text
+    assert passes or "11 % below their noise" in text, text
+
+
 def of_runs(gains) -> str:
     """The complaint on a candidate that changes the left-out runs' squares by these."""
     gains = np.asarray(gains, dtype=float)
-    before = fitted(np.full(len(gains), 100.0), 1e4, WIDE)
-    return _complaint(before, fitted(100.0 - gains, 0.0, WIDE), "effect", np.ones(2), later=False)
+    count = 100.0 * len(gains)
+    before = fitted(np.full(len(gains), 100.0), 1e4, count)
+    return _complaint(before, fitted(100.0 - gains, 0.0, count), "effect", np.ones(2), later=False)
 
 
 @pytest.mark.parametrize(("worse", "passes"), [(4, True), (5, False)])
