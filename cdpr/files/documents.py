@@ -8,6 +8,7 @@ import re
 import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -24,6 +25,7 @@ __all__ = [
     "Reader",
     "dump_toml",
     "inside",
+    "load_json",
     "load_toml",
     "plain_json",
     "read_bytes",
@@ -73,6 +75,29 @@ def read_text(path: Path | str, most_bytes: int) -> str:
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
         raise InputError(f"{path}: line {line}: not UTF-8 text; save the file as UTF-8") from error
+
+
+def load_json(path: Path | str, kind: str, most_bytes: int, remedy: str) -> dict[str, Any]:
+    """The table of one of the program's JSON documents.
+
+    Args:
+        path: the file.
+        kind: its `format`.
+        most_bytes: no more are read.
+        remedy: where such a file comes from.
+
+    Raises:
+        InputError: as `read_text`, and when it is not JSON or of another format.
+    """
+    text = read_text(path, most_bytes)
+    try:
+        table = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{path}: not JSON ({error}); {remedy}") from error
+    found = table.get("format") if isinstance(table, dict) else type(table).__name__
+    if not isinstance(table, dict) or found != kind:
+        raise InputError(f"{path}: format is {found!r}, must be {kind!r}; {remedy}")
+    return table
 
 
 def load_toml(path: Path | str, kind: str, problems: Problems | None = None) -> dict[str, object]:

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import base64
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from freeswing.cdpr.files.documents import read_text
-from freeswing.cdpr.files.problems import InputError
+from freeswing.cdpr.files.documents import load_json, read_text
 
 FORMATS = {
     "controller.json": "freeswing-controller/1",
@@ -48,7 +46,7 @@ def read_control(results: Path) -> ControlResults | None:
         InputError: for a document that is not what its name says.
     """
     documents = {
-        name: _document(results / name, format_)
+        name: load_json(results / name, format_, LARGEST_BYTES, "delete it and run again")
         for name, format_ in FORMATS.items()
         if (results / name).is_file()
     }
@@ -61,15 +59,3 @@ def read_control(results: Path) -> ControlResults | None:
             drawn = base64.b64encode(read_text(results / name, LARGEST_BYTES).encode()).decode()
             pictures.append((caption, f"data:image/svg+xml;base64,{drawn}"))
     return ControlResults(documents, tuple(pictures))
-
-
-def _document(path: Path, format_: str) -> dict[str, Any]:
-    try:
-        table = json.loads(read_text(path, LARGEST_BYTES))
-    except ValueError as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"{path}: not a result: not JSON ({error})") from error
-    if not isinstance(table, dict) or table.get("format") != format_:
-        raise InputError(f"{path}: not a result of format {format_}; delete it and run again")
-    return table

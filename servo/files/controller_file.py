@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from freeswing.cdpr.files.documents import read_text
+from freeswing.cdpr.files.documents import load_json
 from freeswing.cdpr.files.problems import InputError
 from freeswing.servo.design.controller import Controller
 from freeswing.servo.design.mpc import Predictor
@@ -99,15 +98,7 @@ def read_controller(path: Path | str) -> Stored:
     Raises:
         InputError: unreadable, of another kind, or matrices that do not fit together.
     """
-    try:
-        table = json.loads(read_text(path, LARGEST_FILE_BYTES))
-    except ValueError as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"{path}: not JSON ({error})") from error
-    if not isinstance(table, dict) or table.get("format") != FORMAT:
-        found = table.get("format") if isinstance(table, dict) else type(table).__name__
-        raise InputError(f"{path}: format is {found!r}, must be {FORMAT!r}")
+    table = load_json(path, FORMAT, LARGEST_FILE_BYTES, "freeswing design writes such a file")
     try:
         rate = float(table["sample_rate_hz"])
         matrices = [np.array(table[key], dtype=np.float64) for key in "ABCD"]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from freeswing.cdpr.driven.model import DrivenModel
-from freeswing.cdpr.files.documents import read_text
+from freeswing.cdpr.files.documents import load_json
 from freeswing.cdpr.files.problems import InputError
 from freeswing.servo.synthesis.state_space import Array
 
@@ -43,15 +42,7 @@ def read_identified(path: Path | str, model: DrivenModel) -> Identified:
     Raises:
         InputError: unreadable, of another kind, of another robot, or no covariance.
     """
-    try:
-        table = json.loads(read_text(path, LARGEST_FILE_BYTES))
-    except ValueError as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"{path}: not JSON ({error})") from error
-    if not isinstance(table, dict) or table.get("format") != FORMAT:
-        found = table.get("format") if isinstance(table, dict) else type(table).__name__
-        raise InputError(f"{path}: format is {found!r}, must be {FORMAT!r} (freeswing drive)")
+    table = load_json(path, FORMAT, LARGEST_FILE_BYTES, "freeswing drive writes such a file")
     try:
         return _read(table["estimates"]["joint"], model)
     except InputError as error:
