@@ -117,3 +117,12 @@ def crew_of(options: Namespace, session: Session) -> AbstractContextManager[Crew
     from freeswing.workers.crew import crew_for
 
     return crew_for(session, options.workers, options.cluster)
+
+
+def setting(text: str) -> tuple[str, float]:
+    """PARAMETER=VALUE as the two."""
+    name, _, value = text.partition("=")
+    try:
+        return name, float(value)
+    except ValueError:
+        raise ArgumentTypeError(f"{text!r} is not PARAMETER=VALUE") from None

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from freeswing.cdpr.effects import driven_catalogue
 from freeswing.cdpr.files.documents import InputError
 from freeswing.ident.drive.diagnose.candidates import Candidate
 from freeswing.ident.drive.diagnose.diagnose import DriveDiagnosis, Verdict
@@ -29,17 +30,19 @@ LARGEST_SHARE = 0.3
 
 def drive_document(name: str, session: DriveSession, found: DriveIdentification) -> dict[str, Any]:
     """The document; what the data do not determine has null values."""
-    estimates: dict[str, Any] = {
-        "inverse_dynamics": {
-            "parameters": _parameters(
-                session.asked.dynamic.names, found.regression.values, found.regression.std
-            ),
+    estimates: dict[str, Any] = {}
+    if found.regression is not None:
+        names = session.asked.without_effects.dynamic.names
+        estimates["inverse_dynamics"] = {
+            "parameters": _parameters(names, found.regression.values, found.regression.std),
             "condition": found.regression.condition,
-        },
-        "output_error": _estimate(found.output_error)
-        | {"second_start_z": found.second_start, "initial_values": "inverse_dynamics"},
-        "joint": _estimate(found.joint),
-    }
+        }
+    second, joint = {"second_start_z": found.second_start}, _estimate(found.joint)
+    if found.output_error is not None:
+        second["initial_values"] = "inverse_dynamics"
+        estimates |= {"output_error": _estimate(found.output_error) | second, "joint": joint}
+    else:
+        estimates["joint"] = joint | second
     if found.kinematics is not None and found.published is not None:
         names = session.asked.kinematic.names
         estimates["kinematic"] = {
@@ -93,10 +96,10 @@ def unknown(std: float, value: float) -> bool:
 def _parameters(
     names: Sequence[str], values: Array, std: Array, on_bound: NDArray[np.bool_] | None = None
 ) -> list[dict[str, Any]]:
-    entries = []
+    entries, known = [], driven_catalogue()
     for k, name in enumerate(names):
-        # Offsets of points have no size of their own to compare with.
-        is_offset = "_offset." in name
+        # What an effect adds has no size of its own to compare with.
+        is_offset = name.partition(".")[0] in known
         lost = not np.isfinite(std[k]) if is_offset else unknown(std[k], values[k])
         entry = {"name": name, "value": None if lost else values[k]}
         entry |= {"std": None if lost else std[k], "identifiable": not lost}

@@ -92,9 +92,11 @@ class DriveIdentification:
     Attributes:
         published: (18), or None without static poses or kinematic unknowns.
         kinematics: the same with poses as the noisy side.
-        regression: inverse dynamics.
-        output_error: second step of two, its covariance with that of the kinematics.
-        second_start: largest difference of its end from another start, in deviations.
+        regression: inverse dynamics; None where angles fit no pose of the declared geometry.
+        output_error: second step of two, its covariance with that of the kinematics; None with
+            effects asked for on top, of which the first step knows nothing.
+        second_start: largest difference of its end from another start, in deviations; of the
+            joint estimate's where there is no output error.
         joint: the joint estimate.
         fits: every run by the joint estimate.
         initial: every run by the declared numbers.
@@ -102,8 +104,8 @@ class DriveIdentification:
 
     published: Kinematics | None
     kinematics: Kinematics | None
-    regression: Regression
-    output_error: Estimate
+    regression: Regression | None
+    output_error: Estimate | None
     second_start: float
     joint: Estimate
     fits: tuple[RunFit, ...]
@@ -148,7 +150,7 @@ def identify_drive(session: DriveSession, progress: Progress) -> DriveIdentifica
         apart,
         joint,
         tuple(predict(session, run, joint.theta, joint.offsets) for run in session.runs),
-        tuple(_declared(session, run, zero) for run in session.runs),
+        tuple(predicted_as_declared(session, run, zero) for run in session.runs),
     )
 
 
@@ -238,7 +240,7 @@ def _start(session: DriveSession, run: DriveRun, theta: Array, zero: Array) -> t
     return moved(pose, shift[:N_POSE]), record.currents_A[0] + shift[N_POSE:]
 
 
-def _declared(session: DriveSession, run: DriveRun, zero: Array) -> RunFit | None:
+def predicted_as_declared(session: DriveSession, run: DriveRun, zero: Array) -> RunFit | None:
     """The run by the declared numbers; None where they cannot follow it at all."""
     try:
         return predict(session, run, session.model.declared, zero)

@@ -32,10 +32,12 @@ class Asked:
     Attributes:
         groups: kinematic ones first.
         n_kinematic: how many of them are kinematic.
+        n_effects: how many of them, the last ones, are of effects asked for on top of the file.
     """
 
     groups: tuple[Group, ...]
     n_kinematic: int
+    n_effects: int = 0
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -51,6 +53,16 @@ class Asked:
     def dynamic(self) -> Asked:
         """Those of the dynamics alone."""
         return Asked(self.groups[self.n_kinematic :], 0)
+
+    @property
+    def without_effects(self) -> Asked:
+        """Those that the file asks for."""
+        return Asked(self.groups[: len(self.groups) - self.n_effects], self.n_kinematic)
+
+    @property
+    def effects(self) -> tuple[Group, ...]:
+        """Those of effects asked for on top of the file."""
+        return self.groups[len(self.groups) - self.n_effects :]
 
     @property
     def members(self) -> tuple[str, ...]:

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from freeswing.commands.arguments import not_negative, positive, whole
+from freeswing.commands.arguments import not_negative, positive, setting, whole
 from freeswing.commands.robot.simulate_drive import add_drive_arguments, run_drive
 from freeswing.console import Console
 
@@ -32,7 +32,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         "--set",
         action="append",
         default=[],
-        type=_setting,
+        type=setting,
         metavar="PARAMETER=VALUE",
         help="value of an effect's parameter, such as rate_1_s=0.05",
     )
@@ -125,11 +125,3 @@ def _numbers(text: str) -> list[float]:
         return [float(part) for part in text.split(",")]
     except ValueError:
         raise ArgumentTypeError(f"{text!r} is not a list of numbers, such as 1.3,1.4") from None
-
-
-def _setting(text: str) -> tuple[str, float]:
-    name, _, value = text.partition("=")
-    try:
-        return name, float(value)
-    except ValueError:
-        raise ArgumentTypeError(f"{text!r} is not PARAMETER=VALUE") from None

@@ -6,10 +6,12 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from freeswing.commands.arguments import add_results
+from freeswing.commands.arguments import add_results, setting
 from freeswing.console import Console
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from freeswing.session.drive_session import DriveFile
 
 # Residuals of a right model are their noise: counts that stand still make 1.1 of it at most.
@@ -20,6 +22,22 @@ def add_arguments(parser: ArgumentParser) -> None:
     """The session."""
     parser.add_argument("session", metavar="SESSION", help="a session's folder or drive.toml")
     add_results(parser, "SESSION/results")
+    parser.add_argument(
+        "--effect",
+        action="append",
+        default=[],
+        metavar="NAME[.PART]",
+        help="estimate the numbers of an effect too, of all motors or cables or of one, such as "
+        "drum_radius.4; may be repeated",
+    )
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        type=setting,
+        metavar="PARAMETER=VALUE",
+        help="where a number of an effect starts, or stays if it is not asked for",
+    )
 
 
 def run(options: Namespace, console: Console) -> None:
@@ -30,7 +48,7 @@ def run(options: Namespace, console: Console) -> None:
     if path is None:
         named = Path(options.session)
         path = named / "drive.toml" if named.is_dir() else named
-    identify(read_drive_session(path, options.results), console)
+    identify(read_drive_session(path, options.results), console, options.effect, options.set)
 
 
 def examined(file: DriveFile) -> None:
@@ -47,22 +65,44 @@ def examined(file: DriveFile) -> None:
         raise DataError("\n  ".join([f"{file.path}: {len(found)} to mend first", *found]))
 
 
-def identify(file: DriveFile, console: Console) -> Path:
-    """drive.json of a session.
+def identify(
+    file: DriveFile,
+    console: Console,
+    effects: Sequence[str] = (),
+    starts: Sequence[tuple[str, float]] = (),
+) -> Path:
+    """drive.json of a session, its joint estimate with the numbers of `effects`.
 
     Raises:
+        InputError: for an effect, or a number of one, that there is not.
         DataError: when the recordings cannot give a result.
     """
-    from freeswing.cdpr.files.documents import DataError, write_json
+    from freeswing.cdpr.files.documents import DataError, InputError, write_json
+    from freeswing.ident.drive.added_effects import with_effects
     from freeswing.ident.drive.identify import identify_drive
+    from freeswing.ident.drive.identify_effects import identify_with_effects
     from freeswing.results.drive import drive_document
 
+    session, held = file.session, ()
+    if effects or starts:
+        try:
+            larger = with_effects(session, effects, starts)
+        except ValueError as error:
+            raise InputError(str(error)) from error
+        session, held = larger.session, larger.held
     examined(file)
+    for name in held:
+        console.complain(
+            f"{name} stays as the robot's file has it: the effects can do whatever it does"
+        )
+    identified = identify_with_effects if session.asked.n_effects else identify_drive
     try:
-        found = identify_drive(file.session, console.progress)
+        found = identified(session, console.progress)
     except ValueError as error:
         raise DataError(f"{file.path}: {error}") from error
-    document = drive_document(file.name, file.session, found)
+    document = drive_document(file.name, session, found)
+    if effects:
+        document |= {"effects": list(effects), "held": list(held)}
     result = file.results / "drive.json"
     write_json(result, document)
     _say(document, console)
@@ -197,9 +237,11 @@ def _warn(document: dict[str, Any], console: Console) -> None:
             f"the angles' residuals are above their noise (times: {', '.join(wrong)}): something "
             "is missing in the model, and the deviations above do not count it; see diagnose"
         )
-    apart = document["estimates"]["output_error"]["second_start_z"]
+    name = "output_error" if "output_error" in document["estimates"] else "joint"
+    apart = document["estimates"][name]["second_start_z"]
     if apart > 1.0:
+        what = "output error" if name == "output_error" else "the joint estimate"
         console.complain(
-            f"output error ends {apart:.1f} deviations elsewhere from a second start: another "
-            "minimum; do not trust its numbers"
+            f"{what} ends {apart:.1f} deviations elsewhere from a second start: another minimum; "
+            "do not trust its numbers"
         )

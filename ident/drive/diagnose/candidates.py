@@ -46,31 +46,32 @@ def candidates(
     taken, found = set(asked.members), []
     for name in driven_catalogue() if only is None else only:
         effect = effect_named(name)
-        parameters = [p for p in _shown(effect, model) if f"{name}.{p.name}" not in taken]
+        parameters = [p for p in shown(effect, model) if f"{name}.{p.name}" not in taken]
         for part in dict.fromkeys(p.part for p in parameters):
             names = [f"{name}.{p.name}" for p in parameters if p.part == part]
             screened = tuple(names)
-            if _weighs(effect):
+            if weighs(effect):
                 screened = tuple(one for one in CENTRE if one not in taken)
             groups = tuple(Group(one, (one,)) for one in names)
             found.append(Candidate(name, part, groups, screened))
     return tuple(found)
 
 
-def _weighs(effect: Effect) -> bool:
+def weighs(effect: Effect) -> bool:
+    """Whether an effect fixes weights to the platform."""
     return type(effect).payloads is not Effect.payloads
 
 
-def _shown(effect: Effect, model: DrivenModel) -> list[Parameter]:
+def shown(effect: Effect, model: DrivenModel) -> list[Parameter]:
     """The parameters that a recording could tell, alone or (weights) with the others."""
     parameters = effect.parameters(model.robot)
-    if _weighs(effect):
+    if weighs(effect):
         return list(parameters)
-    shown = []
+    found = []
     for k, parameter in enumerate(parameters):
         values = np.zeros(len(parameters))
         values[k] = parameter.scale
         stretches = type(effect).stretch is not Effect.stretch
         if parameter.amplitude and (not stretches or effect.stretch(values, 1.0)[0] > 0.0):
-            shown.append(parameter)
-    return shown
+            found.append(parameter)
+    return found

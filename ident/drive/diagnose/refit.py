@@ -131,20 +131,24 @@ def with_candidate(
     asked = Asked((*found.asked.groups, *candidate.groups), found.asked.n_kinematic)
     given = replace(base.given, model=model, theta=theta, offsets=found.offsets)
     if candidate.screened[0] in CENTRE:
-        return fitted(session, _weighted(given, base, candidate), asked, candidate)
+        return fitted(session, weighted(given, found, candidate.groups), asked, candidate)
     for name, value in zip(candidate.screened, screened.values, strict=True):
         limits = model.parameters[model.index(name) - len(model.numbers.names)]
         theta[model.index(name)] = np.clip(value, limits.low, limits.high)
     return fitted(session, given, asked, candidate)
 
 
-def _weighted(given: Premise, base: Fitted, candidate: Candidate) -> Premise:
+def weighted(given: Premise, found: Estimate, groups: tuple[Group, ...]) -> Premise:
     """Where a weight's fit begins: the moment of a displaced centre, and the best of some masses.
 
     Products of inertia alone tell a light weight far out from a heavy one near the centre: from a
     wrong one the search goes astray.
+
+    Args:
+        given: the larger model's premise.
+        found: the estimate without the weight.
+        groups: the weight's mass and its three coordinates.
     """
-    found = base.found
     names = [name for name in CENTRE if name not in found.asked.members]
     asked = Asked(
         (*found.asked.groups, *(Group(name, (name,)) for name in names)), found.asked.n_kinematic
@@ -158,7 +162,7 @@ def _weighted(given: Premise, base: Fitted, candidate: Candidate) -> Premise:
         trial = centred.theta.copy()
         trial[places] = given.theta[places]
         trial[model.index("mass_kg")] = mass - weight
-        for group, value in zip(candidate.groups, (weight, *(moment / weight)), strict=True):
+        for group, value in zip(groups, (weight, *(moment / weight)), strict=True):
             limits = model.parameters[model.index(group.name) - len(model.numbers.names)]
             trial[model.index(group.name)] = np.clip(value, limits.low, limits.high)
         problem = Problem(replace(given, theta=trial), found.asked)
