@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import casadi as ca
@@ -25,7 +25,8 @@ class Enlarged:
     """A session with effects.
 
     Attributes:
-        session: its model has the effects at their start values, its unknowns their numbers last.
+        session: its model has the effects at their start values; those of their numbers that
+            move points or drums are kinematic unknowns, the others dynamic ones.
         held: unknowns of the file that the effects do as well: no longer asked for.
     """
 
@@ -60,11 +61,15 @@ def with_effects(
     twice = [name for name in names if name in session.asked.members]
     if twice:
         raise ValueError(f"--effect: {twice[0]} is in [unknown] of the file already")
-    added = tuple(Group(name, (name,)) for name in names)
-    held = _held(model, session.asked, added)
+    slopes = _slopes(model)
+    held = _held(model, session.asked, names, np.vstack(slopes))
     kept = [group for group in session.asked.groups if group.name not in held]
     n_kinematic = sum(group.name not in held for group in session.asked.kinematic.groups)
-    asked = Asked((*kept, *added), n_kinematic, len(added))
+    moving = [name for name in names if slopes[0][:, model.index(name)].any()]
+    groups = {name: Group(name, (name,)) for name in names}
+    still = [groups[name] for name in names if name not in moving]
+    kinematic = [*kept[:n_kinematic], *(groups[name] for name in moving)]
+    asked = Asked((*kinematic, *kept[n_kinematic:], *still), len(kinematic), tuple(names))
     return Enlarged(replace(session, model=model, asked=asked), held)
 
 
@@ -100,24 +105,29 @@ def _started(model: DrivenModel, starts: Sequence[tuple[str, float]]) -> Array:
     return theta
 
 
-def _held(model: DrivenModel, asked: Asked, added: tuple[Group, ...]) -> tuple[str, ...]:
-    """Unknowns that change points and motors in no way in which the effects cannot.
+def _slopes(model: DrivenModel) -> tuple[Array, Array]:
+    """How points and drums, and all other constants of motors and body, answer to theta."""
+    terms, theta = model.premises.terms, model.premises.theta
+    points = ca.vertcat(*terms.geometry.entries, *terms.geometry.attachments)
+    rest = [name for name in type(terms.motors).__slots__ if name != "drum_radius"]
+    motors = ca.vertcat(*[getattr(terms.motors, name) for name in rest])
+    parts = [ca.vertcat(points, terms.motors.drum_radius), ca.vertcat(motors, terms.body)]
+    slope = ca.Function("slope", [theta], [ca.jacobian(part, theta) for part in parts])
+    first, second = (np.asarray(ca.DM(one).full()) for one in slope(model.declared))
+    return first, second
+
+
+def _held(model: DrivenModel, asked: Asked, added: Iterable[str], slopes: Array) -> tuple[str, ...]:
+    """Unknowns that change points, motors and body in no way in which the effects cannot.
 
     A drum radius of all motors and an addition to that of each are only known as their sum.
     """
-    terms = model.premises.terms
-    motors = [getattr(terms.motors, name) for name in type(terms.motors).__slots__]
-    points = [*terms.geometry.entries, *terms.geometry.attachments]
-    everything = ca.vertcat(*motors, *points, terms.body)
-    theta = model.premises.theta
-    slope = ca.Function("slope", [theta], [ca.jacobian(everything, theta)])
-    matrix = np.asarray(ca.DM(slope(model.declared)).full())
-    by_effects = matrix[:, [model.index(group.name) for group in added]]
+    by_effects = slopes[:, [model.index(name) for name in added]]
     left, sizes, _ = np.linalg.svd(by_effects, full_matrices=False)
     base = left[:, sizes > SAME * sizes.max(initial=0.0)]
     held = []
     for group in asked.groups:
-        column = matrix[:, [model.index(name) for name in group.members]].sum(axis=1)
+        column = slopes[:, [model.index(name) for name in group.members]].sum(axis=1)
         rest = column - base @ (base.T @ column)
         if np.linalg.norm(rest) <= SAME * np.linalg.norm(column):
             held.append(group.name)

@@ -9,7 +9,7 @@ from freeswing.cdpr.driven.slopes import length_slope
 from freeswing.cdpr.model.batch import evaluate
 from freeswing.ident.drive.identify import DriveSession
 from freeswing.ident.drive.inverse_dynamics import flowing
-from freeswing.ident.drive.kinematics import most_likely
+from freeswing.ident.drive.kinematics import StaticPoses, most_likely
 from freeswing.ident.drive.run_problem import DriveRun
 
 Array = NDArray[np.float64]
@@ -201,18 +201,29 @@ def _static(session: DriveSession) -> list[str]:
     asks = bool(session.asked.kinematic.groups)
     if session.static is None or len(session.static.poses) < 4 or not asks:
         return []
-    model, static = session.model, session.static
+    squares = _static_squares(session, session.static)
+    worst = int(np.argmax(squares))
+    rest = float(np.median(squares))
+    if squares[worst] < ODD_ROW or squares[worst] < 4.0 * rest:
+        return []
+    others = np.arange(len(squares)) != worst
+    left = [getattr(session.static, name)[others] for name in ("currents_A", "angles_rad", "poses")]
+    static = session.static
+    alone = StaticPoses(*left, static.pose_std, static.angle_std_rad)
+    if np.median(_static_squares(session, alone)) > ODD_ROW:
+        return []  # they contradict each other without it too: the model is wrong, not the row
+    return [
+        f"static pose {worst + 1} contradicts the others (chi-square {squares[worst]:.0f}, the "
+        f"others' median {rest:.0f}): not at rest, or an encoder that jumped; record it again"
+    ]
+
+
+def _static_squares(session: DriveSession, static: StaticPoses) -> Array:
+    """Chi-square of every static pose's angles and coordinates, (n_p,)."""
+    model = session.model
     best = most_likely(model, model.declared, session.asked.kinematic, static, session.zero_pose)
     theta = session.asked.kinematic.put(model, model.declared, best.values)
     turns = evaluate(length_slope(model), best.poses, theta)[0]
     gaps = (best.offsets_rad - turns - static.angles_rad) / static.angle_std_rad
     shifts = best.found.values[-6 * len(static.poses) :].reshape(-1, 6) / static.pose_std
-    squares = np.sum(gaps**2, axis=1) + np.sum(shifts**2, axis=1)
-    worst = int(np.argmax(squares))
-    rest = float(np.median(squares))
-    if squares[worst] < ODD_ROW or squares[worst] < 4.0 * rest:
-        return []
-    return [
-        f"static pose {worst + 1} contradicts the others (chi-square {squares[worst]:.0f}, the "
-        f"others' median {rest:.0f}): not at rest, or an encoder that jumped; record it again"
-    ]
+    return np.sum(gaps**2, axis=1) + np.sum(shifts**2, axis=1)

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from freeswing.cdpr.driven.model import DrivenModel
 from freeswing.cdpr.driven.motion import DrivenMotion
-from freeswing.cdpr.driven.record import DriveRecord
 from freeswing.cdpr.driven.sensitivity import N_POSE
 from freeswing.cdpr.driven.slopes import moved
 from freeswing.ident.drive.inverse_dynamics import Regression, inverse_dynamics
@@ -22,7 +21,14 @@ from freeswing.ident.drive.kinematics import (
     most_likely,
     zero_turns,
 )
-from freeswing.ident.drive.run_problem import DriveRun, Noise, compared, simulated, start_pose
+from freeswing.ident.drive.run_problem import (
+    DriveRun,
+    Noise,
+    compared,
+    head_of,
+    simulated,
+    start_pose,
+)
 from freeswing.ident.drive.unknowns import Asked
 
 Array = NDArray[np.float64]
@@ -225,10 +231,7 @@ def predict(session: DriveSession, run: DriveRun, theta: Array, zero: Array) -> 
 
 def _start(session: DriveSession, run: DriveRun, theta: Array, zero: Array) -> tuple[Array, Array]:
     """Pose and currents at the start, by the first angles and one step of least squares."""
-    model, rows = session.model, max(2, round(HEAD_S * run.rate_hz))
-    record = run.record
-    head = DriveRecord(*(getattr(record, name)[:rows] for name in DriveRecord.__slots__))
-    short = replace(run, record=head)
+    model, short = session.model, head_of(run, HEAD_S)
     pose = start_pose(model, theta, run, zero)
     seen = compared(short, simulated(model, theta, short, pose), zero, session.noise, NOTHING)
     n_start = N_POSE + model.n_cables
@@ -237,7 +240,7 @@ def _start(session: DriveSession, run: DriveRun, theta: Array, zero: Array) -> t
     known = np.zeros(n_start)
     known[N_POSE:] = session.noise.current_std_A**-2.0
     shift = -np.linalg.solve(columns.T @ columns + np.diag(known), columns.T @ gaps)
-    return moved(pose, shift[:N_POSE]), record.currents_A[0] + shift[N_POSE:]
+    return moved(pose, shift[:N_POSE]), run.record.currents_A[0] + shift[N_POSE:]
 
 
 def predicted_as_declared(session: DriveSession, run: DriveRun, zero: Array) -> RunFit | None:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from freeswing.cdpr.effects import driven_catalogue
+from freeswing.cdpr.effects import Effect, driven_catalogue
 from freeswing.ident.drive.diagnose.candidates import weighs
 from freeswing.ident.drive.diagnose.refit import MOST_STEPS, weighted
 from freeswing.ident.drive.diagnose.screen import jump_start
@@ -16,6 +16,7 @@ from freeswing.ident.drive.identify import (
     DriveSession,
     Progress,
     geometry,
+    offsets_of,
     possible,
     predict,
     predicted_as_declared,
@@ -23,8 +24,11 @@ from freeswing.ident.drive.identify import (
 )
 from freeswing.ident.drive.inverse_dynamics import Regression, inverse_dynamics
 from freeswing.ident.drive.joint import Estimate, Premise, Problem, estimate
+from freeswing.ident.drive.run_problem import head_of
 from freeswing.ident.drive.unknowns import Asked
 
+FIRST_HEAD_S = 0.15  # of a run: a cable's swings turn by less than ten radians
+HEAD_STEPS = 8
 JUMP = "encoder_jump.after_s"
 
 
@@ -55,10 +59,13 @@ def identify_with_effects(session: DriveSession, progress: Progress) -> DriveIde
     first = estimate(given, asked.without_effects, MOST_STEPS)
     progress("joint estimate", 0.4)
     started = _started(session, given, first)
+    if _swings(session):
+        started = _followed(started, asked, progress)
     joint = estimate(started, asked)
     progress("a second start", 0.65)
     apart = _second_start(started, joint)
     progress("predictions", 0.9)
+    zero = offsets_of(session, model.declared, offsets)
     return DriveIdentification(
         published,
         kinematics,
@@ -67,7 +74,7 @@ def identify_with_effects(session: DriveSession, progress: Progress) -> DriveIde
         apart,
         joint,
         tuple(predict(session, run, joint.theta, joint.offsets) for run in session.runs),
-        tuple(predicted_as_declared(session, run, offsets) for run in session.runs),
+        tuple(predicted_as_declared(session, run, zero) for run in session.runs),
     )
 
 
@@ -82,20 +89,51 @@ def _regressed(session: DriveSession, theta, offsets) -> Regression | None:
 
 def _started(session: DriveSession, given: Premise, first: Estimate) -> Premise:
     """Where the joint search begins."""
-    model, names = session.model, session.asked.names
+    model, asked = session.model, session.asked
     started = replace(given, theta=first.theta.copy(), offsets=first.offsets)
-    if JUMP in model.names and JUMP not in names and _untouched(session, JUMP):
+    if JUMP in model.names and JUMP not in asked.added and _untouched(session, JUMP):
         problem = Problem(given, first.asked)
         x = first.found.values.copy()
         x[: problem.k] = first.values
         problem.normal(x)
         started.theta[model.index(JUMP)] = jump_start(problem.seen, (JUMP,))[JUMP]
     for effect in driven_catalogue().values():
-        groups = tuple(g for g in session.asked.effects if g.name.startswith(f"{effect.name}."))
+        groups = tuple(
+            g for g in asked.groups if g.name in asked.added and _of(g.name) == effect.name
+        )
         whole = len(groups) == len(effect.parameters(model.robot))
         if weighs(effect) and whole and all(_untouched(session, one.name) for one in groups):
             started = weighted(started, first, groups)
     return started
+
+
+def _of(name: str) -> str:
+    """The effect that a full name is of."""
+    return name.partition(".")[0]
+
+
+def _swings(session: DriveSession) -> bool:
+    """Whether an effect is asked for that makes cables elastic."""
+    asked = {_of(name) for name in session.asked.added}
+    known = driven_catalogue()
+    return any(type(known[name]).stretch is not Effect.stretch for name in asked)
+
+
+def _followed(given: Premise, asked: Asked, progress: Progress) -> Premise:
+    """The start that longer and longer heads of the runs lead to.
+
+    A cable's own swings tell its stiffness, and of a whole run only within a radian at its end:
+    from farther off the search ends in another minimum, where they are a turn apart.
+    """
+    longest = max(len(run.record.times_s) / run.rate_hz for run in given.runs)
+    seconds = FIRST_HEAD_S
+    while seconds < longest:
+        progress(f"elastic cables, the first {seconds:g} s", 0.4)
+        heads = tuple(head_of(run, seconds) for run in given.runs)
+        found = estimate(replace(given, runs=heads), asked, HEAD_STEPS)
+        given = replace(given, theta=found.theta, offsets=found.offsets)
+        seconds *= 2.0
+    return given
 
 
 def _untouched(session: DriveSession, name: str) -> bool:

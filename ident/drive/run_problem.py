@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from freeswing.cdpr.driven.motion import DrivenMotion
 from freeswing.cdpr.driven.record import DriveRecord, poses_at
 from freeswing.cdpr.driven.sensitivity import N_POSE, state_slopes
 from freeswing.cdpr.driven.slopes import length_slope, moved, turn_map
-from freeswing.cdpr.effects import effect_named
+from freeswing.cdpr.effects import Effect, effect_named
 from freeswing.cdpr.model.batch import evaluate
 from freeswing.ident.drive.direct_kinematics import poses_from_turns
 from freeswing.ident.drive.unknowns import Asked
@@ -44,6 +44,14 @@ class DriveRun:
     role: str
     record: DriveRecord
     rate_hz: float
+
+
+def head_of(run: DriveRun, seconds: float) -> DriveRun:
+    """The run's first part, of two samples at least."""
+    rows = max(2, round(seconds * run.rate_hz))
+    record = run.record
+    cut = DriveRecord(*(getattr(record, name)[:rows] for name in DriveRecord.__slots__))
+    return replace(run, record=cut)
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,6 +209,8 @@ def _elastic_slopes(
         columns.append((there, CURRENT_STEP_A))
     for group in asked.groups:
         theta, step = motion.theta.copy(), _step_of(model, motion.theta, group.name)
+        if _gives_way(model, group.name):
+            step = min(step, NUMBER_STEP * float(theta[model.index(group.name)]) or step)
         for member in group.members:
             theta[model.index(member)] += step
         columns.append((ahead(np.zeros(N_POSE), np.zeros(n), theta), step))
@@ -216,6 +226,16 @@ def _step_of(model: DrivenModel, theta: Array, name: str) -> float:
     if place >= first:
         return DIFFERENCE * model.parameters[place - first].scale
     return NUMBER_STEP * abs(float(theta[place])) or NUMBER_STEP
+
+
+def _gives_way(model: DrivenModel, name: str) -> bool:
+    """Whether a number is of an effect that makes cables elastic.
+
+    Those swing a hundred radians a second: a hundredth more stiffness turns a second's end by one,
+    and is no derivative any more.
+    """
+    effect = name.partition(".")[0]
+    return effect in model.effects and type(effect_named(effect)).stretch is not Effect.stretch
 
 
 def _is_beside(model: DrivenModel, name: str) -> bool:

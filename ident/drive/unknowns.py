@@ -32,12 +32,12 @@ class Asked:
     Attributes:
         groups: kinematic ones first.
         n_kinematic: how many of them are kinematic.
-        n_effects: how many of them, the last ones, are of effects asked for on top of the file.
+        added: names of those that are of effects asked for on top of the file.
     """
 
     groups: tuple[Group, ...]
     n_kinematic: int
-    n_effects: int = 0
+    added: tuple[str, ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -57,12 +57,9 @@ class Asked:
     @property
     def without_effects(self) -> Asked:
         """Those that the file asks for."""
-        return Asked(self.groups[: len(self.groups) - self.n_effects], self.n_kinematic)
-
-    @property
-    def effects(self) -> tuple[Group, ...]:
-        """Those of effects asked for on top of the file."""
-        return self.groups[len(self.groups) - self.n_effects :]
+        kept = [group.name not in self.added for group in self.groups]
+        groups = tuple(group for group, keep in zip(self.groups, kept, strict=True) if keep)
+        return Asked(groups, sum(kept[: self.n_kinematic]))
 
     @property
     def members(self) -> tuple[str, ...]:

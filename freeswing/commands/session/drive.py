@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -90,12 +91,12 @@ def identify(
         except ValueError as error:
             raise InputError(str(error)) from error
         session, held = larger.session, larger.held
-    examined(file)
+    examined(replace(file, session=session))
     for name in held:
         console.complain(
             f"{name} stays as the robot's file has it: the effects can do whatever it does"
         )
-    identified = identify_with_effects if session.asked.n_effects else identify_drive
+    identified = identify_with_effects if session.asked.added else identify_drive
     try:
         found = identified(session, console.progress)
     except ValueError as error:
@@ -212,6 +213,13 @@ def _say(document: dict[str, Any], console: Console) -> None:
         console.say(
             f"  {entry['name']:24} {entry['value']:12.6g}  +- {entry['std']:.2g} "
             f"({share:.2g} %){bound}"
+        )
+    lost = [e["name"] for e in document["estimates"]["joint"]["parameters"] if e["value"] is None]
+    if len(lost) > 1:
+        console.complain(
+            f"of these {len(lost)} perhaps only combinations are determined (all torque constants "
+            "with mass, friction and springs are, for one): take one whose value is known out of "
+            "[unknown], or name one motor, as --effect torque_constant.1"
         )
     for fit in document["fit_percent"]:
         mean = sum(fit["matlab"]) / len(fit["matlab"])
