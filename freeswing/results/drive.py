@@ -37,7 +37,8 @@ def drive_document(name: str, session: DriveSession, found: DriveIdentification)
             "parameters": _parameters(names, found.regression.values, found.regression.std),
             "condition": found.regression.condition,
         }
-    second, joint = {"second_start_z": found.second_start}, _estimate(found.joint)
+    second: dict[str, Any] = {"second_start_z": found.second_start}
+    joint = _estimate(found.joint)
     if found.output_error is not None:
         second["initial_values"] = "inverse_dynamics"
         estimates |= {"output_error": _estimate(found.output_error) | second, "joint": joint}

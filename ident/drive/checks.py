@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -207,9 +209,13 @@ def _static(session: DriveSession) -> list[str]:
     if squares[worst] < ODD_ROW or squares[worst] < 4.0 * rest:
         return []
     others = np.arange(len(squares)) != worst
-    left = [getattr(session.static, name)[others] for name in ("currents_A", "angles_rad", "poses")]
     static = session.static
-    alone = StaticPoses(*left, static.pose_std, static.angle_std_rad)
+    alone = replace(
+        static,
+        currents_A=static.currents_A[others],
+        angles_rad=static.angles_rad[others],
+        poses=static.poses[others],
+    )
     if np.median(_static_squares(session, alone)) > ODD_ROW:
         return []  # they contradict each other without it too: the model is wrong, not the row
     return [

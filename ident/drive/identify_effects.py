@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from freeswing.cdpr.effects import Effect, driven_catalogue
 from freeswing.ident.drive.diagnose.candidates import weighs
@@ -24,11 +25,14 @@ from freeswing.ident.drive.identify import (
 )
 from freeswing.ident.drive.inverse_dynamics import Regression, inverse_dynamics
 from freeswing.ident.drive.joint import Estimate, Premise, Problem, estimate
+from freeswing.ident.drive.kinematics import Kinematics
 from freeswing.ident.drive.run_problem import head_of
 from freeswing.ident.drive.unknowns import Asked
 
+Array = NDArray[np.float64]
+
 FIRST_HEAD_S = 0.15  # of a run: a cable's swings turn by less than ten radians
-HEAD_STEPS = 8
+HEAD_STEPS = 10
 JUMP = "encoder_jump.after_s"
 
 
@@ -42,33 +46,26 @@ def identify_with_effects(session: DriveSession, progress: Progress) -> DriveIde
     Raises:
         ValueError: when the runs cannot be simulated from where a search begins.
     """
-    model, asked, runs = session.model, session.asked, session.of("identify")
+    model, asked = session.model, session.asked
     published, kinematics = step_1(session)
-    theta, offsets = geometry(session, kinematics)
-    progress("inverse dynamics", 0.05)
-    regression = _regressed(session, theta, offsets)
-    if regression is not None:
-        dynamic = asked.without_effects.dynamic
-        plain = replace(session, asked=asked.without_effects)
-        theta = dynamic.put(model, theta, possible(plain, regression))
-    free = session.zero_pose is None
-    given = Premise(
-        model, theta, runs, session.noise, session.zero_pose, offsets, session.static, free
-    )
-    progress("without the effects", 0.1)
-    first = estimate(given, asked.without_effects, MOST_STEPS)
+    elastic = _swings(session)
+    regression, given = (_elastic_start if elastic else _rigid_start)(session, kinematics)
+    started = given
+    if not elastic or len({_of(name) for name in asked.added}) > 1:
+        progress("without the effects", 0.1)
+        started = _started(session, given, estimate(given, asked.without_effects, MOST_STEPS))
+    search = _followed if elastic else estimate
     progress("joint estimate", 0.4)
-    started = _started(session, given, first)
-    if _swings(session):
-        started = _followed(started, asked, progress)
-    joint = estimate(started, asked)
+    joint = search(started, asked)
     progress("a second start", 0.65)
-    apart = _second_start(started, joint)
+    other = search(_away(started, joint), asked)
+    gaps = np.abs(other.values - joint.values)[joint.determined]
+    apart = float((gaps / joint.std[joint.determined]).max(initial=0.0))
     progress("predictions", 0.9)
-    zero = offsets_of(session, model.declared, offsets)
+    zero = offsets_of(session, model.declared, given.offsets)
     return DriveIdentification(
-        published,
-        kinematics,
+        None if elastic else published,  # static poses of rigid cables say nothing of elastic ones
+        None if elastic else kinematics,
         regression,
         None,
         apart,
@@ -78,7 +75,62 @@ def identify_with_effects(session: DriveSession, progress: Progress) -> DriveIde
     )
 
 
-def _regressed(session: DriveSession, theta, offsets) -> Regression | None:
+def _premise(session: DriveSession, theta: Array, offsets: Array) -> Premise:
+    free, runs = session.zero_pose is None, session.of("identify")
+    static, zero = session.static, session.zero_pose
+    return Premise(session.model, theta, runs, session.noise, zero, offsets, static, free)
+
+
+def _rigid_start(
+    session: DriveSession, kinematics: Kinematics | None
+) -> tuple[Regression | None, Premise]:
+    """Geometry by static poses, the file's other numbers by inverse dynamics where it succeeds."""
+    theta, offsets = geometry(session, kinematics)
+    regression = _regressed(session, theta, offsets)
+    return regression, _premise(session, _put(session, theta, regression), offsets)
+
+
+def _elastic_start(
+    session: DriveSession, kinematics: Kinematics | None
+) -> tuple[Regression | None, Premise]:
+    """Geometry and stretch together by static poses, and the better start of the other numbers.
+
+    Inverse dynamics takes lengths let out for lengths: what it gives may be worse than the file.
+    """
+    offsets = offsets_of(
+        session, session.model.declared, None if kinematics is None else kinematics.offsets_rad
+    )
+    given = _premise(session, session.model.declared, offsets)
+    groups = session.asked.groups
+    dynamic = groups[session.asked.n_kinematic :]
+    stretch = tuple(g for g in dynamic if g.name in session.asked.added and _stretches(g.name))
+    if session.static is not None:
+        at_rest = Asked((*session.asked.kinematic.groups, *stretch), session.asked.n_kinematic)
+        found = estimate(replace(given, runs=()), at_rest)
+        given = replace(given, theta=found.theta, offsets=found.offsets)
+    regression = _regressed(session, given.theta, given.offsets)
+    heads = tuple(head_of(run, FIRST_HEAD_S) for run in given.runs)
+    costs = []
+    starts = [given, replace(given, theta=_put(session, given.theta, regression))]
+    for start in starts:
+        problem = Problem(replace(start, runs=heads), session.asked)
+        try:
+            costs.append(problem.normal(problem.start()).cost)
+        except ValueError:
+            costs.append(np.inf)
+    return None, starts[int(np.argmin(costs))]
+
+
+def _put(session: DriveSession, theta: Array, regression: Regression | None) -> Array:
+    """The numbers with what the regression gives of those that are possible."""
+    if regression is None:
+        return theta
+    plain = session.asked.without_effects
+    values = possible(replace(session, asked=plain), regression)
+    return plain.dynamic.put(session.model, theta, values)
+
+
+def _regressed(session: DriveSession, theta: Array, offsets: Array) -> Regression | None:
     """Inverse dynamics of the file's numbers, None where the angles fit no pose."""
     dynamic, runs = session.asked.without_effects.dynamic, list(session.of("identify"))
     try:
@@ -112,15 +164,18 @@ def _of(name: str) -> str:
     return name.partition(".")[0]
 
 
+def _stretches(name: str) -> bool:
+    """Whether a number is of an effect that makes cables elastic."""
+    return type(driven_catalogue()[_of(name)]).stretch is not Effect.stretch
+
+
 def _swings(session: DriveSession) -> bool:
     """Whether an effect is asked for that makes cables elastic."""
-    asked = {_of(name) for name in session.asked.added}
-    known = driven_catalogue()
-    return any(type(known[name]).stretch is not Effect.stretch for name in asked)
+    return any(_stretches(name) for name in session.asked.added)
 
 
-def _followed(given: Premise, asked: Asked, progress: Progress) -> Premise:
-    """The start that longer and longer heads of the runs lead to.
+def _followed(given: Premise, asked: Asked) -> Estimate:
+    """The estimate to which longer and longer heads of the runs lead.
 
     A cable's own swings tell its stiffness, and of a whole run only within a radian at its end:
     from farther off the search ends in another minimum, where they are a turn apart.
@@ -128,12 +183,11 @@ def _followed(given: Premise, asked: Asked, progress: Progress) -> Premise:
     longest = max(len(run.record.times_s) / run.rate_hz for run in given.runs)
     seconds = FIRST_HEAD_S
     while seconds < longest:
-        progress(f"elastic cables, the first {seconds:g} s", 0.4)
         heads = tuple(head_of(run, seconds) for run in given.runs)
         found = estimate(replace(given, runs=heads), asked, HEAD_STEPS)
         given = replace(given, theta=found.theta, offsets=found.offsets)
         seconds *= 2.0
-    return given
+    return estimate(given, asked)
 
 
 def _untouched(session: DriveSession, name: str) -> bool:
@@ -143,12 +197,10 @@ def _untouched(session: DriveSession, name: str) -> bool:
     return model.declared[place] == model.parameters[place - len(model.numbers.names)].start
 
 
-def _second_start(given: Premise, first: Estimate) -> float:
-    """Largest difference of the minimum that is reached from numbers 5 % off."""
-    asked: Asked = first.asked
+def _away(given: Premise, first: Estimate) -> Premise:
+    """Numbers 5 % off an estimate, up and down in turn; not lengths, which then fit no pose."""
+    asked = first.asked
     signs = np.where(np.arange(len(first.values)) % 2 == 0, SECOND_START, 1.0 / SECOND_START)
-    signs[: asked.n_kinematic] = 1.0  # lengths 5 % off fit no pose
+    signs[: asked.n_kinematic] = 1.0
     away = asked.put(given.model, first.theta, first.values * signs)
-    other = estimate(replace(given, theta=away, offsets=first.offsets), asked)
-    gaps = np.abs(other.values - first.values)[first.determined]
-    return float((gaps / first.std[first.determined]).max(initial=0.0))
+    return replace(given, theta=away, offsets=first.offsets)

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from freeswing.cdpr.driven.behaviour import turns_at_rest
 from freeswing.cdpr.driven.model import DrivenModel
 from freeswing.cdpr.driven.sensitivity import N_POSE
-from freeswing.cdpr.driven.slopes import length_slope, moved, pose_map
-from freeswing.cdpr.model.batch import evaluate
+from freeswing.cdpr.driven.slopes import moved
+from freeswing.ident.drive.at_rest import turns_and_slopes
 from freeswing.ident.drive.kinematics import StaticPoses, zero_turns
 from freeswing.ident.drive.run_problem import (
     DriveRun,
@@ -212,14 +211,14 @@ class Problem:
         n = self.given.model.n_cables
         own = self.n_shared + self.n_start * len(self.given.runs) + 6 * p + np.arange(6)
         pose = moved(static.poses[p], x[own])
-        found = evaluate(length_slope(self.given.model, self.asked.members), pose, theta)
+        currents = static.currents_A[p]
+        turns, *slopes = turns_and_slopes(self.given.model, pose, currents, theta, self.asked)
         weight = 1.0 / static.angle_std_rad
         rows = np.zeros((n + 6, self.n_shared + 6))
         rows[:n, : self.n_shared] = weight * by_zero
-        rows[:n, : self.k] -= weight * (found[2] @ self.asked.spread)
-        rows[:n, self.n_shared :] = -weight * (found[1] @ pose_map(pose))
+        rows[:n, : self.k] -= weight * slopes[1]
+        rows[:n, self.n_shared :] = -weight * slopes[0]
         rows[n:, self.n_shared :] = np.diag(1.0 / static.pose_std)
-        turns = turns_at_rest(self.given.model, pose, static.currents_A[p], theta)
         gaps = weight * (zero - turns - static.angles_rad[p])
         right = np.concatenate([gaps, x[own] / static.pose_std])
         part = Normal(float(right @ right) / 2, rows.T @ right, rows.T @ rows, len(right))

@@ -208,9 +208,7 @@ def _elastic_slopes(
         there = ahead(np.zeros(N_POSE), CURRENT_STEP_A * np.eye(n)[k], motion.theta)
         columns.append((there, CURRENT_STEP_A))
     for group in asked.groups:
-        theta, step = motion.theta.copy(), _step_of(model, motion.theta, group.name)
-        if _gives_way(model, group.name):
-            step = min(step, NUMBER_STEP * float(theta[model.index(group.name)]) or step)
+        theta, step = motion.theta.copy(), step_of(model, motion.theta, group.name)
         for member in group.members:
             theta[model.index(member)] += step
         columns.append((ahead(np.zeros(N_POSE), np.zeros(n), theta), step))
@@ -219,16 +217,18 @@ def _elastic_slopes(
     return np.stack(turns, axis=-1), np.stack(poses, axis=-1)
 
 
-def _step_of(model: DrivenModel, theta: Array, name: str) -> float:
+def step_of(model: DrivenModel, theta: Array, name: str) -> float:
     """By how much a number changes for a difference."""
     place = model.index(name)
     first = len(model.numbers.names)
     if place >= first:
-        return DIFFERENCE * model.parameters[place - first].scale
+        step = DIFFERENCE * model.parameters[place - first].scale
+        own = NUMBER_STEP * abs(float(theta[place]))
+        return min(step, own or step) if gives_way(model, name) else step
     return NUMBER_STEP * abs(float(theta[place])) or NUMBER_STEP
 
 
-def _gives_way(model: DrivenModel, name: str) -> bool:
+def gives_way(model: DrivenModel, name: str) -> bool:
     """Whether a number is of an effect that makes cables elastic.
 
     Those swing a hundred radians a second: a hundredth more stiffness turns a second's end by one,
@@ -249,7 +249,7 @@ def _differences(
 ) -> tuple[Array, Array]:
     """How turns (n_t, n) and poses (n_p, 6) answer to a number beside the rigid equations."""
     model, place = motion.model, motion.model.index(name)
-    theta, step = motion.theta.copy(), _step_of(model, motion.theta, name)
+    theta, step = motion.theta.copy(), step_of(model, motion.theta, name)
     theta[place] += step
     other = motion
     if stretch_of(model, theta) != stretch_of(model, motion.theta):

@@ -5,8 +5,12 @@ import json
 import numpy as np
 import pytest
 
+from freeswing.cdpr.driven.behaviour import turns_at_rest
+from freeswing.cdpr.driven.slopes import moved
 from freeswing.cdpr.effects import driven_catalogue
 from freeswing.ident.drive.added_effects import with_effects
+from freeswing.ident.drive.at_rest import turns_and_slopes
+from freeswing.ident.drive.unknowns import Asked, Group
 from freeswing.main import main
 from freeswing.session.drive_session import read_drive_session
 from tests.ident.drive.made_sessions import TOML, write_flawed
@@ -141,3 +145,40 @@ def test_an_effect_comes_back_with_its_deviation(tmp_path, flaws, label):
             assert abs(entry["value"]) < 4.0 * entry["std"], entry
     assert np.max(list(document["residual"]["times_noise"].values())) < 1.1
     assert document["estimates"]["joint"]["second_start_z"] < 0.1
+
+
+def test_slopes_of_elastic_cables_at_rest_are_their_differences(session):
+    """A static pose tells the stretch: without this slope the joint estimate stalled."""
+    name = "cable_elasticity.mass_over_stiffness_s2_m"
+    enlarged = with_effects(session, ["cable_elasticity"], [(name, 5e-5)]).session
+    model, pose, static = enlarged.model, enlarged.static.poses[3], enlarged.static
+    currents = static.currents_A[3]
+    asked = Asked((Group("arm_m", ("arm_m",)), Group(name, (name,))), 1)
+    turns, by_pose, by_asked = turns_and_slopes(model, pose, currents, model.declared, asked)
+    for k, (number, step) in enumerate((("arm_m", 1e-4), (name, 1e-6))):
+        value = model.declared[model.index(number)]
+        thetas = [model.declared.copy() for _ in range(2)]
+        for theta, sign in zip(thetas, (1.0, -1.0), strict=True):
+            theta[model.index(number)] = value + sign * step
+        ends = [turns_at_rest(model, pose, currents, theta) for theta in thetas]
+        expected = (ends[0] - ends[1]) / (2.0 * step)
+        assert np.allclose(by_asked[:, k], expected, rtol=2e-3, atol=1e-3 * np.abs(expected).max())
+    shift = np.array([0.0, 0.0, 1e-4, 0.0, 0.0, 0.0])
+    ends = [turns_at_rest(model, moved(pose, s * shift), currents, model.declared) for s in (1, -1)]
+    expected = (ends[0] - ends[1]) / 2e-4
+    assert np.allclose(by_pose[:, 2], expected, atol=1e-3 * np.abs(expected).max())
+    assert np.allclose(turns, turns_at_rest(model, pose, currents, model.declared))
+    # A rigid cable is longer by what it pulls as soon as it gives way: from zero too.
+    rigid = turns_and_slopes(model, pose, currents, model.theta({name: 0.0}), asked)
+    assert np.abs(rigid[2][:, 1]).min() > 0.0
+
+
+@pytest.mark.slow
+def test_elastic_cables_come_back_to_the_noise(tmp_path):
+    """From the file's rigid robot; swings of 250 rad/s, a thousandth of EA is a turn's 50th."""
+    name, truth = "cable_elasticity.mass_over_stiffness_s2_m", 5.78e-5
+    folder = write_flawed(tmp_path, 60, 1.2, {name: truth})
+    document, found = estimated(folder, "--effect", "cable_elasticity")
+    holds(found[name], truth)
+    assert np.max(list(document["residual"]["times_noise"].values())) < 1.1
+    assert document["estimates"]["joint"]["second_start_z"] < 1.0
