@@ -152,6 +152,7 @@ def _slack(session: DriveSession, fit: RunFit) -> dict[str, Any]:
         "samples": int(fit.motion.slack.any(axis=1).sum()),
         "cables": [cables[k].name for k in np.flatnonzero(fit.slack)],
         "least_tension_N": float(fit.motion.tensions_N.min()),
+        "in_model": fit.motion.lengths_out_m is not None,
     }
 
 

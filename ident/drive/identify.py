@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from freeswing.cdpr.driven.behaviour import stretch_of
 from freeswing.cdpr.driven.model import DrivenModel
 from freeswing.cdpr.driven.motion import DrivenMotion
 from freeswing.cdpr.driven.sensitivity import N_POSE
@@ -35,6 +36,7 @@ Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
 
 HEAD_S = 0.3  # of a run: what a wrong start does is largest there
+ELASTIC_STEPS = 4  # of Gauss and Newton; millimetres of stretch become micrometres in three
 NOTHING = Asked((), 0)
 SECOND_START = 1.05  # by which every number is off there, up and down in turn
 
@@ -230,17 +232,25 @@ def predict(session: DriveSession, run: DriveRun, theta: Array, zero: Array) -> 
 
 
 def _start(session: DriveSession, run: DriveRun, theta: Array, zero: Array) -> tuple[Array, Array]:
-    """Pose and currents at the start, by the first angles and one step of least squares."""
+    """Pose and currents at the start, by the first angles and one step of least squares.
+
+    Elastic cables start some steps farther off, for the first angles tell lengths let out.
+    """
     model, short = session.model, head_of(run, HEAD_S)
-    pose = start_pose(model, theta, run, zero)
-    seen = compared(short, simulated(model, theta, short, pose), zero, session.noise, NOTHING)
+    pose, flowing = start_pose(model, theta, run, zero), run.record.currents_A[0]
     n_start = N_POSE + model.n_cables
-    columns = np.vstack([part.reshape(-1, n_start) for part in seen.slopes])
-    gaps = np.concatenate([seen.angles.reshape(-1), seen.poses.reshape(-1)])
-    known = np.zeros(n_start)
+    known, more = np.zeros(n_start), np.zeros(model.n_cables)
     known[N_POSE:] = session.noise.current_std_A**-2.0
-    shift = -np.linalg.solve(columns.T @ columns + np.diag(known), columns.T @ gaps)
-    return moved(pose, shift[:N_POSE]), run.record.currents_A[0] + shift[N_POSE:]
+    for _ in range(1 if stretch_of(model, theta) is None else ELASTIC_STEPS):
+        motion = simulated(model, theta, short, pose, flowing + more)
+        seen = compared(short, motion, zero, session.noise, NOTHING)
+        columns = np.vstack([part.reshape(-1, n_start) for part in seen.slopes])
+        gaps = np.concatenate([seen.angles.reshape(-1), seen.poses.reshape(-1)])
+        gradient = columns.T @ gaps
+        gradient[N_POSE:] += known[N_POSE:] * more
+        shift = -np.linalg.solve(columns.T @ columns + np.diag(known), gradient)
+        pose, more = moved(pose, shift[:N_POSE]), more + shift[N_POSE:]
+    return pose, flowing + more
 
 
 def predicted_as_declared(session: DriveSession, run: DriveRun, zero: Array) -> RunFit | None:
