@@ -143,7 +143,9 @@ def test_an_effect_comes_back_with_its_deviation(tmp_path, flaws, label):
     for entry in absent:
         if entry["name"] not in flaws and entry["value"] is not None:
             assert abs(entry["value"]) < 4.0 * entry["std"], entry
-    assert np.max(list(document["residual"]["times_noise"].values())) < 1.1
+    times = document["residual"]["times_noise"]
+    assert times["ident"] < 1.1
+    assert times["check"] < 1.5  # what the command takes for a right model
     assert document["estimates"]["joint"]["second_start_z"] < 0.1
 
 
