@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from freeswing.cdpr.effects import Effect, driven_catalogue
+from freeswing.cdpr.effects import driven_catalogue
 from freeswing.ident.drive.diagnose.candidates import weighs
 from freeswing.ident.drive.diagnose.refit import MOST_STEPS, weighted
 from freeswing.ident.drive.diagnose.screen import jump_start
+from freeswing.ident.drive.elastic_search import best_start, followed, known_at_rest, stretches
 from freeswing.ident.drive.identify import (
     SECOND_START,
     DriveIdentification,
@@ -26,13 +27,9 @@ from freeswing.ident.drive.identify import (
 from freeswing.ident.drive.inverse_dynamics import Regression, inverse_dynamics
 from freeswing.ident.drive.joint import Estimate, Premise, Problem, estimate
 from freeswing.ident.drive.kinematics import Kinematics
-from freeswing.ident.drive.run_problem import head_of
-from freeswing.ident.drive.unknowns import Asked
 
 Array = NDArray[np.float64]
 
-FIRST_HEAD_S = 0.15  # of a run: a cable's swings turn by less than ten radians
-HEAD_STEPS = 10
 JUMP = "encoder_jump.after_s"
 
 
@@ -54,7 +51,7 @@ def identify_with_effects(session: DriveSession, progress: Progress) -> DriveIde
     if not elastic or len({_of(name) for name in asked.added}) > 1:
         progress("without the effects", 0.1)
         started = _started(session, given, estimate(given, asked.without_effects, MOST_STEPS))
-    search = _followed if elastic else estimate
+    search = followed if elastic else estimate
     progress("joint estimate", 0.4)
     joint = search(started, asked)
     progress("a second start", 0.65)
@@ -97,28 +94,12 @@ def _elastic_start(
 
     Inverse dynamics takes lengths let out for lengths: what it gives may be worse than the file.
     """
-    offsets = offsets_of(
-        session, session.model.declared, None if kinematics is None else kinematics.offsets_rad
-    )
-    given = _premise(session, session.model.declared, offsets)
-    groups = session.asked.groups
-    dynamic = groups[session.asked.n_kinematic :]
-    stretch = tuple(g for g in dynamic if g.name in session.asked.added and _stretches(g.name))
-    if session.static is not None:
-        at_rest = Asked((*session.asked.kinematic.groups, *stretch), session.asked.n_kinematic)
-        found = estimate(replace(given, runs=()), at_rest)
-        given = replace(given, theta=found.theta, offsets=found.offsets)
+    fallback = None if kinematics is None else kinematics.offsets_rad
+    offsets = offsets_of(session, session.model.declared, fallback)
+    given = known_at_rest(_premise(session, session.model.declared, offsets), session.asked)
     regression = _regressed(session, given.theta, given.offsets)
-    heads = tuple(head_of(run, FIRST_HEAD_S) for run in given.runs)
-    costs = []
-    starts = [given, replace(given, theta=_put(session, given.theta, regression))]
-    for start in starts:
-        problem = Problem(replace(start, runs=heads), session.asked)
-        try:
-            costs.append(problem.normal(problem.start()).cost)
-        except ValueError:
-            costs.append(np.inf)
-    return None, starts[int(np.argmin(costs))]
+    starts = (given.theta, _put(session, given.theta, regression))
+    return None, best_start(given, session.asked, starts)
 
 
 def _put(session: DriveSession, theta: Array, regression: Regression | None) -> Array:
@@ -164,30 +145,9 @@ def _of(name: str) -> str:
     return name.partition(".")[0]
 
 
-def _stretches(name: str) -> bool:
-    """Whether a number is of an effect that makes cables elastic."""
-    return type(driven_catalogue()[_of(name)]).stretch is not Effect.stretch
-
-
 def _swings(session: DriveSession) -> bool:
     """Whether an effect is asked for that makes cables elastic."""
-    return any(_stretches(name) for name in session.asked.added)
-
-
-def _followed(given: Premise, asked: Asked) -> Estimate:
-    """The estimate to which longer and longer heads of the runs lead.
-
-    A cable's own swings tell its stiffness, and of a whole run only within a radian at its end:
-    from farther off the search ends in another minimum, where they are a turn apart.
-    """
-    longest = max(len(run.record.times_s) / run.rate_hz for run in given.runs)
-    seconds = FIRST_HEAD_S
-    while seconds < longest:
-        heads = tuple(head_of(run, seconds) for run in given.runs)
-        found = estimate(replace(given, runs=heads), asked, HEAD_STEPS)
-        given = replace(given, theta=found.theta, offsets=found.offsets)
-        seconds *= 2.0
-    return estimate(given, asked)
+    return any(stretches(name) for name in session.asked.added)
 
 
 def _untouched(session: DriveSession, name: str) -> bool:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from freeswing.cdpr.driven.model import DrivenModel
 from freeswing.ident.drive.diagnose.candidates import CENTRE, Candidate
 from freeswing.ident.drive.diagnose.screen import Screened, grown
+from freeswing.ident.drive.elastic_search import best_start, followed, known_at_rest, stretches
 from freeswing.ident.drive.identify import DriveSession, RunFit, predict
 from freeswing.ident.drive.joint import Estimate, Premise, Problem, estimate
 from freeswing.ident.drive.unknowns import Asked, Group
@@ -106,11 +107,30 @@ def _held_out(session: DriveSession, model: DrivenModel, found: Estimate) -> Hel
 
 def settled(session: DriveSession, fit: Fitted) -> Fitted:
     """The same fit, gone on with where it was stopped before it had converged."""
+    if fit.candidate is not None and stretches(fit.candidate.effect):
+        return _followed(session, fit)
     if fit.found.found.iterations < MOST_STEPS:
         return fit
     found = fit.found
     given = replace(fit.given, theta=found.theta, offsets=found.offsets)
     again = estimate(given, found.asked, MORE_STEPS)
+    return Fitted(fit.candidate, given, again, _held_out(session, given.model, again))
+
+
+def _followed(session: DriveSession, fit: Fitted) -> Fitted:
+    """Elastic cables fitted from static poses and the runs' heads on, where that is better."""
+    given, asked, found = fit.given, fit.found.asked, fit.found
+    declared = asked.put(given.model, found.theta, asked.read(given.model, given.model.declared))
+    rest = known_at_rest(replace(given, theta=declared), asked)
+    kinematic = asked.kinematic.read(given.model, rest.theta)
+    fitted_theta = asked.kinematic.put(given.model, found.theta, kinematic)
+    for name in asked.members:
+        if stretches(name):
+            fitted_theta[given.model.index(name)] = rest.theta[given.model.index(name)]
+    started = best_start(rest, asked, (rest.theta, fitted_theta))
+    again = followed(started, asked)
+    if again.found.normal.cost >= found.found.normal.cost:
+        return fit
     return Fitted(fit.candidate, given, again, _held_out(session, given.model, again))
 
 

@@ -122,3 +122,16 @@ def test_nothing_is_found_where_nothing_is(tmp_path, seed):
     assert document["accepted"] == []
     assert not document["unexplained"]["present"]
     assert np.isclose(document["before"]["motor_rmse_rad"], document["after"]["motor_rmse_rad"])
+
+
+@pytest.mark.slow
+def test_elastic_cables_are_found(tmp_path):
+    name, truth = "cable_elasticity.mass_over_stiffness_s2_m", 5.78e-5
+    document = diagnosed(
+        write_flawed(tmp_path, 60, 1.2, {name: truth}), "--only", "cable_elasticity"
+    )
+    value, std = value_of(document, name)
+    assert abs(value - truth) < max(3.0 * std, 1e-3 * truth), (value, std)
+    assert not document["unexplained"]["present"]
+    after = document["after"]
+    assert after["motor_rmse_rad"] < 1.2 * after["motor_noise_rad"], after
