@@ -108,7 +108,7 @@ def best_ml_estimate(
     """
     entry, found = _from_starts(model, runs, free, starts, dropped, progress, asked)
     shares = unexplained_motion(found)
-    lawless = is_lawless(shares, refuted=entry.consistency.is_refuted)
+    lawless = is_lawless(shares, refuted=_is_refuted(entry, found))
     if not lawless.any():
         return entry, found
     if lawless.all():
@@ -149,12 +149,21 @@ def _from_starts(
         except (ValueError, np.linalg.LinAlgError) as error:
             failure = failure or error
             continue
-        if not entry.consistency.is_refuted and astray(result) < _ASTRAY:
+        if not _is_refuted(entry, result) and astray(result) < _ASTRAY:
             return entry, result
         found.append((entry, result))
     if not found:
         raise ValueError(str(failure)) from failure
     return min(found, key=lambda pair: pair[1].deviance)
+
+
+def _is_refuted(entry: Estimate, found: LikelihoodFit) -> bool:
+    """Whether no body has the inertia that a fit needs, by the fit's own deviations.
+
+    A run that follows no law puts the runs apart: the deviations between them would excuse it.
+    """
+    own = found.covariance_of(INERTIA)
+    return consistency(found.inertia, own, entry.held_cost).is_refuted
 
 
 def astray(found: LikelihoodFit) -> float:

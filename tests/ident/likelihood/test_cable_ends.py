@@ -71,11 +71,14 @@ def z_scores(found: Estimate) -> np.ndarray:
 
 @pytest.mark.slow
 def test_deviations_are_honest_where_the_geometry_is_let_free():
-    """Taken as exact, a millimetre makes errors that the printed deviations do not hold."""
+    """Taken as exact, a millimetre makes errors that the printed deviations do not hold.
+
+    Nor those that runs say apart: all swings share the same wrong ends.
+    """
     exact = z_scores(identified(GeometryPriors()).estimates["ml_full"])
     free = z_scores(identified(GeometryPriors(STD_M, STD_M)).estimates["ml_full"])
     assert np.abs(free).max() < 3.5, f"geometry free: z-scores {np.round(free, 1)}"
-    assert np.abs(exact).max() > 5.0, f"geometry exact: z-scores {np.round(exact, 1)}"
+    assert np.abs(exact).max() > 4.0, f"geometry exact: z-scores {np.round(exact, 1)}"
 
 
 @pytest.mark.slow

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from collections.abc import Callable, Iterable
 from dataclasses import replace
@@ -83,8 +84,8 @@ def without_clocks(cameras: tuple[Camera, ...]) -> list[Camera]:
 
 def without_base_tags(text: str) -> str:
     """The session's text without surveyed tags."""
-    parts = text.split("[[")
-    return "[[".join(part for part in parts if not part.startswith("calibration.base_tags"))
+    tables = re.split(r"^(?=\[)", text, flags=re.MULTILINE)
+    return "".join(one for one in tables if not one.startswith("[[calibration.base_tags"))
 
 
 def track(folder: Path, *more: str) -> int:
