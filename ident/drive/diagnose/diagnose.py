@@ -10,6 +10,7 @@ import numpy as np
 from freeswing.ident.drive.diagnose.candidates import Candidate, candidates
 from freeswing.ident.drive.diagnose.refit import Fitted, fitted, settled, with_candidate
 from freeswing.ident.drive.diagnose.screen import Screened, jump_start, screen
+from freeswing.ident.drive.elastic_search import stretches
 from freeswing.ident.drive.identify import (
     DriveSession,
     Progress,
@@ -138,7 +139,7 @@ def _climb(search: _Search, only: Collection[str] | None) -> bool:
     problem.normal(_point(problem, base))
     starts = jump_start(problem.seen, ("encoder_jump.after_s",))
     chosen = candidates(base.given.model, base.found.asked, only)
-    told = screen(base.given, base.found, chosen, starts)
+    told = _screened(search, base, chosen, starts)
     worth = _worth(search, base, told)
     tried = []
     for one in worth[:REFITTED]:
@@ -170,6 +171,22 @@ def _climb(search: _Search, only: Collection[str] | None) -> bool:
     search.ladder.append(best)
     search.leads.append(min((fit.times_noise for fit in others), default=np.inf))
     return True
+
+
+def _screened(
+    search: _Search, base: Fitted, chosen: tuple[Candidate, ...], starts: dict[str, float]
+) -> tuple[Screened, ...]:
+    """All candidates about the base; elastic cables are left out where they are too stiff."""
+    try:
+        return screen(base.given, base.found, chosen, starts)
+    except ValueError as error:
+        stiff = [one for one in chosen if stretches(one.effect)]
+        if not stiff:
+            raise
+        for one in stiff:
+            search.say(one, "rejected", f"cannot be followed: {error}")
+        rest = tuple(one for one in chosen if one not in stiff)
+        return screen(base.given, base.found, rest, starts)
 
 
 def _point(problem: Problem, base: Fitted) -> np.ndarray:

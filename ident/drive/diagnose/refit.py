@@ -118,8 +118,21 @@ def settled(session: DriveSession, fit: Fitted) -> Fitted:
 
 
 def _followed(session: DriveSession, fit: Fitted) -> Fitted:
-    """Elastic cables fitted from static poses and the runs' heads on, where that is better."""
-    given, asked, found = fit.given, fit.found.asked, fit.found
+    """Elastic cables fitted from static poses and the runs' heads on, where that is better.
+
+    Static poses may ask for cables too stiff to be simulated: then the fit stays what it was.
+    """
+    try:
+        again = _from_rest(fit.given, fit.found)
+    except ValueError:
+        return fit
+    if again.found.normal.cost >= fit.found.found.normal.cost:
+        return fit
+    return Fitted(fit.candidate, fit.given, again, _held_out(session, fit.given.model, again))
+
+
+def _from_rest(given: Premise, found: Estimate) -> Estimate:
+    asked = found.asked
     declared = asked.put(given.model, found.theta, asked.read(given.model, given.model.declared))
     rest = known_at_rest(replace(given, theta=declared), asked)
     kinematic = asked.kinematic.read(given.model, rest.theta)
@@ -128,10 +141,7 @@ def _followed(session: DriveSession, fit: Fitted) -> Fitted:
         if stretches(name):
             fitted_theta[given.model.index(name)] = rest.theta[given.model.index(name)]
     started = best_start(rest, asked, (rest.theta, fitted_theta))
-    again = followed(started, asked)
-    if again.found.normal.cost >= found.found.normal.cost:
-        return fit
-    return Fitted(fit.candidate, given, again, _held_out(session, given.model, again))
+    return followed(started, asked)
 
 
 def with_candidate(

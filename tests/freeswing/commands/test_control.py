@@ -138,7 +138,7 @@ def test_a_driven_robots_report_shows_controllers_runs_and_pictures(designed, tm
         assert text in page, text
     (results / "servo.json").write_text("{}")
     assert main(["report", str(INCA), "--results", str(results)]) == 2
-    assert "not a result of format freeswing-servo/1" in capsys.readouterr().err
+    assert "must be 'freeswing-servo/1'; delete it and run again" in capsys.readouterr().err
     empty = tmp_path / "empty"
     empty.mkdir()
     assert main(["report", str(INCA), "--results", str(empty)]) == 2
