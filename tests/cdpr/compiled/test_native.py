@@ -69,6 +69,7 @@ def test_every_operation_is_the_interpreters(lanes):
         assert np.array_equal(found, expected, equal_nan=True), first
 
 
+@pytest.mark.slow
 def test_code_that_is_given_up_leaves_the_rest_alone():
     x = ca.SX.sym("x")
     kept = native(ca.Function("kept", [x], [ca.sin(x)]))
