@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from freeswing.cdpr.files.documents import InputError
-from freeswing.report.figures import INK, MARKS, SERIES, figure_style
+from freeswing.report.figures import INK, MARKS, SERIES, figure_style, interval_axes
 from freeswing.report.words import HALF_WIDTH_95, plain, unit_of
 from freeswing.results.comparison import NOTABLE_Z, Comparison, Row
 
@@ -60,12 +60,7 @@ def _draw(axes: Axes, row: Row) -> None:
     worst = max((abs(z) for z in row.z if z is not None), default=0.0)
     if worst > NOTABLE_Z:
         axes.set_title(f"z = {worst:.1f}", fontsize=8, loc="right", color=INK)
-    axes.set_yticks([])
-    axes.margins(y=0.3)
-    axes.locator_params(axis="x", nbins=4)
-    axes.ticklabel_format(axis="x", useOffset=False)
-    axes.set_xlabel(f"{plain(stem)} ({unit})")
-    axes.spines["left"].set_visible(False)
+    interval_axes(axes, f"{plain(stem)} ({unit})")
 
 
 def _mark(k: int) -> str:

@@ -113,6 +113,16 @@ def thin(values: np.ndarray, limit: int = MAX_POINTS) -> np.ndarray:
     return values[::step]
 
 
+def interval_axes(axes: Axes, label: str) -> None:
+    """Axes of intervals one below the other: a few plain numbers along x, nothing along y."""
+    axes.set_yticks([])
+    axes.margins(y=0.3)
+    axes.locator_params(axis="x", nbins=4)
+    axes.ticklabel_format(axis="x", useOffset=False)
+    axes.set_xlabel(label)
+    axes.spines["left"].set_visible(False)
+
+
 def plain_log_axes(axes: Axes) -> None:
     """Decades as plain numbers, few of them."""
     for axis in (axes.xaxis, axes.yaxis):

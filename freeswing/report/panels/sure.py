@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from freeswing.cdpr.robot import INERTIA_NAMES, Array
-from freeswing.report.figures import INK, MARKS, SERIES, Draw, figures, key
+from freeswing.report.figures import INK, MARKS, SERIES, Draw, figures, interval_axes, key
 from freeswing.report.material import Material
 from freeswing.report.words import ESTIMATES, HALF_WIDTH_95, number, plain, unit_of
 from freeswing.results.common import Parameter
@@ -188,9 +188,4 @@ def draw_interval(axes: Axes, name: str, points: list[tuple[int, Parameter]]) ->
         axes.errorbar(
             scale * entry.value, -kind, xerr=half, fmt=mark, ms=size, capsize=3, color=colour
         )
-    axes.set_yticks([])
-    axes.margins(y=0.3)
-    axes.locator_params(axis="x", nbins=4)
-    axes.ticklabel_format(axis="x", useOffset=False)
-    axes.set_xlabel(f"{plain(stem)} ({unit})")
-    axes.spines["left"].set_visible(False)
+    interval_axes(axes, f"{plain(stem)} ({unit})")

@@ -13,7 +13,6 @@ import multiprocessing
 import os
 import random
 import resource
-import shutil
 import signal
 import sys
 import tempfile
@@ -97,16 +96,11 @@ def one_kind(case: Case, count: int, seed: int, pipe: Any) -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name) / "files"
         for k in range(count + 1):
-            shutil.rmtree(folder, ignore_errors=True)
-            folder.mkdir()
-            for other in case.beside:
-                shutil.copy(other, folder / other.name)
-            data = vandalised(case.data, chance) if k else case.data
-            (folder / case.name).write_bytes(data)
+            path = case.laid(folder, vandalised(case.data, chance) if k else case.data)
             begun = time.perf_counter()
             signal.alarm(LONGEST_S)
             try:
-                case.read(folder / case.name)
+                case.read(path)
                 read += 1
             except (InputError, DataError) as error:
                 refused += 1

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import random
-import shutil
 from pathlib import Path
 
 import pytest
@@ -28,14 +27,9 @@ def test_some_files_of_each_further_kind(tmp_path: Path) -> None:
             continue
         chance = random.Random(name)
         for k in range(FILES_A_KIND + 1):
-            shutil.rmtree(folder, ignore_errors=True)
-            folder.mkdir()
-            for other in case.beside:
-                shutil.copy(other, folder / other.name)
-            data = vandalised(case.data, chance) if k else case.data
-            (folder / case.name).write_bytes(data)
+            path = case.laid(folder, vandalised(case.data, chance) if k else case.data)
             try:
-                case.read(folder / case.name)
+                case.read(path)
             except (InputError, DataError) as error:
                 if k == 0:
                     wrong[name] = f"the whole file is refused: {error}"

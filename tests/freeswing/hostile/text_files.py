@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -49,6 +50,15 @@ class Case:
     data: bytes
     read: Callable[[Path], Any]
     beside: tuple[Path, ...] = ()
+
+    def laid(self, folder: Path, data: bytes) -> Path:
+        """The file with these bytes in a folder made anew, with what stands beside it."""
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir()
+        for other in self.beside:
+            shutil.copy(other, folder / other.name)
+        (folder / self.name).write_bytes(data)
+        return folder / self.name
 
 
 def cameras(count: int = 2) -> tuple[Camera, ...]:
