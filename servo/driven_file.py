@@ -6,7 +6,7 @@ from pathlib import Path
 
 from freeswing.cdpr.driven.model import DrivenModel, build_driven
 from freeswing.cdpr.files.problems import InputError
-from freeswing.cdpr.files.robot_file import read_robot
+from freeswing.cdpr.files.robot_file import read_robot, robot_path
 
 
 def read_driven(path: Path | str) -> tuple[Path, DrivenModel]:
@@ -15,9 +15,7 @@ def read_driven(path: Path | str) -> tuple[Path, DrivenModel]:
     Raises:
         InputError: unreadable, or not a driven robot of six cables and more.
     """
-    path = Path(path)
-    if path.is_dir():
-        path = path / "robot.toml"
+    path = robot_path(path)
     robot = read_robot(path)
     try:
         return path, build_driven(robot)

@@ -39,6 +39,12 @@ SWIVEL_KEYS = ("swivel_x", "swivel_y", "swivel_z")
 INERTIA_TOLERANCE = 1e-9
 
 
+def robot_path(path: Path | str) -> Path:
+    """The file that is meant: `path`, or robot.toml in it where it is a folder."""
+    path = Path(path)
+    return path / "robot.toml" if path.is_dir() else path
+
+
 def read_robot(path: Path | str) -> Robot:
     """Read robot.toml; a mesh named in it is read too, from the file's folder or below.
 

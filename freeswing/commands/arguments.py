@@ -22,6 +22,19 @@ def add_session(parser: ArgumentParser) -> None:
     add_results(parser, "SESSION/results")
 
 
+def add_robot(parser: ArgumentParser, needs: str = "") -> None:
+    """The robot's file, or the folder that holds it, and what must stand in it."""
+    parser.add_argument(
+        "robot", metavar="ROBOT", type=_robot, help=f"robot.toml{needs}, or its folder"
+    )
+
+
+def _robot(text: str) -> Path:
+    from freeswing.cdpr.files.robot_file import robot_path
+
+    return robot_path(text)
+
+
 def add_results(parser: ArgumentParser, usual: str) -> None:
     """Where results go."""
     text = f"write everything to DIR instead of {usual} (for read-only folders)"

@@ -6,7 +6,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from freeswing.commands.arguments import add_results, finite
+from freeswing.commands.arguments import add_results, add_robot, finite
 from freeswing.console import Console
 
 if TYPE_CHECKING:
@@ -20,9 +20,7 @@ METHODS = ("hinf", "hinf-fastest", "lqg", "pid", "joint-pid", "mpc", "all")
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Robot, weights, method, where, how large."""
-    parser.add_argument(
-        "robot", metavar="ROBOT", help="robot.toml of a driven robot, or its folder"
-    )
+    add_robot(parser, " of a driven robot")
     parser.add_argument(
         "--weights", metavar="FILE", help="weights.toml; without it the paper's, as corrected"
     )

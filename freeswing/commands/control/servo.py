@@ -7,7 +7,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from freeswing.commands.arguments import add_results
+from freeswing.commands.arguments import add_results, add_robot
 from freeswing.console import Console
 
 if TYPE_CHECKING:
@@ -19,9 +19,7 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Robot, task, controllers, what is switched on."""
-    parser.add_argument(
-        "robot", metavar="ROBOT", help="robot.toml of a driven robot, or its folder"
-    )
+    add_robot(parser, " of a driven robot")
     parser.add_argument("--task", required=True, metavar="FILE", help="task.toml")
     parser.add_argument(
         "--controller",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING
 
-from freeswing.commands.arguments import add_results, finite
+from freeswing.commands.arguments import add_results, add_robot, finite
 from freeswing.console import Console
 
 if TYPE_CHECKING:
@@ -17,9 +17,7 @@ METHODS = ("nearest", "barycentre", "paper", "closed-form", "qp")
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Robot, wrenches, method."""
-    parser.add_argument(
-        "robot", metavar="ROBOT", help="robot.toml of a driven robot, or its folder"
-    )
+    add_robot(parser, " of a driven robot")
     parser.add_argument(
         "wrenches", metavar="WRENCHES", help="CSV, a pose and a wrench a row (docs/formats.md)"
     )

@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
-from pathlib import Path
 
-from freeswing.commands.arguments import add_results, finite, positive, positive_whole, whole
+from freeswing.commands.arguments import (
+    add_results,
+    add_robot,
+    finite,
+    positive,
+    positive_whole,
+    whole,
+)
 from freeswing.console import Console
 
 
 def add_arguments(parser: ArgumentParser) -> None:
     """The robot and the limits."""
-    parser.add_argument("robot", metavar="ROBOT", help="robot.toml with nominal inertia and mass")
+    add_robot(parser, " with nominal inertia and mass")
     add_results(parser, "ROBOT's folder/results")
     parser.add_argument("--swings", type=positive_whole, default=12, metavar="N", help="default 12")
     parser.add_argument(
@@ -53,7 +59,7 @@ def run(options: Namespace, console: Console) -> None:
     from freeswing.results.planning import Excitation
     from freeswing.session.made import Made, write_made
 
-    path = Path(options.robot)
+    path = options.robot
     limits = SwingLimits(tension_N=tuple(options.tension_n), reach_m=options.reach_m)
     asked = ExcitationOptions(
         n_swings=options.swings,

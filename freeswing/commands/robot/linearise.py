@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from freeswing.commands.arguments import add_results, finite
+from freeswing.commands.arguments import add_results, add_robot, finite
 from freeswing.console import Console
 
 if TYPE_CHECKING:
@@ -20,7 +19,7 @@ N_RATES = 400
 
 def add_arguments(parser: ArgumentParser) -> None:
     """The robot and the pose."""
-    parser.add_argument("robot", metavar="ROBOT", help="robot.toml with [drive]")
+    add_robot(parser, " with [drive]")
     parser.add_argument(
         "--at",
         type=finite,
@@ -51,7 +50,7 @@ def run(options: Namespace, console: Console) -> None:
     from freeswing.printing.curves import log_log_svg
     from freeswing.results.linear import linear_document, linear_panels
 
-    path = Path(options.robot)
+    path = options.robot
     robot = read_robot(path)
     if robot.drive is None:
         raise InputError(f"{path}: has no [drive]: only a driven robot has this linear model")

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from freeswing.commands.arguments import not_negative, positive, setting, whole
+from freeswing.commands.arguments import add_robot, not_negative, positive, setting, whole
 from freeswing.commands.robot.simulate_drive import add_drive_arguments, run_drive
 from freeswing.console import Console
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Robot, lengths, release, effects, sampling."""
-    parser.add_argument("robot", metavar="ROBOT", help="robot.toml with nominal inertia")
+    add_robot(parser, " with nominal inertia")
     parser.add_argument("result", metavar="TO", help="trajectory to write, .csv or .tum")
     parser.add_argument(
         "--lengths-m", type=_numbers, metavar="L1,L2,..", help="cable lengths of a free swing"

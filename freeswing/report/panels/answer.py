@@ -103,7 +103,12 @@ def verdict(diagnosis: Diagnosis | None) -> list[str]:
     sentences = []
     if accepted:
         sentences.append(f"The model lacked: {', '.join(accepted)}.")
+    told: set[frozenset[str]] = set()
     for one in confounded:
+        group = frozenset((one.effect, *one.confounded_with))
+        if group in told:
+            continue
+        told.add(group)
         rivals = ", ".join(plain(name) for name in one.confounded_with) or "others"
         sentences.append(f"These data cannot tell {plain(one.effect)} from {rivals}.")
     unexplained = diagnosis.unexplained

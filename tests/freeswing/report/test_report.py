@@ -14,7 +14,9 @@ import pytest
 
 from freeswing.report.material import FILES, RESULTS, Material
 from freeswing.report.page import PANELS, render_page
+from freeswing.report.panels.answer import verdict
 from freeswing.report.space import enlargement
+from freeswing.results.diagnosis import Candidate, Diagnosis
 from tests.freeswing.report.report_material import whole_material
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
@@ -260,3 +262,14 @@ def test_what_each_run_loses_stands_beside_what_the_models_lose(page: str) -> No
     assert "How the swings die away" in page
     row = page[page.index(">swing-7</td>") :]
     assert row.index(">30</td>") < row.index(">0.0</td>")
+
+
+def test_effects_that_replace_each_other_are_told_of_once() -> None:
+    rivals = [("quadratic_drag", "translational_drag"), ("translational_drag", "quadratic_drag")]
+    candidates = tuple(
+        Candidate(effect=one, verdict="confounded", confounded_with=(other,))
+        for one, other in (*rivals, ("gravity_tilt", "anchor_offset"))
+    )
+    said = verdict(Diagnosis(candidates=candidates))
+    assert len(said) == 2
+    assert all(said[0].count(name) == 1 for name in ("quadratic drag", "translational drag"))
