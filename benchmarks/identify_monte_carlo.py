@@ -27,9 +27,9 @@ from freeswing.cdpr.model.regressor import regressor
 from freeswing.cdpr.robot import INERTIA_NAMES, Array
 from freeswing.cdpr.simulation.free_swing import Motion
 from freeswing.ident.fidim.fidim import fidim
+from freeswing.ident.likelihood.fit_swings import fit
 from freeswing.ident.likelihood.guess_run_start import first_state
 from freeswing.ident.likelihood.joint_problem import State
-from freeswing.ident.likelihood.likelihood import fit
 from freeswing.ident.likelihood.raw_samples import prepare
 from freeswing.ident.runs import SwingRun
 from freeswing.ident.signals.derivatives import SignalSettings

@@ -20,7 +20,7 @@ from freeswing.ident.judge.validate import ValidatedRun, validate_run
 from freeswing.ident.likelihood.cable_ends import GeometryPriors, corrected
 from freeswing.ident.likelihood.calibration_modes import freed
 from freeswing.ident.likelihood.inertia_starts import likelihood_starts
-from freeswing.ident.likelihood.maximum_likelihood import Asked, best_ml_estimate
+from freeswing.ident.likelihood.session_estimates import Asked, best_ml_estimate
 from freeswing.ident.runs import SwingRun
 from freeswing.ident.signals.derivatives import SignalSettings
 from freeswing.ident.signals.prepare import (

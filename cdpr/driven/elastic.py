@@ -29,7 +29,7 @@ from freeswing.cdpr.driven.scene import scene
 from freeswing.cdpr.driven.slopes import moved
 from freeswing.cdpr.driven.statics import static_pose
 from freeswing.cdpr.model.batch import evaluate
-from freeswing.cdpr.model.factors import Factors
+from freeswing.cdpr.model.ldl_factors import Factors
 
 Array = NDArray[np.float64]
 Function = Any

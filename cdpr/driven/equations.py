@@ -15,7 +15,7 @@ import casadi as ca
 
 from freeswing.cdpr.driven.parameters import MotorTerms, Terms
 from freeswing.cdpr.model.body import symmetric
-from freeswing.cdpr.model.factors import Factors
+from freeswing.cdpr.model.ldl_factors import Factors
 from freeswing.cdpr.model.pulley import CableState, cable_state
 
 Expression = Any

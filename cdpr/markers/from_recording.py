@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from freeswing.cdpr.files.problems import InputError
-from freeswing.cdpr.markers.session import fit_session
+from freeswing.cdpr.markers.session_markers import fit_session
 from freeswing.cdpr.measured.marker_recording import MarkerRecording, marker_position
 from freeswing.cdpr.measured.rigid_fit import FEWEST_POINTS, is_planar_or_better
 from freeswing.cdpr.measured.target import Marker, Target

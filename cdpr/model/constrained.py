@@ -14,7 +14,7 @@ import casadi as ca
 
 from freeswing.cdpr.effects import Effect, Instant
 from freeswing.cdpr.model.body import Expression, Spin, along, symmetric
-from freeswing.cdpr.model.factors import Factors
+from freeswing.cdpr.model.ldl_factors import Factors
 from freeswing.cdpr.model.pulley import Geometry
 from freeswing.cdpr.robot import Robot
 

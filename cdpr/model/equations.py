@@ -30,7 +30,7 @@ from freeswing.cdpr.model.constrained import (
     total_inertia,
 )
 from freeswing.cdpr.model.pulley import CableState, Geometry, cable_state
-from freeswing.cdpr.model.refused import Refused
+from freeswing.cdpr.model.refused_function import Refused
 from freeswing.cdpr.robot import Array, Robot
 
 Function = Any  # casadi.Function

@@ -8,7 +8,13 @@ from freeswing.cdpr.files.problems import DataError, InputError
 from freeswing.cdpr.files.trajectory_files import holds_markers, read_recording
 from freeswing.cdpr.markers.from_recording import fixes_poses
 from freeswing.cdpr.markers.layout import SessionLayout
-from freeswing.cdpr.markers.session import Examined, RunMarkers, common_layout, examine, place
+from freeswing.cdpr.markers.session_markers import (
+    Examined,
+    RunMarkers,
+    common_layout,
+    examine,
+    place,
+)
 from freeswing.cdpr.measured.frame_change import moved_recording
 from freeswing.cdpr.measured.target import Target
 from freeswing.cdpr.measured.trajectory import Trajectory

@@ -13,7 +13,7 @@ from freeswing.ident.bench.noise import column_residuals
 from freeswing.ident.bench.runs import Bench, BenchRun
 from freeswing.ident.bench.solve import Solved
 from freeswing.ident.bench.swing import BenchSwing, Column
-from freeswing.ident.likelihood.fit import How, fit
+from freeswing.ident.likelihood.fit_blocks import How, fit
 from freeswing.ident.likelihood.unknowns import Unknowns
 
 

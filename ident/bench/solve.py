@@ -14,7 +14,7 @@ from freeswing.ident.bench.noise import WIDE_SCATTER, rescaled, scatter_block, s
 from freeswing.ident.bench.objects import moments, specific
 from freeswing.ident.bench.runs import Bench
 from freeswing.ident.bench.swing import IZZ, BenchSwing
-from freeswing.ident.likelihood.fit import How, Solution, fit
+from freeswing.ident.likelihood.fit_blocks import How, Solution, fit
 from freeswing.ident.likelihood.unknowns import Gaussian, Unknowns
 
 ROUGH = How(steps=30, tolerance=3.0)

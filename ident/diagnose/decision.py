@@ -11,11 +11,11 @@ from freeswing.cdpr.effects import effect_named
 from freeswing.cdpr.robot import Array
 from freeswing.ident.diagnose.leave_one_out import Score
 from freeswing.ident.diagnose.lengths.wrong_places import WrongPlace
+from freeswing.ident.diagnose.model_probabilities import Rival, model_probabilities
 from freeswing.ident.diagnose.refit import Refit, colour_of, plausible
 from freeswing.ident.diagnose.screen import value_priors
 from freeswing.ident.diagnose.spectrum import independent_numbers
 from freeswing.ident.diagnose.variants import effect_of, inside, variants
-from freeswing.ident.diagnose.weights import Rival, model_probabilities
 from freeswing.ident.likelihood.joint_problem import INERTIA_UNIT
 
 # How many are fitted at a time, how near to the best they start, and what is not worth a fit.

@@ -18,8 +18,8 @@ from freeswing.ident.diagnose.answer.decay import swing_decay
 from freeswing.ident.diagnose.answer.deviations import honest_covariance
 from freeswing.ident.diagnose.answer.entries import accepted_entries, candidate_entry, claims
 from freeswing.ident.diagnose.answer.next_swing import NextSwing, next_swing
-from freeswing.ident.diagnose.base import base_fit, refuse_few
 from freeswing.ident.diagnose.decision import LEAST_SHARE_EXPLAINED, Candidate, excess_of
+from freeswing.ident.diagnose.declared_model import base_fit, refuse_few
 from freeswing.ident.diagnose.heldout import HeldOut, held_out
 from freeswing.ident.diagnose.lengths.wrong_places import Kinematics
 from freeswing.ident.diagnose.refit import Refit
@@ -30,8 +30,8 @@ from freeswing.ident.fidim.fidim_stage import fidim_estimates
 from freeswing.ident.identify import session_notes
 from freeswing.ident.likelihood.blocks import INERTIA
 from freeswing.ident.likelihood.calibration_modes import with_calibration
+from freeswing.ident.likelihood.fit_swings import LikelihoodFit, fit
 from freeswing.ident.likelihood.inertia_starts import likelihood_starts
-from freeswing.ident.likelihood.likelihood import LikelihoodFit, fit
 from freeswing.ident.likelihood.raw_samples import UNIT_NOISE_M, UNIT_NOISE_RAD
 from freeswing.ident.runs import SwingRun
 from freeswing.ident.signals.derivatives import SignalSettings

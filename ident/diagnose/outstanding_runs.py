@@ -12,8 +12,8 @@ import numpy as np
 
 from freeswing.cdpr.robot import Array
 from freeswing.ident.diagnose.spectrum import residual_powers
-from freeswing.ident.likelihood.likelihood import LikelihoodFit
-from freeswing.ident.likelihood.likelihood_run import Samples
+from freeswing.ident.likelihood.fit_swings import LikelihoodFit
+from freeswing.ident.likelihood.run_residuals import Samples
 
 # Times the median power: of seven runs one had 61 times the noise where the others had 6 to 16.
 OUTSTANDING = 4.0

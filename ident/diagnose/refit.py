@@ -17,8 +17,8 @@ from freeswing.ident.diagnose.screen import screen
 from freeswing.ident.diagnose.spectrum import residual_powers
 from freeswing.ident.diagnose.variants import effect_of, extended, inside, reduced
 from freeswing.ident.likelihood.blocks import each_run, effect_blocks, free_of
+from freeswing.ident.likelihood.fit_swings import LikelihoodFit, correlation_factor, fit
 from freeswing.ident.likelihood.joint_problem import State
-from freeswing.ident.likelihood.likelihood import LikelihoodFit, correlation_factor, fit
 from freeswing.ident.likelihood.unknowns import Unknowns
 
 RANKING_STEPS = 12

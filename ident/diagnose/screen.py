@@ -14,8 +14,8 @@ from freeswing.cdpr.simulation.sensitivity import linearise
 from freeswing.ident.diagnose.leave_one_out import Evidence
 from freeswing.ident.diagnose.variants import effect_of, extended, inside
 from freeswing.ident.likelihood.blocks import columns_of, shared_size
-from freeswing.ident.likelihood.likelihood import LikelihoodFit
-from freeswing.ident.likelihood.likelihood_run import Samples, reduce_run
+from freeswing.ident.likelihood.fit_swings import LikelihoodFit
+from freeswing.ident.likelihood.run_residuals import Samples, reduce_run
 
 
 @dataclass(frozen=True, slots=True)

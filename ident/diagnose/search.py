@@ -43,7 +43,7 @@ from freeswing.ident.diagnose.removal import is_no_worse, superfluous
 from freeswing.ident.diagnose.screen import Screen, screen
 from freeswing.ident.diagnose.spectrum import Residual, too_small
 from freeswing.ident.diagnose.variants import effect_of, inside, variants
-from freeswing.ident.likelihood.likelihood import LikelihoodFit
+from freeswing.ident.likelihood.fit_swings import LikelihoodFit
 
 Progress = Callable[[str, float], None]
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from freeswing.cdpr.robot import Array
-from freeswing.ident.likelihood.likelihood import LikelihoodFit
-from freeswing.ident.likelihood.likelihood_run import residuals
+from freeswing.ident.likelihood.fit_swings import LikelihoodFit
+from freeswing.ident.likelihood.run_residuals import residuals
 
 LOWEST_HZ = 0.15
 # No calibration or survey can be trusted below this: nothing is sought in such a residual.

@@ -8,8 +8,8 @@ import numpy as np
 
 from freeswing.cdpr.robot import Array
 from freeswing.ident.diagnose.spectrum import common_frequency, mean_log_spectrum, too_small
-from freeswing.ident.likelihood.likelihood import LikelihoodFit
-from freeswing.ident.likelihood.likelihood_run import predicted, residuals
+from freeswing.ident.likelihood.fit_swings import LikelihoodFit
+from freeswing.ident.likelihood.run_residuals import predicted, residuals
 from freeswing.ident.signals.prepare import PreparedRun
 
 # What white noise does not leave: more power than its own, and that at low frequencies. A hint has

@@ -16,8 +16,8 @@ from freeswing.cdpr.model.free_motion import coordinate_indices
 from freeswing.cdpr.model.regressor import SwingMotion
 from freeswing.cdpr.robot import Array
 from freeswing.ident.estimate import Estimate
-from freeswing.ident.likelihood.likelihood import LikelihoodFit
-from freeswing.ident.likelihood.likelihood_run import predicted
+from freeswing.ident.likelihood.fit_swings import LikelihoodFit
+from freeswing.ident.likelihood.run_residuals import predicted
 
 # Of the variance of a run's motion. Half is left to a swing whose losses were not declared, and
 # half of that is room; a curve that obeys no law is explained by chance alone.

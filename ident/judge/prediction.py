@@ -9,10 +9,10 @@ import numpy as np
 from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.robot import POSE_COORDINATES, Array, frozen_array
 from freeswing.ident.likelihood.blocks import none_free
+from freeswing.ident.likelihood.fit_swings import LikelihoodFit, fit
 from freeswing.ident.likelihood.joint_problem import State
-from freeswing.ident.likelihood.likelihood import LikelihoodFit, fit
-from freeswing.ident.likelihood.likelihood_run import Samples, predicted
-from freeswing.ident.likelihood.maximum_likelihood import started
+from freeswing.ident.likelihood.run_residuals import Samples, predicted
+from freeswing.ident.likelihood.session_estimates import started
 from freeswing.ident.signals.prepare import PreparedRun
 
 PREDICTED_HZ = 50.0

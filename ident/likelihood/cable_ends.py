@@ -14,7 +14,7 @@ import numpy as np
 
 from freeswing.cdpr.model.equations import Model, build_model
 from freeswing.cdpr.robot import Array, Robot
-from freeswing.ident.likelihood.likelihood import LikelihoodFit, fit
+from freeswing.ident.likelihood.fit_swings import LikelihoodFit, fit
 
 _ENTRY, _ATTACHMENT = "anchor_offset", "attachment_offset"
 

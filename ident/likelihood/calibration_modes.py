@@ -21,9 +21,9 @@ from freeswing.cdpr.robot import Array
 from freeswing.cdpr.rotation import angle_rate_matrix, matrix_from_angles
 from freeswing.cdpr.simulation.free_swing import Motion
 from freeswing.cdpr.simulation.sensitivity import linearise
+from freeswing.ident.likelihood.fit_swings import LikelihoodFit, fit
 from freeswing.ident.likelihood.joint_problem import Problem
-from freeswing.ident.likelihood.likelihood import LikelihoodFit, fit
-from freeswing.ident.likelihood.likelihood_run import Samples, reduce_run
+from freeswing.ident.likelihood.run_residuals import Samples, reduce_run
 from freeswing.ident.runs import SwingRun
 
 ROUNDS = 3

@@ -12,8 +12,8 @@ from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.model.free_motion import assemble
 from freeswing.cdpr.model.statics import Equilibrium, modes
 from freeswing.cdpr.robot import POSE_COORDINATES, Array
-from freeswing.ident.likelihood.likelihood_run import Samples
 from freeswing.ident.likelihood.rest_pose import rest_near
+from freeswing.ident.likelihood.run_residuals import Samples
 
 SMOOTHED_S = (0.1, 0.15, 0.2, 0.3, 0.4)
 SMOOTHED_DEGREE = 4

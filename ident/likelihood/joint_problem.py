@@ -15,7 +15,8 @@ from freeswing.cdpr.simulation.free_swing import LARGEST_TAIL, Motion, simulate,
 from freeswing.cdpr.simulation.nearby import Surroundings
 from freeswing.cdpr.simulation.sensitivity import linearise
 from freeswing.ident.judge.consistency import nearest_possible
-from freeswing.ident.likelihood.likelihood_run import (
+from freeswing.ident.likelihood.payload_runs import Loads
+from freeswing.ident.likelihood.run_residuals import (
     Reduced,
     Samples,
     lengths_residual,
@@ -23,7 +24,6 @@ from freeswing.ident.likelihood.likelihood_run import (
     reduce_run,
     residuals,
 )
-from freeswing.ident.likelihood.payload_runs import Loads
 from freeswing.ident.likelihood.unknowns import Layout
 
 INERTIA, EFFECTS, PAYLOADS = "inertia", "effects", "payloads"

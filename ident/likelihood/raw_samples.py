@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from freeswing.cdpr.robot import POSE_COORDINATES, Array
-from freeswing.ident.likelihood.likelihood_run import Samples
+from freeswing.ident.likelihood.run_residuals import Samples
 from freeswing.ident.runs import SwingRun
 
 UNIT_NOISE_M = 1e-4

@@ -162,7 +162,7 @@ HELD = (
     ),
     Held("ident/diagnose/outstanding_runs.py", ("OUTSTANDING",), DECISION),
     Held(
-        "ident/diagnose/base.py",
+        "ident/diagnose/declared_model.py",
         ("LEAST_RUNS", "SMALL_BESIDE_SWINGS", "AT_THE_NOISE"),
         DECISION,
     ),

@@ -16,7 +16,7 @@ from freeswing.cdpr.robot import POSE_COORDINATES, Array, Robot
 from freeswing.cdpr.rotation import exp_rotation
 from freeswing.ident.estimate import Estimate
 from freeswing.ident.identify import IdentifySettings, identify
-from freeswing.ident.likelihood.maximum_likelihood import ml_estimate
+from freeswing.ident.likelihood.session_estimates import ml_estimate
 from freeswing.ident.runs import SwingRun
 from freeswing.ident.signals.derivatives import SignalSettings
 from freeswing.ident.signals.prepare import prepare_runs

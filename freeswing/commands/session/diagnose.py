@@ -53,7 +53,7 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
     from freeswing.cdpr.files.documents import DataError, InputError
     from freeswing.ident.diagnose.diagnose import diagnose
     from freeswing.results.diagnosis import Diagnosis
-    from freeswing.results.motions import ladder_motions
+    from freeswing.results.motion_from_results import ladder_motions
     from freeswing.session.exchanged_lengths import refuse_exchanged_lengths
     from freeswing.session.load_bench import is_bench
     from freeswing.session.load_swings import load_robot, load_swings, load_target

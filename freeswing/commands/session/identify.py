@@ -70,7 +70,7 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
     from freeswing.ident.swing_places import swing_places
     from freeswing.results.identification import Identification
     from freeswing.results.markers import marker_document
-    from freeswing.results.motions import predicted_motions
+    from freeswing.results.motion_from_results import predicted_motions
     from freeswing.session.exchanged_lengths import refuse_exchanged_lengths
     from freeswing.session.load_bench import is_bench
     from freeswing.session.load_swings import load_robot, load_swings, load_target

@@ -18,7 +18,7 @@ from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.model.known_values import prior_whitener
 from freeswing.cdpr.robot import Array
 from freeswing.ident.diagnose.refit import Refit, colour_of, rescored
-from freeswing.ident.likelihood.likelihood import fit
+from freeswing.ident.likelihood.fit_swings import fit
 
 
 def settled_places(model: Model) -> np.ndarray:

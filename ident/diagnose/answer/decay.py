@@ -14,7 +14,7 @@ from freeswing.cdpr.model.batch import evaluate
 from freeswing.cdpr.model.equations import Model, build_model
 from freeswing.cdpr.robot import Array
 from freeswing.ident.diagnose.lengths.length_rows import measured_rates
-from freeswing.ident.likelihood.likelihood import LikelihoodFit
+from freeswing.ident.likelihood.fit_swings import LikelihoodFit
 
 # Parts of a run over which speeds are averaged: two periods of the slowest mode and more.
 PARTS = 5

@@ -9,7 +9,7 @@ import numpy as np
 from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.robot import Array
 from freeswing.ident.diagnose.refit import Refit
-from freeswing.ident.likelihood.likelihood import LikelihoodFit
+from freeswing.ident.likelihood.fit_swings import LikelihoodFit
 
 AXES = ("x", "y", "z")
 

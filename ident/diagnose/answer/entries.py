@@ -13,7 +13,7 @@ from freeswing.ident.diagnose.answer.deviations import directions
 from freeswing.ident.diagnose.answer.next_swing import NextSwing
 from freeswing.ident.diagnose.decision import Candidate
 from freeswing.ident.diagnose.experiments import separating_experiment
-from freeswing.ident.likelihood.likelihood import LikelihoodFit
+from freeswing.ident.likelihood.fit_swings import LikelihoodFit
 
 
 def claims(effects: tuple[str, ...]) -> tuple[str, ...]:

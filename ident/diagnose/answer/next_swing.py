@@ -14,7 +14,7 @@ from freeswing.cdpr.simulation.free_swing import Motion, simulate
 from freeswing.cdpr.simulation.sensitivity import linearise
 from freeswing.ident.diagnose.refit import Refit, colour_of
 from freeswing.ident.diagnose.screen import value_priors
-from freeswing.ident.likelihood.likelihood_run import Samples, predicted, reduce_run
+from freeswing.ident.likelihood.run_residuals import Samples, predicted, reduce_run
 
 # Times what was recorded: how far from the middle of that run a swing starts, how long it lasts.
 REACHES = (0.3, 1.0)

@@ -16,7 +16,7 @@ from freeswing.cdpr.model.batch import evaluate, with_jacobian
 from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.robot import Array
 from freeswing.cdpr.rotation import angle_rate_matrix, matrix_from_angles
-from freeswing.ident.likelihood.likelihood_run import Samples
+from freeswing.ident.likelihood.run_residuals import Samples
 
 # Slow errors follow the swing (up to some 2 Hz): means over a tenth of a second lose none of them.
 BLOCK_S = 0.1

@@ -35,8 +35,8 @@ from freeswing.ident.diagnose.lengths.joint_lengths import (
 )
 from freeswing.ident.diagnose.lengths.length_rows import length_rows, measured_rates
 from freeswing.ident.diagnose.variants import effect_of, inside
-from freeswing.ident.likelihood.likelihood import LikelihoodFit
-from freeswing.ident.likelihood.likelihood_run import Samples
+from freeswing.ident.likelihood.fit_swings import LikelihoodFit
+from freeswing.ident.likelihood.run_residuals import Samples
 
 LINEARISATIONS = 3
 # Runs whose slow errors are this many times as large as the usual run's are named.

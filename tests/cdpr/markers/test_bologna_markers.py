@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from freeswing.cdpr.files.trajectory_files import read_recording
-from freeswing.cdpr.markers.session import examine
+from freeswing.cdpr.markers.session_markers import examine
 from freeswing.cdpr.measured.target import read_target
 from tests.places import REAL, needs_real
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from freeswing.cdpr.markers.rigidity import Rigidity
-from freeswing.cdpr.markers.session import fit_session
+from freeswing.cdpr.markers.session_markers import fit_session
 from freeswing.cdpr.markers.stand_outs import stand_outs
 from tests.cdpr.markers.made import drift, recording, target
 

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from freeswing.ident.diagnose import base, decision, diagnose, outstanding_runs, removal
+from freeswing.ident.diagnose import decision, declared_model, diagnose, outstanding_runs, removal
 from freeswing.ident.diagnose import unexplained as rest
 from freeswing.ident.diagnose.decision import (
     Decision,
@@ -251,9 +251,9 @@ def test_a_run_that_stands_out(monkeypatch, powers, tempered) -> None:
 )
 def test_a_start_that_follows_the_runs(monkeypatch, astray, power, follows) -> None:
     """A quarter of the swings' size, or twice the noise's power."""
-    monkeypatch.setattr(base, "astray", lambda _: astray)
-    monkeypatch.setattr(base, "residual_powers", lambda *_: np.array([power]))
-    assert base._follows(None, np.ones(2)) == follows
+    monkeypatch.setattr(declared_model, "astray", lambda _: astray)
+    monkeypatch.setattr(declared_model, "residual_powers", lambda *_: np.array([power]))
+    assert declared_model._follows(None, np.ones(2)) == follows
 
 
 @pytest.mark.parametrize(("chance", "lead", "no_worse"), [
@@ -270,7 +270,7 @@ def test_an_effect_that_may_leave_again(monkeypatch, chance, lead, no_worse) -> 
 @pytest.mark.parametrize(("runs", "enough"), [(2, False), (3, True)])
 def test_runs_to_leave_one_out_of(runs, enough) -> None:
     if enough:
-        base.refuse_few([None] * runs)
+        declared_model.refuse_few([None] * runs)
     else:
-        with pytest.raises(base.DataError, match="at least 3"):
-            base.refuse_few([None] * runs)
+        with pytest.raises(declared_model.DataError, match="at least 3"):
+            declared_model.refuse_few([None] * runs)

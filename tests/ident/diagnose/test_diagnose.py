@@ -5,7 +5,7 @@ import pytest
 
 from freeswing.cdpr.effects import catalogue
 from freeswing.cdpr.files.documents import DataError
-from freeswing.ident.diagnose import decision, weights
+from freeswing.ident.diagnose import decision, model_probabilities
 from freeswing.ident.diagnose import diagnose as module
 from freeswing.ident.diagnose.diagnose import diagnose
 from freeswing.ident.diagnose.experiments import separating_experiment
@@ -25,7 +25,7 @@ LOOSENED = {
         "LEAST_EXCESS_LATER": -1.0,
     },
     module: {"LEAST_SHARE_EXPLAINED": 0.0, "LARGEST_EXCESS_LEFT": 50.0},
-    weights: {"CHANCE_OF_EFFECT": 0.5},
+    model_probabilities: {"CHANCE_OF_EFFECT": 0.5},
 }
 
 

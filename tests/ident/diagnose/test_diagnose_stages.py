@@ -11,7 +11,7 @@ from freeswing.ident.diagnose.outstanding_runs import OUTSTANDING, tempered
 from freeswing.ident.diagnose.refit import refit, without
 from freeswing.ident.diagnose.removal import is_no_worse, superfluous
 from freeswing.ident.diagnose.variants import variants
-from freeswing.ident.likelihood.likelihood_run import residuals
+from freeswing.ident.likelihood.run_residuals import residuals
 from freeswing.session.load_swings import load_robot, load_swings, load_target
 from freeswing.session.session_file import read_session
 from tests.oracle.sessions import make_session

@@ -13,10 +13,10 @@ from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.model.statics import modes
 from freeswing.cdpr.robot import POSE_COORDINATES
 from freeswing.ident.judge.prediction import predict
+from freeswing.ident.likelihood.fit_swings import LikelihoodFit
 from freeswing.ident.likelihood.joint_problem import State
-from freeswing.ident.likelihood.likelihood import LikelihoodFit
-from freeswing.ident.likelihood.likelihood_run import Samples
 from freeswing.ident.likelihood.rest_pose import taut_equilibrium
+from freeswing.ident.likelihood.run_residuals import Samples
 from freeswing.ident.signals.derivatives import SignalSettings
 from freeswing.ident.signals.prepare import PreparedRun, prepare_runs
 from tests.ident.swings import PAPER_LENGTHS_M, paper_model, recorded, swing

@@ -9,7 +9,7 @@ import pytest
 
 from freeswing.cdpr.model.free_motion import admissible_rates
 from freeswing.ident.likelihood.joint_problem import Problem, State
-from freeswing.ident.likelihood.likelihood_run import Samples
+from freeswing.ident.likelihood.run_residuals import Samples
 from tests.cdpr.model_cases import swing_start
 
 

@@ -15,8 +15,8 @@ from freeswing.ident.likelihood.blocks import (
     effect_blocks,
     free_of,
 )
+from freeswing.ident.likelihood.fit_swings import fit
 from freeswing.ident.likelihood.joint_problem import State
-from freeswing.ident.likelihood.likelihood import fit
 from freeswing.ident.likelihood.raw_samples import prepare
 from freeswing.ident.runs import Payload
 from tests.ident.swings import TRUE_INERTIA, paper_model, recorded, swing

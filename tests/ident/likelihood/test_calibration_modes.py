@@ -16,7 +16,7 @@ from freeswing.ident.fidim.fidim import fidim
 from freeswing.ident.identify import identify
 from freeswing.ident.judge.prediction import predict
 from freeswing.ident.likelihood.calibration_modes import freed, mode_shifts, with_calibration
-from freeswing.ident.likelihood.maximum_likelihood import ml_estimate
+from freeswing.ident.likelihood.session_estimates import ml_estimate
 from freeswing.ident.runs import SwingRun
 from freeswing.ident.signals.derivatives import SignalSettings
 from freeswing.ident.signals.prepare import PreparedRun, prepare_runs

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from freeswing.ident.likelihood.fit import How, fit
+from freeswing.ident.likelihood.fit_blocks import How, fit
 from freeswing.ident.likelihood.unknowns import Gaussian, Unknown, Unknowns
 
 RATE, STD = 0.7, 0.01

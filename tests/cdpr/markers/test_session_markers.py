@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from freeswing.cdpr.files.problems import DataError, InputError
-from freeswing.cdpr.markers.session import common_layout, examine, fit_session
+from freeswing.cdpr.markers.session_markers import common_layout, examine, fit_session
 from tests.cdpr.markers.made import LAYOUT, NAMES, drift, recording, target
 
 NOISE = 2e-5

@@ -27,9 +27,9 @@ from freeswing.ident.likelihood.blocks import (
     state_of,
 )
 from freeswing.ident.likelihood.joint_problem import TOLERANCE_M, Problem, State, Step
-from freeswing.ident.likelihood.likelihood_run import Samples, predicted, residuals
 from freeswing.ident.likelihood.minimise import minimised
 from freeswing.ident.likelihood.payload_runs import Loads
+from freeswing.ident.likelihood.run_residuals import Samples, predicted, residuals
 from freeswing.ident.likelihood.unknowns import Unknowns
 
 Progress = Callable[[str, float], None]

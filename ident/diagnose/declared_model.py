@@ -13,9 +13,9 @@ from freeswing.cdpr.robot import Array
 from freeswing.ident.diagnose.outstanding_runs import tempered
 from freeswing.ident.diagnose.spectrum import residual_powers
 from freeswing.ident.judge.consistency import is_possible
+from freeswing.ident.likelihood.fit_swings import LikelihoodFit, fit
 from freeswing.ident.likelihood.joint_problem import State
-from freeswing.ident.likelihood.likelihood import LikelihoodFit, fit
-from freeswing.ident.likelihood.maximum_likelihood import astray, begun
+from freeswing.ident.likelihood.session_estimates import astray, begun
 from freeswing.ident.signals.prepare import PreparedRun
 
 Progress = Callable[[str, float], None]

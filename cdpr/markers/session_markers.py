@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from freeswing.cdpr.files.problems import DataError, InputError
 from freeswing.cdpr.markers.layout import Alignment, SessionLayout, align, session_layout
 from freeswing.cdpr.markers.rigidity import Rigidity, marker_weights, rigidity
-from freeswing.cdpr.markers.slow import slow_share
+from freeswing.cdpr.markers.slow_residuals import slow_share
 from freeswing.cdpr.markers.spacing import (
     Jump,
     Mended,

@@ -21,12 +21,12 @@ from freeswing.ident.likelihood.between_runs import widened
 from freeswing.ident.likelihood.blocks import INERTIA, PAYLOADS
 from freeswing.ident.likelihood.cable_ends import geometry_document, weighed_against_priors
 from freeswing.ident.likelihood.calibration_modes import with_calibration
+from freeswing.ident.likelihood.fit_swings import LikelihoodFit, fit
 from freeswing.ident.likelihood.guess_run_start import first_state
 from freeswing.ident.likelihood.joint_problem import State
-from freeswing.ident.likelihood.likelihood import LikelihoodFit, fit
-from freeswing.ident.likelihood.likelihood_run import Samples
 from freeswing.ident.likelihood.payload_runs import Loads, mass_of
 from freeswing.ident.likelihood.raw_samples import prepare
+from freeswing.ident.likelihood.run_residuals import Samples
 from freeswing.ident.runs import DroppedRun
 from freeswing.ident.signals.prepare import PreparedRun, Progress
 

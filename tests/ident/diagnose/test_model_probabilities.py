@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from freeswing.ident.diagnose.weights import (
+from freeswing.ident.diagnose.model_probabilities import (
     CHANCE_OF_EFFECT,
     Rival,
     log_evidence,
