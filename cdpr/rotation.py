@@ -49,6 +49,9 @@ def angles_from_matrix(R: ArrayLike) -> Array:
     """(phi, theta, chi) [rad] with theta in [-pi/2, pi/2]. (..., 3, 3) -> (..., 3).
 
     At theta = +-pi/2 only phi +- chi is defined: chi = 0 is returned there.
+
+    Source:
+        Ida, Merlet, Carricato 2019, eq. (1) solved for its angles.
     """
     R = np.asarray(R, dtype=np.float64)
     cos_theta = np.hypot(R[..., 0, 0], R[..., 0, 1])

@@ -33,14 +33,23 @@ class Choice:
 
 
 def excited_directions(inertia: Array) -> Array:
-    """Orthonormal basis of the nine directions that W can excite, (10, 9): all but chi's."""
+    """Orthonormal basis of the nine directions that W can excite, (10, 9): all but chi's.
+
+    Source:
+        FIDIM 2022, sec. 3.2: W chi = 0; the complement by Golub, Van Loan 2013, Matrix
+        Computations, sec. 2.4.
+    """
     chi = np.concatenate([[1.0], inertia])
     full = np.linalg.svd(chi[None, :])[2]
     return full[1:].T
 
 
 def reduced(grams: Array, basis: Array) -> Array:
-    """W^T W (..., 10, 10) on the excited directions, (..., 9, 9)."""
+    """W^T W (..., 10, 10) on the excited directions, (..., 9, 9).
+
+    Source:
+        FIDIM 2022, eq. (40): s9 is the least singular value that is not zero.
+    """
     return basis.T @ grams @ basis
 
 
@@ -58,7 +67,11 @@ def stacked_cost(stacked: Array) -> float:
 
 
 def determinant_cost(information: Array) -> Array:
-    """Minus half the log determinant of information matrices (..., k, k): D-optimality."""
+    """Minus half the log determinant of information matrices (..., k, k): D-optimality.
+
+    Source:
+        Boyd, Vandenberghe 2004, Convex Optimization, sec. 7.5.
+    """
     sign, value = np.linalg.slogdet(information)
     return np.where(sign > 0, -0.5 * value, np.inf).astype(np.float64)
 

@@ -39,6 +39,9 @@ def swing_information(bench: Bench, swing: Swing, noise: MeasurementNoise | None
 
     Raises:
         ValueError: when the motion cannot be followed.
+
+    Source:
+        Kay 1993, Fundamentals of Statistical Signal Processing: Estimation Theory, ch. 3.
     """
     from scipy.linalg import null_space
 
@@ -62,7 +65,12 @@ def swing_information(bench: Bench, swing: Swing, noise: MeasurementNoise | None
 
 
 def predicted_std(information: Array) -> Array:
-    """Standard deviations of the inertia values that (9, 9) information allows; NaN if singular."""
+    """Standard deviations of the inertia values that (9, 9) information allows; NaN if singular.
+
+    Source:
+        Kay 1993, Fundamentals of Statistical Signal Processing: Estimation Theory, ch. 3:
+        the Cramer-Rao bound.
+    """
     scale = 1 / np.sqrt(np.maximum(np.diag(information), 1e-300))
     scaled = information * np.outer(scale, scale)
     if np.linalg.eigvalsh(scaled)[0] < 1e-12:

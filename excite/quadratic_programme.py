@@ -20,6 +20,9 @@ def least_effort(
 
     Rows are taken up as they are broken; one slack, heavily priced, keeps the problem solvable
     where the limits cannot be met.
+
+    Source:
+        Nocedal, Wright 2006, Numerical Optimization, ch. 16: active sets.
     """
     scale = np.maximum(high - low, 1e-9)
     held: list[int] = []

@@ -88,6 +88,10 @@ def subproblem(basis: Array, plan: list[Swing], known: list[SwingSlopes], region
     """Steps of all releases, (n_e, 6), that lower C of the linearised plan the most.
 
     C's extreme eigenvalues are smoothed to p-norms: at the best plans several of them meet.
+
+    Source:
+        Nocedal, Wright 2006, Numerical Optimization, ch. 18: sequential programming, of
+        FIDIM 2022, eqs. (41), (42).
     """
     from scipy.optimize import minimize
 
@@ -119,7 +123,12 @@ def subproblem(basis: Array, plan: list[Swing], known: list[SwingSlopes], region
 
 
 def smooth_cost(total: Array, by: Array, step: Array) -> tuple[float, Array]:
-    """Logarithm of C with p-norms for its extreme eigenvalues, and its gradient by the step."""
+    """Logarithm of C with p-norms for its extreme eigenvalues, and its gradient by the step.
+
+    Source:
+        FIDIM 2022, eq. (40), its extreme values as p-norms; derivatives of eigenvalues:
+        Magnus, Neudecker 1999, Matrix Differential Calculus, ch. 8.
+    """
     matrix = total + np.tensordot(step, by, axes=1)
     values, vectors = np.linalg.eigh(matrix)
     values = np.maximum(values, 1e-9 * values[-1])

@@ -207,6 +207,9 @@ def released(bench: Bench, equilibrium: Equilibrium, push: Array) -> Array:
 
     Raises:
         ValueError: when no pose of the same lengths is near.
+
+    Source:
+        FIDIM 2022, sec. 4: displaced with its lengths kept, eq. (5).
     """
     from scipy.linalg import null_space
 
@@ -229,7 +232,11 @@ def furthest(bench: Bench, course: Course, rest: Equilibrium) -> Array:
 
 
 def workspace(bench: Bench) -> tuple[Array, Array]:
-    """Lowest and highest x y z of P at equilibrium: as stated, or the box below the pulleys."""
+    """Lowest and highest x y z of P at equilibrium: as stated, or the box below the pulleys.
+
+    Source:
+        FIDIM 2022, sec. 5.1: the workspace of random equilibria.
+    """
     entries = bench.model.robot.entries_m
     low, high = entries.min(axis=0), entries.max(axis=0)
     down = bench.model.robot.gravity_m_s2 / np.linalg.norm(bench.model.robot.gravity_m_s2)

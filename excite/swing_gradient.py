@@ -141,7 +141,12 @@ def _limits(bench: Bench, swing: Swing, course: Any, linear: Any) -> tuple[Array
 
 
 def equilibrium_by_release(bench: Bench, rest: Equilibrium, release: Array) -> Array:
-    """Derivative of the equilibrium pose by the pose of release, (6, 6), through the lengths."""
+    """Derivative of the equilibrium pose by the pose of release, (6, 6), through the lengths.
+
+    Source:
+        Nocedal, Wright 2006, Numerical Optimization, sec. 12.3 and 18.1: the KKT matrix of
+        an equilibrium on its cables, differentiated.
+    """
     values, n = bench.model.start_values, bench.model.robot.n_cables
     hessian = evaluate(bench.model.lagrangian, rest.zeta, rest.tensions, bench.inertia, values)[2]
     here = evaluate(bench.model.cables, rest.zeta, values)[3]

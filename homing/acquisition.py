@@ -90,6 +90,9 @@ def default_tensions(robot: Robot) -> tuple[Array, Array]:
 
     Raises:
         DataError: when the mass is unknown.
+
+    Source:
+        Ida, Merlet, Carricato 2019, sec. 4: start and largest tensions of the procedure.
     """
     mass, n = robot.platform.mass_kg, robot.n_cables
     if mass is None:

@@ -109,7 +109,11 @@ class ArrowCovariance:
 
 
 def huber_weights(residuals: Array, limit: float) -> Array:
-    """Weights of Huber's loss: 1 up to `limit` standard deviations, then limit / |residual|."""
+    """Weights of Huber's loss: 1 up to `limit` standard deviations, then limit / |residual|.
+
+    Source:
+        Huber 1981, Robust Statistics, ch. 7.
+    """
     return limit / np.maximum(np.abs(residuals), limit) if np.isfinite(limit) else residuals * 0 + 1
 
 

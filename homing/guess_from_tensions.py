@@ -128,6 +128,9 @@ def stable_starts(energy: TensionEnergy, pulls: Array) -> Array:
     """All stable poses found at one set of tensions over the weight, lowest energy first, (k, 6).
 
     Starts hang below the middle of the pulleys at three heights and eight headings.
+
+    Source:
+        Ida, Merlet, Carricato 2019, eq. (9); starts spread by hand.
     """
     robot = energy.robot
     middle = robot.entries_m.mean(axis=0)
@@ -170,6 +173,9 @@ def acquisition_tensions(start_N: Array, largest_N: Array, n_poses: int) -> Arra
     """Tension set-points of section 4 for `n_poses` static poses, the start pose first, (N, n).
 
     One cable after another is tightened in equal steps to its largest tension and let back.
+
+    Source:
+        Ida, Merlet, Carricato 2019, sec. 4: tensioning and detensioning phases.
     """
     start, largest = np.asarray(start_N, float), np.asarray(largest_N, float)
     n = len(start)

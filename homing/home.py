@@ -101,6 +101,9 @@ def guess_poses(homing: Homing, energy: TensionEnergy) -> list[Array]:
 
     Tensions that were read serve where there are any, else the set-points of the procedure. There
     is no guess where the platform cannot rest at the start tensions.
+
+    Source:
+        Ida, Merlet, Carricato 2019, eqs. (9), (29).
     """
     robot, readings = homing.robot, homing.readings
     count = len(readings.sigma_rad)

@@ -35,7 +35,11 @@ _SMALLEST_STEP = 1e-7
 
 
 def many_starts(energy: TensionEnergy, n_cables: int) -> Array:
-    """Distinct stable rests over tension direction and scale, (k, 6)."""
+    """Distinct stable rests over tension direction and scale, (k, 6).
+
+    Source:
+        Ida, Merlet, Carricato 2019, eq. (9), over many tensions.
+    """
     factors = FACTORS if n_cables < 4 else (FACTORS[0], FACTORS[2])
     shares = np.array(list(itertools.product(factors, repeat=n_cables)))
     shares = np.unique(np.round(shares / shares.sum(axis=1, keepdims=True), 9), axis=0)
@@ -53,7 +57,11 @@ def many_starts(energy: TensionEnergy, n_cables: int) -> Array:
 
 
 def far_rows(readings: Readings) -> NDArray[np.intp]:
-    """The start's row and those whose readings lie farthest apart, `ROWS` of them, rising."""
+    """The start's row and those whose readings lie farthest apart, `ROWS` of them, rising.
+
+    Source:
+        Gonzalez 1985, Clustering to Minimize the Maximum Intercluster Distance.
+    """
     table = np.nan_to_num(np.hstack([readings.sigma_rad, readings.length_m]))
     chosen, distance = [0], np.linalg.norm(table - table[0], axis=1)
     while len(chosen) < min(ROWS, len(table)):
@@ -72,6 +80,9 @@ def rank_starts(problem: StartProblem, noise: ReadingNoise, starts: Array) -> li
         problem: the readings and their model.
         noise: of the readings.
         starts: start poses, (k, 6).
+
+    Source:
+        Ida, Merlet, Carricato 2019, eqs. (16) to (21).
     """
     borders = np.array([problem.start_border(start)[: 2 * problem.n] for start in starts])
     poses = np.repeat(starts[:, None], len(problem.data), axis=1)

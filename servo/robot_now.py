@@ -27,7 +27,11 @@ def rotation(angles_rad: Array) -> Array:
 
 
 def pose7(pose: Array) -> Array:
-    """Position and quaternion of [x y z roll pitch yaw]."""
+    """Position and quaternion of [x y z roll pitch yaw].
+
+    Source:
+        INCA 2016, eq. (1); as a quaternion: Diebel 2006, Representing Attitude.
+    """
     roll, pitch, yaw = (pose[3:] / 2.0).tolist()
     cr, cp, cy = math.cos(roll), math.cos(pitch), math.cos(yaw)
     sr, sp, sy = math.sin(roll), math.sin(pitch), math.sin(yaw)
@@ -41,7 +45,11 @@ def pose7(pose: Array) -> Array:
 
 
 def pose6(state: Array) -> Array:
-    """[x y z roll pitch yaw] of position and quaternion, pitch within 90 degrees."""
+    """[x y z roll pitch yaw] of position and quaternion, pitch within 90 degrees.
+
+    Source:
+        INCA 2016, eq. (1), solved for its angles: Diebel 2006, Representing Attitude.
+    """
     px, py, pz, w, x, y, z = state[:7].tolist()
     roll = math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
     pitch = math.asin(min(max(2 * (w * y - x * z), -1.0), 1.0))

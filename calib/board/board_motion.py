@@ -119,7 +119,12 @@ def linked(times_s: Array, smooth: np.ndarray, frame_s: float) -> np.ndarray:
 
 
 def boards_at(scene: Scene, piece: np.ndarray, times_s: Array) -> Array:
-    """T_base_board at times from the middles of pieces, both (n,), (n, 4, 4)."""
+    """T_base_board at times from the middles of pieces, both (n,), (n, 4, 4).
+
+    Source:
+        Murray, Li, Sastry 1994, A Mathematical Introduction to Robotic Manipulation, ch. 2:
+        rotation vectors; polynomials in them are plain algebra.
+    """
     order = np.arange(1, scene.motion.shape[1] + 1)
     powers = (times_s[:, None] / scene.motion_scale_s) ** order
     change = np.einsum("nj,nji->ni", powers, scene.motion[piece])

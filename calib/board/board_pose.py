@@ -40,7 +40,12 @@ def best_poses(camera: Camera, points_m: Array, pixels: Array) -> Array:
 
 
 def view_errors(camera: Camera, points_m: Array, poses: Array, pixels: Array) -> Array:
-    """Rms reprojection error of each view, each axis, (n,); infinite where a corner is behind."""
+    """Rms reprojection error of each view, each axis, (n,); infinite where a corner is behind.
+
+    Source:
+        Hartley, Zisserman 2004, Multiple View Geometry in Computer Vision, sec. 4.2.3:
+        reprojection error.
+    """
     points = points_m @ np.swapaxes(poses[:, :3, :3], 1, 2) + poses[:, None, :3, 3]
     squares = np.sum((pixels - camera.project(points)) ** 2, axis=-1)
     seen = np.isfinite(pixels[..., 0])

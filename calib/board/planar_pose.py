@@ -57,7 +57,11 @@ def _centred(points: Array, seen: np.ndarray) -> tuple[Array, Array]:
 
 
 def apply(matrices: Array, plane_points: Array) -> Array:
-    """Images (n, n_points, 2) of board points (n_points, 2) under homographies (n, 3, 3)."""
+    """Images (n, n_points, 2) of board points (n_points, 2) under homographies (n, 3, 3).
+
+    Source:
+        Hartley, Zisserman 2004, Multiple View Geometry in Computer Vision, sec. 2.3.
+    """
     lifted = np.column_stack([plane_points, np.ones(len(plane_points))])
     mapped = lifted @ np.swapaxes(matrices, 1, 2)
     return mapped[..., :2] / mapped[..., 2:]
@@ -67,6 +71,10 @@ def flatness_errors(plane_points: Array, images: Array) -> Array:
     """Rms distance of each view from its best homography, relative to the board's extent, (n,).
 
     A lens bends a true board by a few per cent at most; a false detection is no plane at all.
+
+    Source:
+        Hartley, Zisserman 2004, Multiple View Geometry in Computer Vision, sec. 4.2:
+        transfer error of a homography.
     """
     error = images - apply(homographies(plane_points, images), plane_points)
     extent = np.linalg.norm(np.nanmax(images, axis=1) - np.nanmin(images, axis=1), axis=-1)

@@ -69,6 +69,10 @@ def polish_poses(
     """Refines `poses` (n, 4, 4) in place; root mean square error of each by axis, (n,).
 
     Infinite where a corner lies behind the camera. `pixels` (n, n_points, 2) may hold NaN.
+
+    Source:
+        Hartley, Zisserman 2004, Multiple View Geometry in Computer Vision, appendix 6:
+        Levenberg-Marquardt on the reprojection error.
     """
     errors = np.empty(len(poses))
     normal, damped, slope = np.empty((6, 6)), np.empty((6, 6)), np.empty(6)

@@ -161,6 +161,10 @@ def smoothness(sightings: Sightings) -> tuple[np.ndarray, Array]:
         1 where the frame and its two neighbours show one smooth motion, -1 where they do not (a
         cut, a new pose), 0 where too little is seen to tell, (n,); and the image speed of the
         board in px/s where the motion is smooth, else 0, (n,).
+
+    Source:
+        Abramowitz, Stegun 1964, Handbook of Mathematical Functions, sec. 25.3: central
+        differences.
     """
     pixels, stamps, numbers = sightings.pixels, sightings.stamps_s, sightings.numbers
     smooth, speed = np.zeros(len(numbers), dtype=int), np.zeros(len(numbers))

@@ -65,7 +65,11 @@ def focal_and_centre(model: str, params: Array) -> tuple[Array, Array]:
 
 
 def full_parameters(model: str, params: Array) -> Array:
-    """The parameters as the full list `FULL_NAMES`, the fisheye's in its first eight, (12,)."""
+    """The parameters as the full list `FULL_NAMES`, the fisheye's in its first eight, (12,).
+
+    Source:
+        Brown 1971, Close-Range Camera Calibration: the distortion that the full list holds.
+    """
     return _selection(model) @ params
 
 
@@ -140,7 +144,12 @@ def _first_positive_root(polynomial_in_square: Array) -> float:
 
 
 def normalise(model: str, pixels: Array, params: Array) -> Array:
-    """Undistorted (x/z, y/z) of pixels, (..., 2); NaN where no ray of the lens gives the pixel."""
+    """Undistorted (x/z, y/z) of pixels, (..., 2); NaN where no ray of the lens gives the pixel.
+
+    Source:
+        Brown 1971, Close-Range Camera Calibration; the fisheye: Kannala, Brandt 2006, A
+        Generic Camera Model, eq. (6); both inverted by Newton's method.
+    """
     focal, centre = focal_and_centre(model, params)
     distorted = (np.asarray(pixels, dtype=np.float64) - centre) / focal
     if model == FISHEYE:

@@ -102,6 +102,9 @@ def evened(times_s: Array, tick_s: float) -> tuple[Array, float, bool, int]:
     Args:
         times_s: rising, (n,).
         tick_s: unit in which they were written.
+
+    Source:
+        Press et al. 2007, Numerical Recipes, sec. 15.2: a straight line by least squares.
     """
     beat = float(np.median(np.diff(times_s)))
     start, count = float(times_s[0]), np.zeros(len(times_s))

@@ -93,7 +93,12 @@ def _shape_modes(points: bytes) -> Array:
 
 
 def warped(board_points_m: Array, warp_m: Array) -> Array:
-    """Board points with the board's true shape applied, (n, 3)."""
+    """Board points with the board's true shape applied, (n, 3).
+
+    Source:
+        mrcal 2.2, 2022, user's manual: board deformation as a paraboloid (see
+        `shape_modes`).
+    """
     return board_points_m + shape_modes(board_points_m) @ warp_m
 
 
@@ -143,7 +148,12 @@ def fixed_residuals(scene: Scene, fixed: FixedPoints) -> Array:
 
 
 def fixed_jacobians(scene: Scene, fixed: FixedPoints, index: int) -> tuple[Array, Array, Array]:
-    """Residuals (m, 2) of one camera's fixed points, derivatives by camera and by the point."""
+    """Residuals (m, 2) of one camera's fixed points, derivatives by camera and by the point.
+
+    Source:
+        Hartley, Zisserman 2004, Multiple View Geometry in Computer Vision, appendix 6;
+        rotations as by Murray, Li, Sastry 1994, Robotic Manipulation, ch. 2.
+    """
     camera = scene.cameras[index]
     arm = scene.base_points_m[fixed.point] @ camera.T_camera_base[:3, :3].T
     pixels, d_point, d_params = camera.project_jacobian(arm + camera.T_camera_base[:3, 3])

@@ -76,7 +76,12 @@ class Spare(NamedTuple):
 
 @numba.njit(cache=True, nogil=True)
 def turn_and_jacobian(w: Array, turn: Array, left: Array) -> tuple[Array, Array]:
-    """exp(skew(w)) and its left Jacobian, (3, 3) each, in the arrays given."""
+    """exp(skew(w)) and its left Jacobian, (3, 3) each, in the arrays given.
+
+    Source:
+        Barfoot 2017, State Estimation for Robotics, sec. 7.1: the rotation of a vector and
+        its left Jacobian, in series where the angle is small.
+    """
     square = w[0] * w[0] + w[1] * w[1] + w[2] * w[2]
     angle = math.sqrt(square)
     if angle < 1e-4:
@@ -222,6 +227,10 @@ def view_rows(
 
     Local columns are lens (k), pose (6), clock (2), warp (3), board (6 (degree + 1)). Corners that
     are not finite are skipped; rows are filled where `with_rows` says so.
+
+    Source:
+        Hartley, Zisserman 2004, Multiple View Geometry in Computer Vision, appendix 6:
+        bundle adjustment.
     """
     pixels, at, seen = view.pixels, spare.carried, spare.point
     for i in range(3):
@@ -265,7 +274,12 @@ def new_spare() -> Spare:
 
 @numba.njit(cache=True, nogil=True)
 def local_rows(views: ViewArrays, estimate: Estimate, v: int) -> Array:
-    """Minus the derivatives of view v by its local unknowns, (2 n_points, n_local)."""
+    """Minus the derivatives of view v by its local unknowns, (2 n_points, n_local).
+
+    Source:
+        Hartley, Zisserman 2004, Multiple View Geometry in Computer Vision, appendix 6:
+        bundle adjustment.
+    """
     view = view_of(views, estimate, v)
     columns = view.n_lens + POSE + CLOCK + WARP + 6 * (1 + view.motion.shape[0])
     n = 2 * views.pixels.shape[1]

@@ -239,7 +239,12 @@ def _fixed_cost(scene: Scene, fixed: FixedPoints, T_rig_base: Array) -> float:
 
 
 def pose_from_points(camera: Camera, points_m: Array, pixels: Array) -> Array | None:
-    """T_camera_base from four or more known points, OpenCV's solvers; None when they fail."""
+    """T_camera_base from four or more known points, OpenCV's solvers; None when they fail.
+
+    Source:
+        Collins, Bartoli 2014, Infinitesimal Plane-Based Pose Estimation; for points off a
+        plane Terzakis, Lourakis 2020, SQPnP; both as OpenCV has them.
+    """
     import cv2
 
     rays = camera.normalise(pixels)

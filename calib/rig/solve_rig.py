@@ -167,7 +167,12 @@ def _with_board_shape(rig: Rig) -> Rig:
 
 
 def is_shown(shape_m: Array, std_m: Array) -> NDArray[np.bool_]:
-    """Which of a board's deformations the views show beyond doubt, (k,)."""
+    """Which of a board's deformations the views show beyond doubt, (k,).
+
+    Source:
+        Bishop 2006, Pattern Recognition and Machine Learning, sec. 2.3: deviations of a
+        Gaussian.
+    """
     return (np.abs(shape_m) > SHAPE_SIGMAS * std_m) & (np.abs(shape_m) > LEAST_SHAPE_M)
 
 

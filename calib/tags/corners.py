@@ -198,7 +198,12 @@ def fit_tag(
 
 
 def to_pixels(camera: Camera, rays: Array, covariance: Array) -> tuple[Array, Array]:
-    """Corners in pixels (4, 2) and their covariance (8, 8) from those in undistorted rays."""
+    """Corners in pixels (4, 2) and their covariance (8, 8) from those in undistorted rays.
+
+    Source:
+        JCGM 100:2008, Guide to the Expression of Uncertainty in Measurement, eq. (13):
+        propagation.
+    """
     points = np.column_stack([rays, np.ones(len(rays))])
     pixels, d_point, _ = camera.project_jacobian(points)
     jacobian = np.zeros((2 * len(rays), 2 * len(rays)))

@@ -90,6 +90,10 @@ def fit_bias(
         T_camera_boards: poses, (n, 4, 4).
         edges: `pattern_edges` of the tag, (m, 4).
         twists: velocity of the board's origin and turning rate in the camera's axes, (n, 6).
+
+    Source:
+        Press et al. 2007, Numerical Recipes, sec. 15.4: eight linear equations a tag, as
+        the module derives them.
     """
     across, down = corners_m[1] - corners_m[0], corners_m[3] - corners_m[0]
     return _biases(
@@ -218,6 +222,10 @@ def pattern_edges(family: str, tag: int, border_cells: int, corner_squares: bool
 
     (m, 4): x, y to the right and down in units of the tag's side, and the edge itself, one row a
     cell's edge.
+
+    Source:
+        Olson 2011, AprilTag: A Robust and Flexible Visual Fiducial System, sec. 4: the
+        cells.
     """
     cells = rimmed_cells(family, tag, border_cells, corner_squares=corner_squares)
     side = len(cells) - 2

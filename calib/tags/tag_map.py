@@ -30,7 +30,12 @@ def blur_at_centre(h: Array, ray_step: Array, half: float, blur: float) -> tuple
 
 @numba.njit(cache=True, nogil=True)
 def compose(pattern_from_ray: Array, e: NDArray[np.floating], half: float) -> Array:
-    """The pattern's map after the small homography `e`, which acts on (q - half) / half."""
+    """The pattern's map after the small homography `e`, which acts on (q - half) / half.
+
+    Source:
+        Hartley, Zisserman 2004, Multiple View Geometry in Computer Vision, sec. 2.3: maps
+        of the plane composed.
+    """
     change = np.eye(3)
     change[0, :] += e[0:3] / half
     change[1, :] += e[3:6] / half
@@ -46,7 +51,12 @@ def compose(pattern_from_ray: Array, e: NDArray[np.floating], half: float) -> Ar
 def corners_of_map(
     pattern_from_ray: Array, covariance: Array, n: int
 ) -> tuple[Array, Array, float]:
-    """Corner rays TL TR BR BL (4, 2), their covariance (8, 8) and the shortest side in rays."""
+    """Corner rays TL TR BR BL (4, 2), their covariance (8, 8) and the shortest side in rays.
+
+    Source:
+        Hartley, Zisserman 2004, Multiple View Geometry in Computer Vision, sec. 2.3 and
+        5.2: covariance through a map.
+    """
     back = np.linalg.inv(pattern_from_ray)
     rays = np.empty((4, 2))
     jacobian = np.zeros((8, 8))

@@ -39,6 +39,10 @@ def tag_cells(family: str, tag_id: int, border_cells: int = 1) -> NDArray[np.uin
 
     Raises:
         ValueError: when the family is unknown or has no such id.
+
+    Source:
+        Olson 2011, AprilTag: A Robust and Flexible Visual Fiducial System, sec. 4;
+        Garrido-Jurado et al. 2014 for ArUco; the codes as OpenCV lists them.
     """
     dictionary = tag_dictionary(family)
     count = dictionary.bytesList.shape[0]

@@ -124,7 +124,12 @@ def _lengths(scene: Scene, problem: Problem, edges: np.ndarray) -> tuple[Array, 
 
 
 def at_moment(scene: Scene, problem: Problem) -> Array:
-    """Corner pixels carried to an instant common to the moment's views by the board's motion."""
+    """Corner pixels carried to an instant common to the moment's views by the board's motion.
+
+    Source:
+        plain algebra on Hartley, Zisserman 2004, Multiple View Geometry in Computer Vision,
+        sec. 6.1: what the motion moves of a projection, added to the pixel.
+    """
     views = problem.views
     if not scene.motion.any():
         return views.pixels

@@ -81,7 +81,11 @@ def rest_pose(model: DrivenModel, currents: Array, theta: Array | None = None) -
 
 
 def turns_at_rest(model: DrivenModel, poses: Array, currents: Array, theta: Array) -> Array:
-    """Lengths let out over drum radii at rest at poses (..., 7) under currents (..., n)."""
+    """Lengths let out over drum radii at rest at poses (..., 7) under currents (..., n).
+
+    Source:
+        INCA 2016, eq. (2): the inverse kinematic model.
+    """
     stretch = stretch_of(model, theta)
     if stretch is None:
         lengths = evaluate(model.lengths, poses, theta)[0]

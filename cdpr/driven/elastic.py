@@ -59,6 +59,10 @@ def elastic_rest(
 
     Raises:
         ValueError: when a cable is slack there or the search does not settle.
+
+    Source:
+        Press et al. 2007, Numerical Recipes, sec. 9.6: Newton's method in several
+        dimensions, on INCA 2016, eqs. (8), (9) at rest.
     """
     theta = model.declared if theta is None else theta
     pose, force = static_pose(model, currents, theta).pose, np.full(6, np.inf)
@@ -81,7 +85,12 @@ def elastic_rest(
 def out_at_rest(
     model: DrivenModel, poses: Array, currents: Array, stretch: Stretch, theta: Array
 ) -> Array:
-    """Lengths let out where every motor balances its cable, (..., n), for poses (..., 7)."""
+    """Lengths let out where every motor balances its cable, (..., n), for poses (..., 7).
+
+    Source:
+        INCA 2016, eq. (9) at rest with a linear cable: a quadratic, Press et al. 2007,
+        Numerical Recipes, sec. 5.6.
+    """
     lengths = evaluate(model.lengths, poses, theta)[0]
     spring, constant = evaluate(_held(model), currents, theta)
     # EA (L - l) / l = spring l + constant: the positive root.

@@ -35,7 +35,11 @@ def prbs(
 
 
 def steps(n_samples: int, n_motors: int, levels_A: tuple[float, float]) -> Array:
-    """One motor after another at the upper level, all others at the lower, (n_samples, n)."""
+    """One motor after another at the upper level, all others at the lower, (n_samples, n).
+
+    Source:
+        INCA 2016, sec. 4.2.2: one motor's current, the rest low.
+    """
     low, high = levels_A
     turn = np.minimum(np.arange(n_samples) * n_motors // n_samples, n_motors - 1)
     return np.where(turn[:, None] == np.arange(n_motors), high, low).astype(np.float64)
@@ -49,7 +53,11 @@ def ramp(
     slope_A_s: float,
     motor: int,
 ) -> Array:
-    """One motor's reference rising evenly and then held, all others at the lower level."""
+    """One motor's reference rising evenly and then held, all others at the lower level.
+
+    Source:
+        INCA 2016, sec. 4.2.1: the friction test.
+    """
     low, high = levels_A
     result = np.full((n_samples, n_motors), low)
     result[:, motor] = np.minimum(low + slope_A_s * np.arange(n_samples) / rate_hz, high)

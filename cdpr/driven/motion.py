@@ -82,7 +82,11 @@ class DrivenMotion:
 
 
 def motor_angles(model: DrivenModel, poses: Array, zero_pose: Array, theta: Array) -> Array:
-    """The inverse position kinematic model (2): (..., 7) and (7,) -> (..., n)."""
+    """The inverse position kinematic model (2): (..., 7) and (7,) -> (..., n).
+
+    Source:
+        INCA 2016, eq. (2).
+    """
     lengths = evaluate(model.lengths, poses, theta)[0]
     zero = evaluate(model.lengths, zero_pose, theta)[0]
     return (zero - lengths) / evaluate(model.drums, theta)[0]

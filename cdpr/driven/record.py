@@ -104,6 +104,10 @@ def poses_at(times_s: Array, states: Array, wanted_s: Array) -> Array:
 
     Before the first sample and after the last the robot is where it was there: runs start at
     rest. Second order in half a sample: 0.5 ms at 40 m/s^2 is 5 micrometres.
+
+    Source:
+        Hairer, Norsett, Wanner 1993, Solving Ordinary Differential Equations I, sec. II.6:
+        dense output, here of second order.
     """
     inside = np.clip(wanted_s, times_s[0], times_s[-1])
     grain = 1e-6 * (times_s[1] - times_s[0])  # so that a time on the grid is taken as it is

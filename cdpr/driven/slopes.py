@@ -92,7 +92,12 @@ def length_slope(model: DrivenModel, chosen: tuple[str, ...] = ()) -> Function:
 
 
 def turn_map(quaternions: Array) -> Array:
-    """Change of a quaternion by a small turn in the platform frame: (..., 4) -> (..., 4, 3)."""
+    """Change of a quaternion by a small turn in the platform frame: (..., 4) -> (..., 4, 3).
+
+    Source:
+        Sola 2017, Quaternion Kinematics for the Error-State Kalman Filter, sec. 4: local
+        perturbations.
+    """
     q = np.asarray(quaternions, dtype=np.float64)
     w, x, y, z = np.moveaxis(q, -1, 0)
     rows = [[-x, -y, -z], [w, -z, y], [z, w, -x], [-y, x, w]]
@@ -109,7 +114,11 @@ def pose_map(poses: Array) -> Array:
 
 
 def moved(poses: Array, shifts: NDArray[np.floating]) -> Array:
-    """Poses (..., 7) after small translations and turns in the platform frame (..., 6)."""
+    """Poses (..., 7) after small translations and turns in the platform frame (..., 6).
+
+    Source:
+        Sola 2017, Quaternion Kinematics for the Error-State Kalman Filter, sec. 2.4 and 4.
+    """
     poses, shifts = np.broadcast_arrays(poses, np.concatenate([shifts, shifts[..., :1]], axis=-1))
     angle = np.linalg.norm(shifts[..., 3:6], axis=-1, keepdims=True)
     half = 0.5 * np.sinc(angle / (2 * np.pi)) * shifts[..., 3:6]
@@ -125,9 +134,11 @@ def moved(poses: Array, shifts: NDArray[np.floating]) -> Array:
 def stiffness(
     model: DrivenModel, pose: Array, currents: Array, theta: Array
 ) -> tuple[Array, Array]:
-    """Force at rest (6,) and how it falls with small translation and turn (6, 6), per unit mass
-    matrix: the acceleration and minus its derivative.
-    """  # noqa: D205
+    """Acceleration at rest (6,), and minus its derivative by translation and turn (6, 6).
+
+    Source:
+        INCA 2016, eqs. (14), (16), here by exact derivatives.
+    """
     state = np.concatenate([pose, np.zeros(6)])
     acceleration, by_state = evaluate(motion_slope(model), state, currents, theta)[:2]
     return acceleration, -by_state[:, :7] @ pose_map(pose)

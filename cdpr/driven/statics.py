@@ -87,6 +87,9 @@ def holding_currents(
 
     Raises:
         ValueError: when a limit is passed, naming the motor, or the cables cannot give the wrench.
+
+    Source:
+        INCA 2016, eqs. (25) to (28): the pseudo-inverse of the wrench matrix.
     """
     theta = model.declared if theta is None else theta
     limits = model.drive.current_limits_A

@@ -51,6 +51,10 @@ def read_noise(
     Raises:
         InputError: for a standard deviation that is not above 0, a correlation beyond 1, or either
             left empty where the sample (`is_known`, (n_t,)) is not.
+
+    Source:
+        JCGM 100:2008, Guide to the Expression of Uncertainty in Measurement, eq. (14):
+        correlations.
     """
     wanted = noise_names(names)
     by_quaternion = names == POSE_NOISE and wanted[3] not in columns
@@ -79,6 +83,10 @@ def noise_columns(trajectory: Trajectory) -> tuple[list[str], Array]:
     """Names and values (n_t, n) of the columns that hold a trajectory's covariances.
 
     Correlations that are 0 throughout are left out; without covariances there are no columns.
+
+    Source:
+        JCGM 100:2008, Guide to the Expression of Uncertainty in Measurement, eq. (14):
+        correlations.
     """
     names, covariances = trajectory.coordinates, trajectory.covariances
     if covariances is None:

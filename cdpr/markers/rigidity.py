@@ -92,7 +92,11 @@ def _some_frames(n: int, most: int) -> NDArray[np.intp]:
 
 
 def marker_weights(std: Array, left_out: tuple[int, ...]) -> Array:
-    """One over each marker's variance, 0 for those left out or never seen, (n_m,)."""
+    """One over each marker's variance, 0 for those left out or never seen, (n_m,).
+
+    Source:
+        Press et al. 2007, Numerical Recipes, sec. 15.1: weights of least squares.
+    """
     weights = np.where(np.isfinite(std), 1.0 / np.maximum(std, LEAST_STD_M) ** 2, 0.0)
     weights[list(left_out)] = 0.0
     return weights
@@ -102,6 +106,9 @@ def mean_layout(nominal: Array, points: Array, weights: Array) -> Array:
     """Mean places of all markers in the frame of the weighted ones, NaN where never seen, (n_m, 3).
 
     Its frame is that of the nominal layout as the weighted markers give it.
+
+    Source:
+        Gower 1975, Generalized Procrustes Analysis.
     """
     layout = np.where(np.isfinite(nominal), nominal, 0.0)
     for _ in range(ROUNDS):

@@ -83,7 +83,11 @@ def pairs_of(n_markers: int) -> Pairs:
 
 
 def distances(points: Array, pairs: Pairs) -> Array:
-    """Distances of pairs (n_p, 2) of points (..., n_m, 3), NaN where one is missing."""
+    """Distances of pairs (n_p, 2) of points (..., n_m, 3), NaN where one is missing.
+
+    Source:
+        Golub, Van Loan 2013, Matrix Computations, sec. 2.2: the Euclidean norm.
+    """
     return np.linalg.norm(points[..., pairs[:, 0], :] - points[..., pairs[:, 1], :], axis=-1)
 
 

@@ -93,7 +93,12 @@ def read_pose_errors(document: Any) -> PoseErrors:
 def error_terms(
     positions_m: Array, rotations: Array, velocities: Array, about_m: Array, about_rotation: Array
 ) -> Array:
-    """The terms b of the errors at some poses, (n, 13); see `PoseErrors.at`."""
+    """The terms b of the errors at some poses, (n, 13); see `PoseErrors.at`.
+
+    Source:
+        Murray, Li, Sastry 1994, A Mathematical Introduction to Robotic Manipulation, ch. 2:
+        errors of a frame as small screws.
+    """
     turn = log_rotation(rotations @ np.swapaxes(about_rotation, -1, -2))
     return np.concatenate(
         [np.ones((len(positions_m), 1)), positions_m - about_m, turn, velocities], axis=1
@@ -101,7 +106,11 @@ def error_terms(
 
 
 def fitted_terms(terms: Array, slopes: Array) -> Array:
-    """Least-squares coefficients of slopes (n, 6, m) over terms (n, 13), (6, 13, m)."""
+    """Least-squares coefficients of slopes (n, 6, m) over terms (n, 13), (6, 13, m).
+
+    Source:
+        Press et al. 2007, Numerical Recipes, sec. 15.4: general linear least squares.
+    """
     scale = np.maximum(np.sqrt(np.mean(terms**2, axis=0)), 1e-12)
     flat = slopes.reshape(len(slopes), -1)
     found = np.linalg.lstsq(terms / scale, flat, rcond=_LEAST_SPREAD)[0] / scale[:, None]

@@ -77,6 +77,9 @@ def pose_covariances(layout: Array, R: Array, weights: Array) -> Array:
     """Covariances (n_t, 6, 6) of (t, delta) for markers of weights, one over variance, (n_t, n_m).
 
     NaN where the markers with weight do not fix a pose.
+
+    Source:
+        Press et al. 2007, Numerical Recipes, sec. 15.6: inverse of the normal matrix.
     """
     determined = _is_determined(layout, weights > 0.0) & np.isfinite(R[:, 0, 0])
     arms = np.einsum("tij,mj->tmi", np.where(determined[:, None, None], R, 0.0), layout)

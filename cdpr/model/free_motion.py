@@ -112,6 +112,10 @@ def amplification(
     The conditioning number of a choice of free coordinates: the largest singular value of
     d zeta / d zeta_f with angles scaled to metres by the size of the platform. Beyond about 20,
     noise in the free coordinates swamps the dependent ones. Infinite where they are singular.
+
+    Source:
+        Golub, Van Loan 2013, Matrix Computations, sec. 2.6: condition, of FIDIM 2022, eq.
+        (6).
     """
     values = model.start_values if values is None else values
     chosen, dependent = split_coordinates(model, free)
@@ -164,6 +168,10 @@ def admissible_rates(
 
     Raises:
         ValueError: for wrong shapes or numbers that are not finite.
+
+    Source:
+        FIDIM 2022, eq. (5), by the pseudo-inverse: Golub, Van Loan 2013, Matrix
+        Computations, sec. 5.5.
     """
     values = model.start_values if values is None else values
     zeta, rates = finite("zeta", zeta, 6), finite("rates", rates, 6)

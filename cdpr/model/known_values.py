@@ -11,7 +11,12 @@ from freeswing.cdpr.robot import Array
 
 
 def prior_whitener(model: Model) -> Array:
-    """Turns distances from `start_values` into independent ones of unit deviation, (k, k)."""
+    """Turns distances from `start_values` into independent ones of unit deviation, (k, k).
+
+    Source:
+        Golub, Van Loan 2013, Matrix Computations, sec. 4.2: the Cholesky factor; Bishop
+        2006, Pattern Recognition and Machine Learning, sec. 2.3.
+    """
     scaled = np.diag([1.0 / parameter.prior_std for parameter in model.parameters])
     if model.correlations is None:
         return scaled

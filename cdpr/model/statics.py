@@ -180,7 +180,11 @@ def equilibria(
 
 
 def random_poses(model: Model, generator: np.random.Generator, count: int) -> Array:
-    """Poses (count, 6) spread over the box below the cable entries, tilted by up to 0.5 rad."""
+    """Poses (count, 6) spread over the box below the cable entries, tilted by up to 0.5 rad.
+
+    Source:
+        FIDIM 2022, sec. 5.1: random equilibria in the workspace.
+    """
     entries = model.robot.entries_m
     low, high = entries.min(axis=0), entries.max(axis=0)
     down = -model.robot.gravity_m_s2 / np.linalg.norm(model.robot.gravity_m_s2)

@@ -165,7 +165,12 @@ def simulate(
 
 
 def tails(motion: Motion) -> Array:
-    """What the last two orders of each segment's accelerations move the platform by, (s,)."""
+    """What the last two orders of each segment's accelerations move the platform by, (s,).
+
+    Source:
+        Boyd 2001, Chebyshev and Fourier Spectral Methods, ch. 2: the last coefficients as
+        error.
+    """
     nodes = motion.accelerations.shape[1]
     last = np.abs(table(nodes).spectrum[-2:] @ motion.accelerations).max(axis=(1, 2))
     return motion.steps_s**2 * last / (4 * nodes**2)

@@ -45,6 +45,10 @@ def release(
 
     Raises:
         DataError: where the lengths do not allow that pose.
+
+    Source:
+        FIDIM 2022, eqs. (38), (39): displaced along its modes; lengths kept by Newton's
+        method.
     """
     shapes = modes(model, rest, inertia, values).shapes
     signs = generator.choice([-1.0, 1.0], shapes.shape[1])

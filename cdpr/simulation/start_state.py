@@ -39,6 +39,10 @@ def start_slopes(
 
     Raises:
         ValueError: for wrong shapes, and when the free coordinates do not determine the pose.
+
+    Source:
+        FIDIM 2022, eqs. (5), (44), by the implicit function theorem: Rudin 1976, Principles
+        of Mathematical Analysis, ch. 9.
     """
     n = model.robot.n_cables
     chosen, _ = split_coordinates(model, free)
@@ -76,6 +80,9 @@ def by_free_coordinates(change: Array, slopes: Array) -> Array:
 
     Returns:
         (..., 6, 2 (6 - n) + n + 9 + k).
+
+    Source:
+        Rudin 1976, Principles of Mathematical Analysis, ch. 9: the chain rule.
     """
     through = change[..., :12] @ slopes
     shared = change.shape[-1] - 12

@@ -104,6 +104,9 @@ def projected(points: Array, azimuth_rad: float, up: Array) -> Array:
         points: base frame, (..., 3).
         azimuth_rad: the viewer's direction about the vertical.
         up: against gravity, unit vector, (3,).
+
+    Source:
+        Foley et al. 1996, Computer Graphics, ch. 6: parallel projection.
     """
     side = np.eye(3)[int(np.argmin(np.abs(up)))]
     first = side - (side @ up) * up

@@ -275,7 +275,12 @@ def _platform(robot: Robot, bench: Bench, runs: Sequence[BenchRun], guess: Guess
 
 
 def wide_body(mass_kg: float, extent_m: float) -> Array:
-    """Prior spread of centre and tensor of a body of which nothing but its size is known, (9,)."""
+    """Prior spread of centre and tensor of a body of which nothing but its size is known, (9,).
+
+    Source:
+        Bishop 2006, Pattern Recognition and Machine Learning, sec. 2.3: a wide prior; sizes
+        by m l^2.
+    """
     return np.concatenate(
         [np.full(3, WIDE_COM * extent_m), np.full(6, WIDE_TENSOR * mass_kg * extent_m**2)]
     )

@@ -129,6 +129,9 @@ def first_gains(channel: Channel, columns: Sequence[Column]) -> Array:
     Args:
         channel: of which they are wanted.
         columns: what all runs hold of it.
+
+    Source:
+        Press et al. 2007, Numerical Recipes, sec. 14.1: percentiles and medians as a scale.
     """
     sizes = [
         0.5 * float(np.nanpercentile(one.values, 99) - np.nanpercentile(one.values, 1))

@@ -95,7 +95,12 @@ def _followed_gains(
 
 
 def gain_spread(channel: Channel, gains: Array) -> Array:
-    """Prior standard deviations of a channel's terms, (terms,)."""
+    """Prior standard deviations of a channel's terms, (terms,).
+
+    Source:
+        Bishop 2006, Pattern Recognition and Machine Learning, sec. 2.3: priors of a Taylor
+        series' terms.
+    """
     place = channel.coordinates.index(channel.main_coordinate)
     main = abs(float(gains[place])) or 1.0
     found = []

@@ -17,7 +17,11 @@ for _entry, (_row, _column) in enumerate(zip(_ROWS, _COLUMNS, strict=True)):
 
 
 def tensor(entries: Array) -> Array:
-    """The symmetric matrix of xx yy zz xy xz yz, (3, 3)."""
+    """The symmetric matrix of xx yy zz xy xz yz, (3, 3).
+
+    Source:
+        Featherstone 2008, Rigid Body Dynamics Algorithms, sec. 2.13.
+    """
     return np.asarray(np.einsum("k,kij->ij", entries, _UNITS))
 
 
@@ -54,7 +58,11 @@ def moments(body: Array, turn: Array | None = None, shift_m: Array | None = None
 
 
 def moments_slope(body: Array, turn: Array | None = None, shift_m: Array | None = None) -> Array:
-    """Derivative of `moments` by the body's ten numbers, (10, 10)."""
+    """Derivative of `moments` by the body's ten numbers, (10, 10).
+
+    Source:
+        Featherstone 2008, Rigid Body Dynamics Algorithms, sec. 2.13, differentiated.
+    """
     turn = np.eye(3) if turn is None else turn
     shift = np.zeros(3) if shift_m is None else shift_m
     mass, centre = body[0], turn @ body[1:4] + shift
@@ -80,12 +88,20 @@ def specific(total: Array) -> Array:
 
 
 def specific_slope(total: Array) -> Array:
-    """Derivative of `specific` by the ten moments, (9, 10)."""
+    """Derivative of `specific` by the ten moments, (9, 10).
+
+    Source:
+        Featherstone 2008, Rigid Body Dynamics Algorithms, sec. 2.13, differentiated.
+    """
     return np.hstack([-total[1:, None] / total[0], np.eye(9)]) / total[0]
 
 
 def body_of(mass_kg: float, inertia: Array) -> Array:
-    """`BODY_NAMES` values of a mass and its nine specific numbers about P, (10,)."""
+    """`BODY_NAMES` values of a mass and its nine specific numbers about P, (10,).
+
+    Source:
+        Featherstone 2008, Rigid Body Dynamics Algorithms, sec. 2.13.
+    """
     centre = inertia[:3]
     central = mass_kg * (tensor(inertia[3:]) - spread(centre))
     return np.concatenate([[mass_kg], centre, entries(central)])

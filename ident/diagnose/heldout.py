@@ -157,7 +157,11 @@ def internal_error(model: Model, motion: SwingMotion, inertia: Array, values: Ar
 
 
 def internal_residual(model: Model, motion: SwingMotion, inertia: Array, values: Array) -> Array:
-    """Force per mass that the model lacks along each free coordinate, (n, 6 - n_cables)."""
+    """Force per mass that the model lacks along each free coordinate, (n, 6 - n_cables).
+
+    Source:
+        FIDIM 2022, eqs. (10), (35): what they leave.
+    """
     arguments = (motion.times_s, motion.zetas, motion.rates, inertia, values)
     modelled = evaluate(model.acceleration, *arguments)[0]
     mass = evaluate(model.mass_matrix, motion.zetas, inertia, values)[0]

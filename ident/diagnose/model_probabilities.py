@@ -53,6 +53,9 @@ def log_predictive(squares: Array, counts: Array, independent: Array) -> Array:
         squares: of each run's whitened residuals, (..., r).
         counts: how many numbers each run measured, (r,).
         independent: how many of them the discrepancy moves independently, (r,).
+
+    Source:
+        MacKay 2003, Information Theory, Inference, and Learning Algorithms, ch. 28.
     """
     excess = np.asarray(squares) - counts
     above = -0.5 * independent * np.log1p(np.maximum(excess, 0.0) / independent)

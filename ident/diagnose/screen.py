@@ -103,7 +103,12 @@ def _amplitudes(model: Model, key: str) -> np.ndarray:
 
 
 def value_priors(model: Model, values: Array) -> Array:
-    """Each effect value is within its plausible range: a weak row each, (k, 9 + k + 1)."""
+    """Each effect value is within its plausible range: a weak row each, (k, 9 + k + 1).
+
+    Source:
+        Bishop 2006, Pattern Recognition and Machine Learning, sec. 3.3: a Gaussian prior as
+        rows.
+    """
     rows = np.zeros((len(values), shared_size(model) + 1))
     whitener = prior_whitener(model)
     whitener[model.own_values] = 0.0

@@ -17,7 +17,11 @@ SMALLEST_RESIDUAL_RAD = 1e-4
 
 
 def residual_powers(fit: LikelihoodFit, noise_scales: Array) -> Array:
-    """Mean square of each run's whitened residuals, (r,): one at the noise."""
+    """Mean square of each run's whitened residuals, (r,): one at the noise.
+
+    Source:
+        Press et al. 2007, Numerical Recipes, sec. 14.1.
+    """
     pairs = zip(fit.motions, fit.samples, strict=True)
     return np.array([np.mean(residuals(m, run, noise_scales) ** 2) for m, run in pairs])
 
@@ -27,6 +31,10 @@ def independent_numbers(fit: LikelihoodFit, noise_scales: Array) -> Array:
 
     Participation numbers of the power over frequencies and coordinates: all of them for white
     noise, a few where one mode of the swing holds it.
+
+    Source:
+        Blackman, Tukey 1958, The Measurement of Power Spectra: equivalent degrees of
+        freedom.
     """
     found = []
     for motion, run in zip(fit.motions, fit.samples, strict=True):
@@ -43,6 +51,9 @@ def mean_log_spectrum(fit: LikelihoodFit, noise_scales: Array) -> tuple[Array, A
 
     Returns:
         Frequencies in Hz and power, (f,) each.
+
+    Source:
+        Percival, Walden 1993, Spectral Analysis for Physical Applications, ch. 6.
     """
     rate = min(1.0 / float(np.median(np.diff(run.times_s))) for run in fit.samples)
     duration = min(run.span_s[1] - run.span_s[0] for run in fit.samples)

@@ -22,6 +22,10 @@ def turns_and_slopes(
 
     Rigid cables' slopes are exact. Elastic ones are longer by what their motors pull: their slopes
     are differences of closed forms.
+
+    Source:
+        INCA 2016, eq. (2) and, by differences where cables give way, Press et al. 2007,
+        Numerical Recipes, sec. 5.7.
     """
     turns = turns_at_rest(model, pose, currents, theta)
     rigid = stretch_of(model, theta) is None

@@ -33,6 +33,10 @@ def poses_from_turns(
 
     Raises:
         ValueError: when the iteration does not settle: the angles fit no pose.
+
+    Source:
+        INCA 2016, eq. (2) solved by Gauss-Newton: Nocedal, Wright 2006, Numerical
+        Optimization, sec. 10.3.
     """
     poses = np.array(np.broadcast_to(start, (len(turns), 7)))
     slope, shift = length_slope(model), np.full((len(turns), 6), np.inf)

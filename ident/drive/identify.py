@@ -193,7 +193,11 @@ def offsets_of(session: DriveSession, theta: Array, fallback: Array | None) -> A
 
 
 def possible(session: DriveSession, regression: Regression) -> Array:
-    """Regressed values, or the declared one where the regression gives an impossible one."""
+    """Regressed values, or the declared one where the regression gives an impossible one.
+
+    Source:
+        plain algebra: INCA 2016, eq. (9) has positive constants alone.
+    """
     declared = session.asked.dynamic.read(session.model, session.model.declared)
     usable = np.isfinite(regression.values) & (regression.values * declared > 0.0)
     return np.where(usable, regression.values, declared)

@@ -99,7 +99,13 @@ def _rows(
 
 
 def flowing(model: DrivenModel, theta: Array, run: DriveRun) -> Array:
-    """Currents at every sample: the loop's lag on held references from what flowed first."""
+    """Currents at every sample: the loop's lag on held references from what flowed first.
+
+    Source:
+        INCA 2016, sec. 4.2.1: the current loop as a first-order lag, exact for held
+        references: Franklin, Powell, Workman 1998, Digital Control of Dynamic Systems, ch.
+        4.
+    """
     lag = [name for name in model.names if name.partition(".")[0] == "current_time_constant_s"]
     taus = np.array([theta[model.index(lag[0])]] * model.n_cables)
     for name in lag:

@@ -268,6 +268,10 @@ def carried_over(given: Premise, asked: Asked, two_step: Estimate, kinematic: Ar
         asked: kinematic and dynamic unknowns.
         two_step: the second step's estimate.
         kinematic: covariance of the first step, (n_kinematic, n_kinematic).
+
+    Source:
+        Newey, McFadden 1994, Large Sample Estimation and Hypothesis Testing, sec. 6: two
+        steps.
     """
     given = Premise(
         given.model, two_step.theta, given.runs, given.noise, given.zero_pose, given.offsets

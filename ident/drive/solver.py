@@ -59,14 +59,22 @@ class Found:
 
 
 def scaled(matrix: Array) -> tuple[Array, Array]:
-    """J'J of columns of length 1, and their lengths; empty columns stay empty."""
+    """J'J of columns of length 1, and their lengths; empty columns stay empty.
+
+    Source:
+        van der Sluis 1969, Condition Numbers and Equilibration of Matrices.
+    """
     lengths = np.sqrt(np.maximum(np.diag(matrix), 0.0))
     safe = np.where(lengths > 0.0, lengths, 1.0)
     return matrix / np.outer(safe, safe), safe
 
 
 def covariance_of(matrix: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Inverse of J'J, and which unknowns the data determine; the others' entries are infinite."""
+    """Inverse of J'J, and which unknowns the data determine; the others' entries are infinite.
+
+    Source:
+        Press et al. 2007, Numerical Recipes, sec. 15.4 and 15.6.
+    """
     unit, lengths = scaled(matrix)
     values, vectors = np.linalg.eigh(unit)
     kept = values > RANK_LIMIT * max(values[-1], 1.0)

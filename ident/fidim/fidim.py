@@ -110,7 +110,11 @@ def essential_parameters(W: Array) -> NDArray[np.bool_]:
 
 
 def near_zero(values: Array) -> NDArray[np.bool_]:
-    """Values small beside the largest of their kind (first moments; inertia), (9,)."""
+    """Values small beside the largest of their kind (first moments; inertia), (9,).
+
+    Source:
+        FIDIM 2022, sec. 3.2: parameters that are not essential.
+    """
     scale = np.repeat([np.abs(values[:3]).max(), np.abs(values[3:]).max()], [3, 6])
     return np.abs(values) < NEAR_ZERO * scale
 

@@ -159,7 +159,12 @@ def _mass(
 
 
 def within_reach(raw: FidimEstimate) -> Array:
-    """The estimate and what lies `REACH` deviations off along its principal axes, (19, 9)."""
+    """The estimate and what lies `REACH` deviations off along its principal axes, (19, 9).
+
+    Source:
+        Bishop 2006, Pattern Recognition and Machine Learning, sec. 2.3: principal axes of a
+        Gaussian.
+    """
     sizes, axes = np.linalg.eigh(raw.solution.covariance)
     steps = REACH * (axes * np.sqrt(np.maximum(sizes, 0.0))).T
     return np.concatenate([raw.values[None], raw.values + steps, raw.values - steps])

@@ -37,6 +37,9 @@ def between_runs(without: Array) -> Array:
 
     Args:
         without: the differences without each run, (r, 9).
+
+    Source:
+        Efron 1982, The Jackknife, the Bootstrap and Other Resampling Plans, ch. 3.
     """
     count = len(without)
     if count < LEAST_RUNS or not np.isfinite(without).all():

@@ -96,7 +96,12 @@ def pseudo_inertia(inertia: Array) -> Array:
 
 
 def least_moment(inertia: Array) -> tuple[float, Array]:
-    """Least second moment of mass about the centre of mass, m2, and its slope by inertia, (9,)."""
+    """Least second moment of mass about the centre of mass, m2, and its slope by inertia, (9,).
+
+    Source:
+        Wensing, Kim, Slotine 2018, Linear Matrix Inequalities for Physically-Consistent
+        Inertial Parameter Identification: the pseudo-inertia.
+    """
     whole = pseudo_inertia(inertia)
     com = whole[:3, 3]
     sizes, axes = np.linalg.eigh(whole[:3, :3] - np.outer(com, com))
@@ -133,6 +138,10 @@ def nearest_possible(target: Array, covariance: Array) -> Array:
 
     Raises:
         ValueError: when the covariance is not positive definite.
+
+    Source:
+        Boyd, Vandenberghe 2004, Convex Optimization, sec. 11.3: the barrier method, on the
+        pseudo-inertia of Wensing, Kim, Slotine 2018.
     """
     if _thickness(target) >= 0.0:
         return np.array(target, dtype=np.float64)

@@ -36,7 +36,11 @@ class LawlessError(ValueError):
 
 
 def unexplained_motion(found: LikelihoodFit) -> Array:
-    """Share of each run's motion about its mean that its fit leaves, root mean square, (runs,)."""
+    """Share of each run's motion about its mean that its fit leaves, root mean square, (runs,).
+
+    Source:
+        Draper, Smith 1998, Applied Regression Analysis, ch. 1: what R^2 leaves.
+    """
     shares = []
     for motion, samples in zip(found.motions, found.samples, strict=True):
         off = samples.values - predicted(motion, samples.times_s)[:, samples.columns]
@@ -51,6 +55,9 @@ def is_lawless(shares: Array, refuted: bool = False) -> Array:
     Args:
         shares: see `unexplained_motion`, (runs,).
         refuted: whether no body can have the inertia that the fit needs: more is then asked of it.
+
+    Source:
+        Draper, Smith 1998, Applied Regression Analysis, ch. 1: R^2.
     """
     least = LEAST_EXPLAINED_BY_NO_BODY if refuted else LEAST_EXPLAINED
     return shares**2 > 1.0 - least

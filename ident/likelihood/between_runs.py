@@ -55,6 +55,10 @@ def widened(covariance: Array, std: Array, runs: int) -> Array:
         covariance: (p, p), the correlations of which stay.
         std: between runs, (p,).
         runs: how many there are.
+
+    Source:
+        JCGM 100:2008, Guide to the Expression of Uncertainty in Measurement, sec. 4.2; the
+        limit by chi-square: Press et al. 2007, Numerical Recipes, sec. 15.1.
     """
     own = np.sqrt(np.diag(covariance))
     if runs < LEAST_RUNS or not np.isfinite(own).all():

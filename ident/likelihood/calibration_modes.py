@@ -141,7 +141,12 @@ def freed(run: SwingRun, amplitudes: Array) -> SwingRun:
 
 
 def mode_shifts(zetas: Array, rates: Array, errors: PoseErrors) -> Array:
-    """What one standard deviation of each mode adds to poses (n, 6) with rates, (n, 6, r)."""
+    """What one standard deviation of each mode adds to poses (n, 6) with rates, (n, 6, r).
+
+    Source:
+        JCGM 100:2008, Guide to the Expression of Uncertainty in Measurement, eq. (13):
+        propagation.
+    """
     turn = angle_rate_matrix(zetas[:, 3:])
     omega = (turn @ rates[:, 3:, None])[..., 0]
     velocities = np.concatenate([rates[:, :3], omega], axis=1)

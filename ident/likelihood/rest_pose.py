@@ -39,6 +39,9 @@ def named_like(zeta: Array, columns: Sequence[int], measured: Array) -> Array:
         measured: their values, (len(columns),); NaN: not known.
 
     Angles that were not measured come out within half a turn of zero.
+
+    Source:
+        Ida, Merlet, Carricato 2019, eq. (1): two sets of angles for every rotation.
     """
     target = np.zeros(6)
     known = np.zeros(6, dtype=bool)

@@ -130,7 +130,11 @@ def residuals(motion: Motion, samples: Samples, scales: Array) -> Array:
 
 
 def lengths_residual(motion: Motion, samples: Samples) -> Array:
-    """Predicted minus stated lengths over their standard deviation, (n_cables,) or (0,)."""
+    """Predicted minus stated lengths over their standard deviation, (n_cables,) or (0,).
+
+    Source:
+        FIDIM 2022, eq. (44), over the stated deviations.
+    """
     if samples.lengths_m is None:
         return np.zeros(0)
     start = (motion.starts_s[0], motion.zetas[0], motion.rates[0], motion.inertia, motion.values)
@@ -177,7 +181,12 @@ def reduce_run(
 
 
 def own_prior(motion: Motion) -> Array:
-    """A run's own effect values over their plausible size, (o,)."""
+    """A run's own effect values over their plausible size, (o,).
+
+    Source:
+        Bishop 2006, Pattern Recognition and Machine Learning, sec. 3.3: a Gaussian prior as
+        rows.
+    """
     parameters = motion.model.parameters
     return np.array([motion.values[k] / parameters[k].prior_std for k in motion.model.own_values])
 

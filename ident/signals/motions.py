@@ -22,6 +22,9 @@ def mean_lengths(model: Model, signals: Signals) -> Array:
 
     Raises:
         UnusableRunError: when a length does not stay constant, with the cable and by how much.
+
+    Source:
+        FIDIM 2022, sec. 5.2: locked lengths of a run.
     """
     lengths = evaluate(model.lengths, signals.values, model.start_values)[0]
     mean = lengths.mean(axis=0)

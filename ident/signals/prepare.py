@@ -121,6 +121,10 @@ def guessed_inertia(robot: Robot) -> Array:
     """Nominal inertia, or one of a body as large as the attachments spread, hung below them, (9,).
 
     Good enough to tell which way the platform hangs; never a result.
+
+    Source:
+        Featherstone 2008, Rigid Body Dynamics Algorithms, sec. 2.13: a solid ball about its
+        centre.
     """
     if robot.inertia is not None:
         return robot.inertia

@@ -115,7 +115,12 @@ def incomplete(values: Array) -> NDArray[np.bool_]:
 
 
 def bridged(values: Array, made: list[Bridge]) -> Array:
-    """`values` with the bridges filled in, (n, n_c)."""
+    """`values` with the bridges filled in, (n, n_c).
+
+    Source:
+        Press et al. 2007, Numerical Recipes, sec. 3.2: polynomials through neighbours, as
+        weights.
+    """
     filled = values.copy()
     for bridge in made:
         filled[bridge.index] = bridge.weights @ values[bridge.donors]
@@ -129,6 +134,10 @@ def jump_sizes(values: Array) -> tuple[Array, float]:
         sizes: (n, n_c), row i for the step from sample i - 1 to i; NaN within eight samples of
             either end or of a missing sample.
         gain: standard deviation of a size over that of one white sample.
+
+    Source:
+        Savitzky, Golay 1964, Smoothing and Differentiation of Data by Simplified Least
+        Squares, at the ends of two windows.
     """
     reach = np.arange(_JUMP_SIDE) + 0.5
     weights = np.linalg.pinv(reach[:, None] ** np.arange(_JUMP_DEGREE + 1))[0]

@@ -86,6 +86,10 @@ def fastest(
 
     Raises:
         ValueError: where none keeps the rule.
+
+    Source:
+        Skogestad, Postlethwaite 2005, Multivariable Feedback Control, sec. 2.4: margins as
+        limits.
     """
     response = plant.system.at(RATES_RAD_S)
 

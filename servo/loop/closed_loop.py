@@ -233,7 +233,11 @@ class _Brain:
 
 
 def current_bounds(at: Here, motors: Motors) -> tuple[Array, Array, Array]:
-    """Least, greatest and wished currents at a pose, by currents' and tensions' limits, (n,)."""
+    """Least, greatest and wished currents at a pose, by currents' and tensions' limits, (n,).
+
+    Source:
+        INCA 2016, eqs. (9), (11) at rest.
+    """
     per_A = motors.tension_per_A
     low = np.maximum(
         motors.current_limits_A[:, 0], (motors.tension_limits_N[:, 0] - at.springs_N) / per_A

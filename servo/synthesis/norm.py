@@ -55,6 +55,10 @@ def crossings(system: StateSpace, level: float) -> Array:
     """Positive rates where a singular value equals `level`; none: the norm is below it.
 
     They are the axis eigenvalues of the Hamiltonian matrix.
+
+    Source:
+        Boyd, Balakrishnan, Kabamba 1989, A Bisection Method for Computing the H-infinity
+        Norm.
     """
     R = level**2 * np.eye(system.n_inputs) - system.D.T @ system.D
     if np.linalg.eigvalsh(R)[0] <= 0.0:

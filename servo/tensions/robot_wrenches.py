@@ -35,6 +35,9 @@ def demands_at_rest(
 
     Returns:
         The demands, the springs' tensions (k, n) and tension per current (n,).
+
+    Source:
+        INCA 2016, eqs. (9), (11), (13).
     """
     survey = Survey(model)
     motors = survey.motors

@@ -141,7 +141,11 @@ def _starts(
 
 
 def whitened(block: Block, noise: Array) -> Array:
-    """Whitening of each sighting with the camera's floor (in rays) added, (n_o, 8, 8)."""
+    """Whitening of each sighting with the camera's floor (in rays) added, (n_o, 8, 8).
+
+    Source:
+        Golub, Van Loan 2013, Matrix Computations, sec. 4.2: the Cholesky factor.
+    """
     if not len(block.things):
         return np.zeros((0, 8, 8))
     covariances = block.covariances.copy()

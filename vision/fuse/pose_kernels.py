@@ -139,7 +139,12 @@ class _Spare(NamedTuple):
 
 @numba.njit(cache=True, nogil=True)
 def small_rotation(r: Array, out: Array) -> Array:
-    """exp(skew(r)) in `out` (3, 3), which is given back."""
+    """exp(skew(r)) in `out` (3, 3), which is given back.
+
+    Source:
+        Murray, Li, Sastry 1994, A Mathematical Introduction to Robotic Manipulation, ch. 2,
+        eq. (2.14).
+    """
     angle2 = r[0] * r[0] + r[1] * r[1] + r[2] * r[2]
     angle = math.sqrt(angle2)
     if angle < 1e-6:
@@ -160,7 +165,12 @@ def small_rotation(r: Array, out: Array) -> Array:
 def carried_on(
     times_s: Array, rotations: Array, positions: Array, time_s: float
 ) -> tuple[Array, Array]:
-    """Rotation (3, 3) and position (3,) at a time, by the polynomial through poses (n, ...)."""
+    """Rotation (3, 3) and position (3,) at a time, by the polynomial through poses (n, ...).
+
+    Source:
+        Press et al. 2007, Numerical Recipes, sec. 3.2: Lagrange's polynomial, in rotation
+        vectors.
+    """
     n = len(times_s)
     ahead, turn = np.zeros(6), np.empty((3, 3))
     for k in range(n - 1):

@@ -45,6 +45,10 @@ def corner_bias(corners: Array, velocities: Array, times_s: Array) -> Array:
         corners: TL TR BR BL in undistorted coordinates, (n, 4, 2).
         velocities: of these, (n, 4, 2).
         times_s: when each corner was seen, (n, 4).
+
+    Source:
+        Press et al. 2007, Numerical Recipes, sec. 15.4: the nearest parallelogram by least
+        squares.
     """
     inside, nearest = _pattern()
     since = times_s - times_s.mean(axis=1, keepdims=True)

@@ -46,7 +46,11 @@ def start_pose(points: Array, rays: Array) -> Pose | None:
 
 
 def whitening(covariances: Array) -> Array:
-    """W with W'W the inverse of each covariance, (n, m, m)."""
+    """W with W'W the inverse of each covariance, (n, m, m).
+
+    Source:
+        Golub, Van Loan 2013, Matrix Computations, sec. 4.2: the Cholesky factor.
+    """
     return np.asarray(np.linalg.inv(np.linalg.cholesky(covariances)), dtype=np.float64)
 
 

@@ -22,6 +22,10 @@ def gathering_weights(psf_px: float, subpixels: int) -> NDArray[np.float32]:
     """Weights of the sub-pixels around a pixel, (2 m + 1) * subpixels of them, summing to 1.
 
     The Gaussian loses the variance that the sub-pixel's own footprint already has.
+
+    Source:
+        Abramowitz, Stegun 1964, Handbook of Mathematical Functions, eq. (7.1.1): a Gaussian
+        over pixels.
     """
     own = 1.0 / (12.0 * subpixels**2)
     sigma = math.sqrt(max(psf_px**2 - own, 1e-6))
@@ -244,6 +248,9 @@ def composite(
 
     The buffer's outer pixels are only the filter's margin. `share` scales light and coverage (one
     of several exposure samples: 1 / count).
+
+    Source:
+        Porter, Duff 1984, Compositing Digital Images.
     """
     samples, left, top, subpixels = buffer
     taps = weights.shape[0]
@@ -280,7 +287,11 @@ def composite(
 def expose(
     image: NDArray[np.float32], noise: NDArray[np.float32], start: int, sigma: float
 ) -> NDArray[np.uint8]:
-    """Adds noise (a bank of unit normals read from `start`) and rounds to 0 ... 255."""
+    """Adds noise (a bank of unit normals read from `start`) and rounds to 0 ... 255.
+
+    Source:
+        EMVA Standard 1288, release 4.0, 2021, sec. 2: the linear camera.
+    """
     out = np.empty(image.shape, dtype=np.uint8)
     at = start
     for i in range(image.shape[0]):

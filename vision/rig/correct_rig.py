@@ -201,7 +201,12 @@ def _estimate(
 
 
 def is_real(values: Array, deviations: Array, least: float) -> NDArray[np.bool_]:
-    """Which values are surely not zero, and large enough to matter."""
+    """Which values are surely not zero, and large enough to matter.
+
+    Source:
+        Bishop 2006, Pattern Recognition and Machine Learning, sec. 2.3: deviations of a
+        Gaussian.
+    """
     return np.abs(values) > np.maximum(least, SIGMAS * deviations)
 
 

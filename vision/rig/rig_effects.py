@@ -60,7 +60,11 @@ class Finding:
 
 
 def base_tag_rays(views: CameraViews, watch: Watch) -> tuple[Array, Array, Array]:
-    """Mean base-tag corners over a run: rays (n, 8), frames (n,) and base corners (n, 4, 3)."""
+    """Mean base-tag corners over a run: rays (n, 8), frames (n,) and base corners (n, 4, 3).
+
+    Source:
+        Press et al. 2007, Numerical Recipes, sec. 14.1: means.
+    """
     sums: dict[int, Array] = {}
     counts: dict[int, int] = {}
     for _, piece in views.pieces():
@@ -79,6 +83,9 @@ def base_tag_misses(views: CameraViews, watch: Watch) -> tuple[Array, Array, Arr
 
     Returns:
         Residual rays (n, 8), their number of frames (n,) and base corners (n, 4, 3).
+
+    Source:
+        Hartley, Zisserman 2004, Multiple View Geometry in Computer Vision, sec. 6.1.
     """
     measured, counts, corners = base_tag_rays(views, watch)
     seen = views.camera.to_camera(corners)
@@ -118,7 +125,12 @@ def repose_by_base_tags(view: CameraViews, watch: Watch, survey_std_m: float) ->
 
 
 def base_equations(view: CameraViews, watch: Watch, survey_std_m: float) -> tuple[Array, Array]:
-    """Normal matrix (6, 6) and right side (6,) of a camera's pose change by its base tags."""
+    """Normal matrix (6, 6) and right side (6,) of a camera's pose change by its base tags.
+
+    Source:
+        Hartley, Zisserman 2004, Multiple View Geometry in Computer Vision, appendix 6:
+        normal equations of a camera's pose.
+    """
     misses, _, corners = base_tag_misses(view, watch)
     focal = view.camera.focal_px.mean()
     normal, right = np.zeros((6, 6)), np.zeros(6)

@@ -36,6 +36,10 @@ def stamp_jitter_s(views: Sequence[CameraViews], watch: Watch, poses: Poses, fit
     """Standard deviation of each camera's stamps against the others', 0 where none shows, (n_c,).
 
     One camera alone shows none: there is nothing to hold its stamps against.
+
+    Source:
+        Press et al. 2007, Numerical Recipes, sec. 15.4: late stamps as unknowns of least
+        squares, poses eliminated.
     """
     n_c, n = len(views), len(poses.times_s)
     if n_c < 2:

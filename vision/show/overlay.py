@@ -83,6 +83,9 @@ def projected_outlines(
     """Outlines of the platform's tags in px by the trajectory, (4, 2) each; markers (1, 2).
 
     Each corner is put at the time at which its own row was read.
+
+    Source:
+        Hartley, Zisserman 2004, Multiple View Geometry in Computer Vision, sec. 6.1.
     """
     camera = seen.camera
     if not trajectory.is_pose or not np.isfinite(stamp_s):

@@ -50,6 +50,9 @@ def with_settled(covariance: Array, held: Refit) -> Array:
     Args:
         covariance: of the others, the geometry being exact, (p, p).
         held: the fit with the geometry held.
+
+    Source:
+        Bierman 1977, Factorization Methods for Discrete Sequential Estimation, ch. 8.
     """
     model, places = held.fit.model, settled_places(held.fit.model)
     whitener = prior_whitener(model)

@@ -23,6 +23,9 @@ def honest_covariance(found: LikelihoodFit, scored: Refit) -> Array:
     Args:
         found: the final fit.
         scored: the fit of the search that it goes on from, with its left-out runs.
+
+    Source:
+        Efron 1982, The Jackknife, the Bootstrap and Other Resampling Plans, ch. 3.
     """
     stds = found.std
     free = np.flatnonzero(scored.fit.free)

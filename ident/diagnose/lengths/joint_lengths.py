@@ -158,6 +158,11 @@ def honest_covariance(normal: Normal, spread: Array, found: Solved) -> Array:
 
     How the runs' scores differ gives a covariance without any model of the noise (a sandwich, the
     jackknife to first order). Where it is the smaller one the posterior stays.
+
+    Source:
+        White 1982, Maximum Likelihood Estimation of Misspecified Models: the
+        sandwich; the larger in every direction by Golub, Van Loan 2013, Matrix
+        Computations, sec. 8.7.
     """
     scores = normal.matrices @ found.values + normal.rights
     scores = scores - scores.mean(axis=0)

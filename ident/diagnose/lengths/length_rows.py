@@ -59,6 +59,10 @@ def measured_rates(times_s: Array, values: Array) -> Array:
     """Time derivatives of samples (n, c) at their times (n,), by cubics over `RATES_OVER_S`.
 
     A simulated motion would not do: where the model lacks much it is out of phase after a while.
+
+    Source:
+        Savitzky, Golay 1964, Smoothing and Differentiation of Data by Simplified Least
+        Squares.
     """
     step = float(np.median(np.diff(times_s)))
     grid = np.arange(times_s[0], times_s[-1] + 0.5 * step, step)
