@@ -1,14 +1,20 @@
-"""Down a sum of squares: one loop after Levenberg and Marquardt, one vocabulary of why it ended.
+"""Down a sum of squares: every search's loop, and one vocabulary of why it ended.
 
 A step is tried; where it lowers the cost it stands and the damping eases, else the damping grows
 (Levenberg 1944, Marquardt 1963; Nocedal and Wright, Numerical Optimization, 2006, sec. 10.3). What
 the normal equations look like, and when enough is gained, is the problem's own affair.
+
+Where a good step may raise the cost for once, as in a curved valley, `Watchdog` lets it stand if
+the next one is shorter (natural monotonicity: Deuflhard, Newton Methods for Nonlinear Problems,
+2011, sec. 4.3), for a few steps (a watchdog: Nocedal and Wright, sec. 15.6); else it goes back to
+the best place and damps.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from typing import Protocol, TypeVar
+from typing import Protocol, TypeVar, cast
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,8 +67,18 @@ class Step(Protocol):
         ...
 
 
+class LongStep(Step, Protocol):
+    """A step whose length is known."""
+
+    @property
+    def longest(self) -> float:
+        """Largest change of an unknown, in its scale."""
+        ...
+
+
 P = TypeVar("P", bound=Place)
 S = TypeVar("S", bound=Step)
+L = TypeVar("L", bound=LongStep)
 
 
 class Problem(Protocol[P, S]):
@@ -105,6 +121,42 @@ class Damping:
         """After a step that lowered the cost by `ratio` times what it promised."""
         return max(damping * self.ease, self.least)
 
+    def grown(self, damping: float, growth: float) -> float:
+        """After a step that did not lower it."""
+        return damping * growth
+
+    def is_hopeless(self, damping: float, growth: float) -> bool:
+        """Whether no further step is worth a trial after one that failed."""
+        return damping > self.largest
+
+
+@dataclass(frozen=True, slots=True)
+class Undamped(Damping):
+    """None until a step fails (Gauss and Newton), and none again where it has eased.
+
+    Attributes:
+        first: before any step has failed.
+        raised: after the first that has.
+        relief: divisor after a step that lowers the cost.
+        least: below it there is none.
+    """
+
+    first: float = 0.0
+    raised: float = 1e-4
+    relief: float = 3.0
+
+    def eased(self, damping: float, ratio: float) -> float:
+        """After a step that lowered the cost."""
+        return 0.0 if damping < self.least else damping / self.relief
+
+    def grown(self, damping: float, growth: float) -> float:
+        """After a step that did not lower it."""
+        return max(self.raised, growth * damping)
+
+    def is_hopeless(self, damping: float, growth: float) -> bool:
+        """Whether no further step is worth a trial after one that failed."""
+        return self.grown(damping, growth) > self.largest
+
 
 @dataclass(frozen=True, slots=True)
 class Nielsen(Damping):
@@ -123,17 +175,21 @@ class LevenbergMarquardt:
         steps: at most so many.
         damping: how it is damped.
         level: whether a step that leaves the cost as it is stands too.
+        slack: by what share of the cost such a step may raise it: rounding.
+        farthest: longer steps are damped before they are tried; only for steps that are `LongStep`.
     """
 
     steps: int
     damping: Damping = Damping()
     level: bool = False
+    slack: float = 0.0
+    farthest: float = math.inf
 
     def descend(self, problem: Problem[P, S], place: P) -> tuple[P, int, Stop]:
         """The lowest place found from a start, how many steps were tried, and why it ended."""
         damping, growth = self.damping.first, self.damping.growth
         for count in range(1, self.steps + 1):
-            step = problem.step(place, damping)
+            step, damping = self._short(problem, place, damping)
             if step is None:
                 return place, count, UNSOLVABLE
             trial = problem.moved(place, step)
@@ -143,13 +199,109 @@ class LevenbergMarquardt:
                 ratio = (place.cost - trial.cost) / max(step.promised, 1e-300)
                 damping, growth = self.damping.eased(damping, ratio), self.damping.growth
                 place = trial
-            elif stop is None and damping > self.damping.largest:
+            elif stop is None and self.damping.is_hopeless(damping, growth):
                 stop = STUCK
             else:
-                damping, growth = damping * growth, growth * self.damping.faster
+                damping = self.damping.grown(damping, growth)
+                growth = growth * self.damping.faster
             if stop is not None:
                 return place, count, stop
         return place, self.steps, out_of_steps(self.steps)
 
+    def _short(self, problem: Problem[P, S], place: P, damping: float) -> tuple[S | None, float]:
+        """A step no longer than the longest, and how it is damped."""
+        step = problem.step(place, damping)
+        if math.isinf(self.farthest):
+            return step, damping
+        while (
+            step is not None
+            and cast(LongStep, step).longest > self.farthest
+            and damping < self.damping.largest
+        ):
+            damping = self.damping.grown(damping, self.damping.growth)
+            step = problem.step(place, damping)
+        return step, damping
+
     def _is_lower(self, trial: float, here: float) -> bool:
-        return trial <= here if self.level else trial < here
+        return trial <= here * (1.0 + self.slack) if self.level else trial < here
+
+
+class Valley(Protocol[P, L]):
+    """What is searched with a watchdog."""
+
+    def step(self, place: P, damping: float) -> L:
+        """A damped step."""
+        ...
+
+    def moved(self, place: P, step: L) -> P | None:
+        """The place after a step; None where nothing can be computed."""
+        ...
+
+    def settled(self, place: P) -> P:
+        """A place that the search goes on from, its noise as its residuals show it."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Watchdog:
+    """The search that may climb.
+
+    Attributes:
+        steps: at most so many.
+        tolerance: converged when an undamped step lowers the cost by less, as it promises or does.
+        damping: how it is damped once a step has failed.
+        shorter: than the last step is the next one where a climb leads on.
+        most_rises: steps above the best cost, until it has to be beaten.
+        negligible: share of the tolerance that is not worth a trial.
+    """
+
+    steps: int
+    tolerance: float
+    damping: Undamped
+    shorter: float
+    most_rises: int
+    negligible: float
+
+    def descend(self, problem: Valley[P, L], place: P) -> tuple[P, L, int, Stop]:
+        """The lowest place found, the step to it, how many were tried, and why it ended."""
+        here = best = problem.settled(place)
+        damping, rises, taken, falls = 0.0, 0, 0, False
+        stop = out_of_steps(self.steps)
+        for taken in range(1, self.steps + 1):
+            step = problem.step(here, damping)
+            if falls and damping > 0.0 and step.promised < self.tolerance:
+                damping, step = 0.0, problem.step(here, 0.0)
+            promised = step.promised if damping == 0.0 else math.inf
+            if promised < self.negligible * self.tolerance and here is best:
+                return best, step, taken, _gained(promised)
+            trial = problem.moved(here, step)
+            gain = -math.inf if trial is None else best.cost - trial.cost
+            if trial is not None and self._ends(promised, gain, damping == 0.0 and here is best):
+                kept = problem.settled(trial) if gain >= 0.0 else best
+                return kept, step, taken, _gained(gain)
+            falls = gain > 0.0
+            if trial is not None and falls:
+                here = best = problem.settled(trial)
+                damping, rises = self.damping.eased(damping, 1.0), 0
+                continue
+            may_climb = damping == 0.0 and rises < self.most_rises
+            if trial is not None and may_climb and self._leads_on(problem, trial, step):
+                here, rises = trial, rises + 1
+                continue
+            here, damping = best, self.damping.grown(damping, self.damping.growth)
+            if damping > self.damping.largest:
+                stop = STUCK
+                break
+        return best, problem.step(best, 0.0), taken, stop
+
+    def _ends(self, promised: float, gain: float, full: bool) -> bool:
+        """Whether nothing is to be gained any more, by what a step promised or a full one did."""
+        settled = promised < self.tolerance or (gain < self.tolerance and full)
+        return settled and abs(gain) < self.tolerance
+
+    def _leads_on(self, problem: Valley[P, L], trial: P, step: L) -> bool:
+        return problem.step(trial, 0.0).longest < self.shorter * step.longest
+
+
+def _gained(gain: float) -> Stop:
+    return converged(f"the last step lowered the cost by {max(gain, 0.0):.2g}")

@@ -8,17 +8,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
 
-from freeswing.cdpr.descent import STUCK, Stop, converged, out_of_steps
+from freeswing.cdpr.descent import LevenbergMarquardt, Stop, Undamped, converged
 from freeswing.cdpr.robot import Array
 from freeswing.ident.likelihood.unknowns import Unknown, Unknowns
 
 RANK_LIMIT = 1e-9  # singular values of the scaled triangle below so much of the largest are none
 FIRST_DAMPING = 1e-4  # of a column's own curvature, where a full step has failed
 LARGEST_DAMPING = 1e8  # from here on a step is too small to lower anything
+ROUNDING = 1e-12  # share of the cost by which a step may raise it and still stand
+
+
+Part = tuple[Array, Array, Array]  # residuals, slopes by own unknowns, slopes by shared ones
 
 
 class Swing(Protocol):
@@ -118,7 +123,8 @@ class _Step:
     own: dict[str, Array]
     triangle: Array
     singular_values: Array
-    gain: float
+    promised: float
+    is_full: bool
 
     @property
     def longest(self) -> float:
@@ -141,34 +147,65 @@ def fit(swings: Sequence[Swing], unknowns: Unknowns, how: How | None = None) -> 
     how = how or How()
     if not swings:
         raise ValueError("no run to fit")
-    made = _simulated(swings, unknowns)
-    cost, damping, taken = _cost(swings, unknowns, made), 0.0, 0
-    stop = out_of_steps(how.steps)
-    parts = _linearised(swings, unknowns, made)
-    while taken < how.steps:
-        taken += 1
-        step = _step(parts, unknowns, damping)
-        while step.longest > how.farthest and damping < LARGEST_DAMPING:
-            damping = max(FIRST_DAMPING, 10.0 * damping)
-            step = _step(parts, unknowns, damping)
-        if damping == 0.0 and step.gain < how.tolerance:
-            stop = converged(f"a step would gain {step.gain:.2g}")
-            break
-        trial = _moved(unknowns, step, how.farthest)
-        lower, made = _cost_or_infinite(swings, trial)
-        if lower > cost * (1.0 + 1e-12):
-            damping = max(FIRST_DAMPING, 10.0 * damping)
-            if damping > LARGEST_DAMPING:
-                stop = STUCK
-                break
-            continue
-        gained, unknowns, cost = cost - lower, trial, lower
-        parts = _linearised(swings, unknowns, made)
-        damping = 0.0 if damping < FIRST_DAMPING else damping / 3.0
-        if gained < how.tolerance and step.gain < 10.0 * how.tolerance:
-            stop = converged(f"the last step gained {gained:.2g}")
-            break
-    return _packed(parts, unknowns, cost, taken, stop)
+    damping = Undamped(
+        raised=FIRST_DAMPING, relief=3.0, least=FIRST_DAMPING, largest=LARGEST_DAMPING
+    )
+    search = LevenbergMarquardt(
+        how.steps, damping, level=True, slack=ROUNDING, farthest=how.farthest
+    )
+    start = _Place(tuple(swings), unknowns, _simulated(swings, unknowns))
+    place, taken, stop = search.descend(_Blocks(how), start)
+    return _packed(place.parts, place.unknowns, place.cost, taken, stop)
+
+
+@dataclass(frozen=True)
+class _Place:
+    """Unknowns with what was simulated there; cost and slopes once they are asked for."""
+
+    swings: tuple[Swing, ...]
+    unknowns: Unknowns
+    made: Sequence[Any]
+
+    @cached_property
+    def cost(self) -> float:
+        return _cost(self.swings, self.unknowns, self.made)
+
+    @cached_property
+    def parts(self) -> list[Part]:
+        return _linearised(self.swings, self.unknowns, self.made)
+
+
+@dataclass(frozen=True, slots=True)
+class _Blocks:
+    """The fit as the search sees it."""
+
+    how: How
+
+    def step(self, place: _Place, damping: float) -> _Step:
+        return _step(place.parts, place.unknowns, damping)
+
+    def moved(self, place: _Place, step: _Step) -> _Place | None:
+        if self._is_idle(step):
+            return None
+        unknowns = _moved(place.unknowns, step, self.how.farthest)
+        try:
+            there = _Place(place.swings, unknowns, _simulated(place.swings, unknowns))
+            return there if np.isfinite(there.cost) else None
+        except (ValueError, np.linalg.LinAlgError):
+            return None
+
+    def ended(
+        self, place: _Place, step: _Step, trial: _Place | None, lower: bool, damping: float
+    ) -> Stop | None:
+        if self._is_idle(step):
+            return converged(f"a step would gain {step.promised:.2g}")
+        gained = np.inf if trial is None or not lower else place.cost - trial.cost
+        if gained < self.how.tolerance and step.promised < 10.0 * self.how.tolerance:
+            return converged(f"the last step gained {gained:.2g}")
+        return None
+
+    def _is_idle(self, step: _Step) -> bool:
+        return step.is_full and step.promised < self.how.tolerance
 
 
 def _simulated(swings: Sequence[Swing], unknowns: Unknowns) -> list[Any]:
@@ -180,17 +217,6 @@ def _cost(swings: Sequence[Swing], unknowns: Unknowns, made: Sequence[Any]) -> f
     for run, (swing, one) in enumerate(zip(swings, made, strict=True)):
         total += float(np.sum(swing.residuals(unknowns.of_run(run), one) ** 2))
     return total
-
-
-def _cost_or_infinite(swings: Sequence[Swing], unknowns: Unknowns) -> tuple[float, list[Any]]:
-    try:
-        made = _simulated(swings, unknowns)
-        return _cost(swings, unknowns, made), made
-    except (ValueError, np.linalg.LinAlgError):
-        return np.inf, []
-
-
-Part = tuple[Array, Array, Array]  # residuals, slopes by own unknowns, slopes by shared ones
 
 
 def _linearised(swings: Sequence[Swing], unknowns: Unknowns, made: Sequence[Any]) -> list[Part]:
@@ -256,6 +282,7 @@ def _step(parts: list[Part], unknowns: Unknowns, damping: float) -> _Step:
         triangle,
         singular,
         gain,
+        damping == 0.0,
     )
 
 

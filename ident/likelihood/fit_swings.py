@@ -26,6 +26,7 @@ from freeswing.ident.likelihood.blocks import (
     split_own,
     state_of,
 )
+from freeswing.ident.likelihood.fit_blocks import Solution
 from freeswing.ident.likelihood.joint_problem import TOLERANCE_M, Problem, State, Step
 from freeswing.ident.likelihood.minimise import minimised
 from freeswing.ident.likelihood.payload_runs import Loads
@@ -122,6 +123,14 @@ class LikelihoodFit:
         if loads.count:
             blocks.append(payload_block(loads, self.loads, payloads))
         return Unknowns(tuple(blocks))
+
+    @property
+    def solution(self) -> Solution:
+        """The same as every fit of named blocks gives it."""
+        pairs = zip(self.motions, self.samples, strict=True)
+        white = tuple(residuals(motion, run, self.scales).ravel() for motion, run in pairs)
+        found = (self.unknowns, self.covariance, self.cost, white, self.singular_values)
+        return Solution(*found, self.rank, self.steps, self.stop)
 
     def covariance_of(self, *names: str) -> Array:
         """Joint covariance of some blocks of the shared unknowns."""

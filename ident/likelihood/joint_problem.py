@@ -89,8 +89,8 @@ class Step:
         triangle: R of the scaled joint problem in the free unknowns.
         singular_values: of that triangle, descending.
         rank: how many of them count.
-        decrease: of the cost that an undamped linear step would bring.
-        length: largest change of a shared unknown or start, each in its unit.
+        promised: decrease of the cost that an undamped linear step would bring.
+        longest: largest change of a shared unknown or start, each in its unit.
         runs: rows of each run over [shared unknowns; residual].
         priors: rows of what is known beforehand.
     """
@@ -101,8 +101,8 @@ class Step:
     triangle: Array
     singular_values: Array
     rank: int
-    decrease: float
-    length: float
+    promised: float
+    longest: float
     runs: tuple[Array, ...]
     priors: Array
 

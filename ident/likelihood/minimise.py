@@ -1,19 +1,16 @@
 """Least squares over all runs: Gauss-Newton steps that may climb out of a curved valley.
 
 Where a swing's decay is wrong, a good step raises the cost for once: what it leaves in the
-directions that data see best is second order, and the next step takes it away. Such a step stands
-when the next one is shorter (natural monotonicity: Deuflhard, Newton Methods for Nonlinear
-Problems, 2011, sec. 4.3), for a few steps (a watchdog: Nocedal and Wright, Numerical Optimization,
-2006, sec. 15.6); else the search goes back to the best place and is damped (Levenberg, Marquardt).
+directions that data see best is second order, and the next step takes it away. Hence the watchdog
+of `cdpr.descent`.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
-import numpy as np
-
-from freeswing.cdpr.descent import STUCK, Stop, converged, out_of_steps
+from freeswing.cdpr.descent import Stop, Undamped, Watchdog
 from freeswing.ident.likelihood.joint_problem import Linear, Problem, State, Step
 
 FIRST_DAMPING = 1e-7  # of the largest curvature: below, a damped step is the full one
@@ -21,15 +18,6 @@ LARGEST_DAMPING = 1e2  # a step so damped goes nowhere
 SHORTER = 0.95  # than the last step is the next one where the search converges
 MOST_RISES = 3  # steps above the best cost, until it has to be beaten
 NEGLIGIBLE = 1e-4  # of the tolerance: not worth a simulation
-
-
-@dataclass(frozen=True, slots=True)
-class Place:
-    """A state with its cost, and all runs to first order."""
-
-    state: State
-    cost: float
-    linear: Linear
 
 
 def minimised(
@@ -48,45 +36,46 @@ def minimised(
     Raises:
         ValueError: when the start cannot be simulated, naming the run.
     """
-    here = best = _place(problem, problem.rescaled(problem.begun(state)))
-    damping, rises, taken, falls = 0.0, 0, 0, False
-    for taken in range(1, steps + 1):
-        step = problem.step(here.state, here.linear, damping)
-        if falls and damping > 0.0 and step.decrease < tolerance:
-            damping, step = 0.0, problem.step(here.state, here.linear, 0.0)
-        promised = step.decrease if damping == 0.0 else np.inf
-        if promised < NEGLIGIBLE * tolerance and here is best:
-            return best.state, step, taken, _converged(promised)
-        trial = problem.moved(here.state, step, here.linear.surroundings)
-        lower = np.inf if trial is None else problem.cost(trial)
-        gain = best.cost - lower
-        settled = promised < tolerance or (gain < tolerance and damping == 0.0 and here is best)
-        if trial is not None and settled and abs(gain) < tolerance:
-            kept = problem.rescaled(trial) if gain >= 0.0 else best.state
-            return kept, step, taken, _converged(gain)
-        falls = gain > 0.0
-        if trial is not None and falls:
-            here = best = _place(problem, problem.rescaled(trial))
-            damping, rises = (0.0 if damping < FIRST_DAMPING / 10.0 else damping / 4.0), 0
-            continue
-        if trial is not None and damping == 0.0 and rises < MOST_RISES:
-            further = _place(problem, trial)
-            next_step = problem.step(further.state, further.linear, 0.0)
-            if next_step.length < SHORTER * step.length:
-                here, rises = further, rises + 1
-                continue
-        here, damping = best, max(FIRST_DAMPING, 10.0 * damping)
-        if damping > LARGEST_DAMPING:
-            break
-    step = problem.step(best.state, best.linear, 0.0)
-    failed = damping > LARGEST_DAMPING
-    stop = STUCK if failed else out_of_steps(steps)
-    return best.state, step, taken, stop
+    damping = Undamped(
+        raised=FIRST_DAMPING, relief=4.0, least=FIRST_DAMPING / 10.0, largest=LARGEST_DAMPING
+    )
+    search = Watchdog(steps, tolerance, damping, SHORTER, MOST_RISES, NEGLIGIBLE)
+    runs = _Runs(problem)
+    place, step, taken, stop = search.descend(runs, runs.at(problem.begun(state)))
+    return place.state, step, taken, stop
 
 
-def _place(problem: Problem, state: State) -> Place:
-    return Place(state, problem.cost(state), problem.linear(state))
+@dataclass(frozen=True)
+class _Place:
+    """A state; its cost and all runs to first order once they are asked for."""
+
+    problem: Problem
+    state: State
+
+    @cached_property
+    def cost(self) -> float:
+        return self.problem.cost(self.state)
+
+    @cached_property
+    def linear(self) -> Linear:
+        return self.problem.linear(self.state)
 
 
-def _converged(gain: float) -> Stop:
-    return converged(f"the last step lowered the cost by {max(gain, 0.0):.2g}")
+@dataclass(frozen=True, slots=True)
+class _Runs:
+    """The joint problem as the search sees it."""
+
+    problem: Problem
+
+    def at(self, state: State) -> _Place:
+        return _Place(self.problem, state)
+
+    def step(self, place: _Place, damping: float) -> Step:
+        return self.problem.step(place.state, place.linear, damping)
+
+    def moved(self, place: _Place, step: Step) -> _Place | None:
+        state = self.problem.moved(place.state, step, place.linear.surroundings)
+        return None if state is None else self.at(state)
+
+    def settled(self, place: _Place) -> _Place:
+        return self.at(self.problem.rescaled(place.state))

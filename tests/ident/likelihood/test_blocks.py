@@ -65,6 +65,14 @@ def test_the_blocks_are_the_vectors(found):
     assert unknowns.block(PAYLOADS).value.tolist() == found.loads.tolist()
     assert found.std_of(PAYLOADS).tolist() == found.std[-len(found.loads) :].tolist()
     assert found.covariance_of(INERTIA).tolist() == found.covariance[:9, :9].tolist()
+    solution = found.solution
+    assert solution.covariance_of(PAYLOADS, INERTIA).tolist() == (
+        found.covariance_of(PAYLOADS, INERTIA).tolist()
+    )
+    assert solution.std(PAYLOADS).tolist() == found.std_of(PAYLOADS).tolist()
+    white = float(sum(np.sum(run**2) for run in solution.residuals))
+    assert 0.0 < white <= solution.cost == found.cost, (white, solution.cost)
+    assert (solution.rank, solution.stop) == (found.rank, found.stop)
     own = np.array([m.values[found.model.own_values] for m in found.motions])
     assert unknowns.block(each_run(EFFECTS[0])).value.tolist() == own.tolist()
 
