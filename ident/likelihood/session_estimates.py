@@ -11,12 +11,7 @@ from freeswing.cdpr.robot import Array
 from freeswing.ident.estimate import Estimate
 from freeswing.ident.fidim.fidim import WELL_IDENTIFIED_PERCENT, near_zero
 from freeswing.ident.judge.consistency import consistency, is_possible, nearest_possible
-from freeswing.ident.judge.free_swing_law import (
-    LawlessError,
-    is_lawless,
-    lawless_sentence,
-    unexplained_motion,
-)
+from freeswing.ident.judge.free_swing_law import unexplained_motion
 from freeswing.ident.likelihood.between_runs import widened
 from freeswing.ident.likelihood.blocks import INERTIA, PAYLOADS
 from freeswing.ident.likelihood.cable_ends import geometry_document, weighed_against_priors
@@ -31,7 +26,6 @@ from freeswing.ident.runs import DroppedRun
 from freeswing.ident.signals.prepare import PreparedRun, Progress
 
 _ASTRAY = 0.5  # a lost swing is out of phase with its samples
-_AS_BAD = 0.95  # times the worst run
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,44 +85,7 @@ def ml_estimate(
     ), told.fit
 
 
-def best_ml_estimate(
-    model: Model,
-    runs: list[PreparedRun],
-    free: tuple[str, ...] | None,
-    starts: list[Array],
-    dropped: tuple[DroppedRun, ...] = (),
-    progress: Progress | None = None,
-    asked: Asked | None = None,
-) -> tuple[Estimate, LikelihoodFit]:
-    """The likeliest fit, without the runs that follow no free swing: they are dropped by name.
-
-    Raises:
-        LawlessError: when no run follows one.
-        ValueError: when no start leads to a fit: what went wrong from the first.
-    """
-    entry, found = _from_starts(model, runs, free, starts, dropped, progress, asked)
-    shares = unexplained_motion(found)
-    lawless = is_lawless(shares, refuted=_is_refuted(entry, found))
-    if not lawless.any():
-        return entry, found
-    if lawless.all():
-        least = int(np.argmin(shares))
-        raise LawlessError(
-            "no run swings freely by this robot's equations; of "
-            f"{found.samples[least].name}, which comes closest, "
-            f"{lawless_sentence(float(shares[least]))}"
-        )
-    # One bad run may take others with it: those that are off nearly as far as the worst leave.
-    worst = {
-        found.samples[run].name: lawless_sentence(float(shares[run]))
-        for run in np.flatnonzero(lawless & (shares > _AS_BAD * shares.max()))
-    }
-    dropped += tuple(DroppedRun(name, why, lawless=True) for name, why in worst.items())
-    kept = [run for run in runs if run.name not in worst]
-    return best_ml_estimate(model, kept, free, [entry.values, *starts], dropped, progress, asked)
-
-
-def _from_starts(
+def from_starts(
     model: Model,
     runs: list[PreparedRun],
     free: tuple[str, ...] | None,
@@ -140,6 +97,9 @@ def _from_starts(
     """The first fit from several starts that follows the runs, or else the likeliest of all.
 
     A fit follows when its residuals are small beside the swings and no body is ruled out by it.
+
+    Raises:
+        ValueError: when no start leads to a fit: what went wrong from the first.
     """
     found: list[tuple[Estimate, LikelihoodFit]] = []
     failure: Exception | None = None
@@ -149,7 +109,7 @@ def _from_starts(
         except (ValueError, np.linalg.LinAlgError) as error:
             failure = failure or error
             continue
-        if not _is_refuted(entry, result) and astray(result) < _ASTRAY:
+        if not is_refuted(entry, result) and astray(result) < _ASTRAY:
             return entry, result
         found.append((entry, result))
     if not found:
@@ -157,7 +117,7 @@ def _from_starts(
     return min(found, key=lambda pair: pair[1].deviance)
 
 
-def _is_refuted(entry: Estimate, found: LikelihoodFit) -> bool:
+def is_refuted(entry: Estimate, found: LikelihoodFit) -> bool:
     """Whether no body has the inertia that a fit needs, by the fit's own deviations.
 
     A run that follows no law puts the runs apart: the deviations between them would excuse it.

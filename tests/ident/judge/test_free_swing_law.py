@@ -111,7 +111,6 @@ def test_one_made_up_run_leaves_by_name(method: str):
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(reason="the fit of all five settles where swing-7 is explained least of all")
 def test_no_swing_leaves_with_a_made_up_run():
     dropped = {drop.run for drop in with_a_curve().estimates["ml_free"].dropped}
     assert dropped == {"made-6"}, f"left out {dropped}"
