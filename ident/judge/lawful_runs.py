@@ -18,7 +18,7 @@ from freeswing.ident.judge.free_swing_law import (
     unexplained_motion,
 )
 from freeswing.ident.judge.prediction import predict
-from freeswing.ident.likelihood.likelihood import LikelihoodFit
+from freeswing.ident.likelihood.fit_swings import LikelihoodFit
 from freeswing.ident.likelihood.session_estimates import Asked, from_starts, is_refuted
 from freeswing.ident.runs import DroppedRun
 from freeswing.ident.signals.prepare import PreparedRun, Progress
