@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from statistics import median
 from typing import TYPE_CHECKING, Any
 
 from freeswing.commands.arguments import add_session, open_session, positive
@@ -11,12 +12,13 @@ from freeswing.console import Console
 if TYPE_CHECKING:
     from freeswing.cdpr.robot import Robot
     from freeswing.ident.runs import SwingRun
-    from freeswing.results.identification import Identification
+    from freeswing.results.identification import Identification, ValidatedRun
     from freeswing.session.made import Made
     from freeswing.session.marker_runs import MarkerRuns
     from freeswing.session.session_file import Session
     from freeswing.workers.crew import Crew
 
+MOST_LISTED = 8  # held-out runs with a line each
 FURTHER = ("consistent", "entry_std_m", "attachment_std_m")  # settings that are absent by default
 
 
@@ -149,7 +151,8 @@ def _recording_notes(
 
 
 def _summarise(document: Identification, best: str, console: Console) -> None:
-    from freeswing.report.words import ESTIMATES, millimetres, number, parameter_row
+    from freeswing.report.grouped_notes import grouped
+    from freeswing.report.words import ESTIMATES, parameter_row
 
     console.say(f"{ESTIMATES[best]}, ± 95 %")
     for parameter in document.estimates[best].parameters:
@@ -158,9 +161,32 @@ def _summarise(document: Identification, best: str, console: Console) -> None:
         console.say(f"{line}  {row['weak']}".rstrip())
     for dropped in document.estimates[best].dropped_runs:
         console.say(f"  run {dropped.run} left out: {dropped.why}")
-    for entry in document.validation:
-        error, floor = millimetres(entry.prediction_rmse_m), millimetres(entry.noise_floor_m)
-        predicted = f"off by {error} (noise {floor}), " if entry.prediction_rmse_m else ""
-        console.say(f"  {entry.run}: {predicted}sigma_perp {number(entry.sigma_perp)}")
-    for note in document.notes:
+    for line in _held_out_lines(document.validation):
+        console.say(f"  {line}")
+    for note in grouped(document.notes):
         console.say(f"  note: {note}")
+
+
+def _held_out_lines(runs: tuple[ValidatedRun, ...]) -> list[str]:
+    """A line for each held-out run; of many, the usual one and the worst."""
+    from freeswing.report.words import millimetres, number
+
+    lines = [_held_out_line(run) for run in runs]
+    errors = [run.prediction_rmse_m or 0.0 for run in runs]
+    scatter = [run.sigma_perp or 0.0 for run in runs]
+    if len(runs) <= MOST_LISTED or not any(errors):
+        return lines
+    worst = dict.fromkeys([errors.index(max(errors)), scatter.index(max(scatter))])
+    return [
+        f"{len(runs)} held-out runs: off by {millimetres(median(errors))} in the median, "
+        f"sigma_perp {number(median(scatter))}; the worst, each is in the report:",
+        *(lines[k] for k in worst),
+    ]
+
+
+def _held_out_line(run: ValidatedRun) -> str:
+    from freeswing.report.words import millimetres, number
+
+    error, floor = millimetres(run.prediction_rmse_m), millimetres(run.noise_floor_m)
+    predicted = f"off by {error} (noise {floor}), " if run.prediction_rmse_m else ""
+    return f"{run.run}: {predicted}sigma_perp {number(run.sigma_perp)}"

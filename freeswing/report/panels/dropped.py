@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from freeswing.report.grouped_notes import grouped
 from freeswing.report.material import Material
 from freeswing.report.words import ESTIMATES
 
@@ -27,7 +28,7 @@ class Dropped:
             rows += [_row("view", "calibration", one) for one in material.calibration.dropped_views]
         runs = () if material.tracking is None else material.tracking.runs
         rows += [_row(f"run {run.run}", "tracking", one) for run in runs for one in run.problems]
-        return {"rows": rows, "notes": list(dict.fromkeys(_notes(material)))}
+        return {"rows": rows, "notes": grouped(_notes(material))}
 
 
 def _row(what: str, where: str, why: str) -> dict[str, str]:
