@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,7 @@ from freeswing.ident.diagnose.answer.cut import cut, settled_places, with_settle
 from freeswing.ident.diagnose.answer.decay import swing_decay
 from freeswing.ident.diagnose.answer.deviations import honest_covariance
 from freeswing.ident.diagnose.answer.entries import accepted_entries, candidate_entry, claims
+from freeswing.ident.diagnose.answer.last_words import last_words, rivals_of
 from freeswing.ident.diagnose.answer.next_swing import NextSwing, next_swing
 from freeswing.ident.diagnose.decision import LEAST_SHARE_EXPLAINED, Candidate, excess_of
 from freeswing.ident.diagnose.declared_model import base_fit, refuse_few
@@ -180,12 +181,12 @@ def diagnose(
     begun = search.rounds[0].before if accepted else last
     first = final if not accepted else _with_own_noise(begun.fit, fitted)
     spread = honest_covariance(final, last)
-    groups = {effect_of(one.decision.key): one.decision.group for one in accepted}
+    groups = rivals_of(accepted)
     if progress:
         progress("diagnosis", 1.0)
     return Diagnosis(
         ladder,
-        _last_words(search, last.effects if accepted else (), barred, names),
+        last_words(search.rounds, last.effects if accepted else (), barred, names),
         groups,
         first,
         final,
@@ -325,29 +326,6 @@ def _ladder(
             )
         )
     return tuple(rungs)
-
-
-def _last_words(
-    search: Search, final: tuple[str, ...], barred: dict[str, str], names: tuple[str, ...]
-) -> tuple[Candidate, ...]:
-    """Each effect's verdict in the round that accepted it, else in the last that looked at it."""
-    words: dict[str, Candidate] = {}
-    for one in search.rounds:
-        stays = any(name in final for name in one.decision.group)
-        for candidate in one.decision.candidates:
-            if candidate.verdict != "rejected" and not stays:
-                candidate = replace(candidate, verdict="rejected", confounded_with=())
-            known = words.get(candidate.effect)
-            if known is None or known.verdict == "rejected":
-                words[candidate.effect] = candidate
-        for name in one.removed:
-            why = f"superfluous since {effect_of(one.decision.key)} is in the model: removed again"
-            words[name] = replace(words[name], verdict="rejected", confounded_with=(), reason=why)
-    for name, why in barred.items():
-        if name in names:
-            words[name] = Candidate(name, "not_identifiable", 0.0, 0.0, (), why)
-    order = {"accepted": 0, "confounded": 1, "rejected": 2, "not_identifiable": 3}
-    return tuple(sorted(words.values(), key=lambda c: (order[c.verdict], c.delta_bic)))
 
 
 def _parameters(found: LikelihoodFit, covariance: Array) -> list[dict[str, Any]]:
