@@ -15,6 +15,10 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 _SMALL_SINE = 1e-9
+_NEWTON_STEPS = 30
+_CONVERGED = 1e-12
+_LEAST_DETERMINANT = 1e-6
+_SOLVED = 1e-9
 
 
 @numba.njit(cache=True, nogil=True)
@@ -141,3 +145,43 @@ def lens_jacobians(is_fisheye: bool, full: Array, points: Array) -> tuple[Array,
     for k in range(count):
         lens_point(is_fisheye, full, points[k], True, pixels[k], d_point[k], d_full[k])
     return pixels, d_point, d_full
+
+
+@numba.njit(cache=True, nogil=True)
+def perspective_rays(distorted: Array, full: Array, limit: float) -> Array:
+    """Undistorted x/z, y/z (n, 2) of distorted ones (n, 2); NaN where no ray of the lens is.
+
+    Newton on the two-dimensional distortion, started and kept inside the radius `limit` up to
+    which the lens is one to one. `full` has focal lengths of one and no principal point.
+
+    Source:
+        Heikkila, Silven 1997, A four-step camera calibration procedure, section 4: the distortion
+        has no inverse in closed form.
+    """
+    rays = np.empty_like(distorted)
+    point, value = np.ones(3), np.empty(2)
+    slope, d_full = np.empty((2, 3)), np.empty((2, 12))
+    for k in range(len(distorted)):
+        xd, yd = distorted[k, 0], distorted[k, 1]
+        shorter = min(1.0, 0.9 * limit / max(math.hypot(xd, yd), 1e-12))
+        point[0], point[1] = shorter * xd, shorter * yd
+        for _ in range(_NEWTON_STEPS):
+            perspective(full, point, True, value, slope, d_full)
+            a, b, c, d = slope[0, 0], slope[0, 1], slope[1, 0], slope[1, 1]
+            determinant = a * d - b * c
+            if abs(determinant) < _LEAST_DETERMINANT:
+                determinant = _LEAST_DETERMINANT
+            ex, ey = xd - value[0], yd - value[1]
+            sx, sy = (d * ex - b * ey) / determinant, (a * ey - c * ex) / determinant
+            x, y = point[0] + sx, point[1] + sy
+            shorter = min(1.0, limit / max(math.hypot(x, y), 1e-12))
+            point[0], point[1] = shorter * x, shorter * y
+            if abs(sx) <= _CONVERGED and abs(sy) <= _CONVERGED:
+                break
+        perspective(full, point, False, value, slope, d_full)
+        solved = math.hypot(xd - value[0], yd - value[1]) < _SOLVED
+        if solved and math.hypot(point[0], point[1]) < limit:
+            rays[k] = point[:2]
+        else:
+            rays[k] = math.nan
+    return rays

@@ -19,7 +19,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from freeswing.calib.camera.lens_kernels import lens_jacobians, lens_pixels
+from freeswing.calib.camera.lens_kernels import lens_jacobians, lens_pixels, perspective_rays
 
 Array = NDArray[np.float64]
 
@@ -160,37 +160,10 @@ def normalise(model: str, pixels: Array, params: Array) -> Array:
 
 
 def _perspective_undistort(distorted: Array, model: str, params: Array) -> Array:
-    """Newton on the two-dimensional distortion, started inside its one-to-one region."""
     unit = full_parameters(model, params)
     unit[:4] = (1.0, 1.0, 0.0, 0.0)
-    limit = radius_limit(model, params)
-    radius = np.linalg.norm(distorted, axis=-1, keepdims=True)
-    guess = distorted * np.minimum(1.0, 0.9 * limit / np.maximum(radius, 1e-12))
-    ones = np.ones((*distorted.shape[:-1], 1))
-    for _ in range(_NEWTON_STEPS):
-        value, jacobian, _ = project_jacobian(
-            "FULL_OPENCV", np.concatenate([guess, ones], -1), unit
-        )
-        a, b = jacobian[..., 0, 0], jacobian[..., 0, 1]
-        c, d = jacobian[..., 1, 0], jacobian[..., 1, 1]
-        error = distorted - value
-        determinant = a * d - b * c
-        determinant = np.where(np.abs(determinant) < 1e-6, 1e-6, determinant)
-        step = (
-            np.stack(
-                [d * error[..., 0] - b * error[..., 1], a * error[..., 1] - c * error[..., 0]], -1
-            )
-            / determinant[..., None]
-        )
-        guess = guess + step
-        size = np.linalg.norm(guess, axis=-1, keepdims=True)
-        guess = guess * np.minimum(1.0, limit / np.maximum(size, 1e-12))
-        if not np.any(np.abs(step) > _CONVERGED):
-            break
-    value = project("FULL_OPENCV", np.concatenate([guess, ones], -1), unit)
-    solved = np.linalg.norm(distorted - value, axis=-1) < 1e-9
-    solved &= np.linalg.norm(guess, axis=-1) < limit
-    return np.where(solved[..., None], guess, np.nan)
+    flat = np.ascontiguousarray(distorted).reshape(-1, 2)
+    return perspective_rays(flat, unit, radius_limit(model, params)).reshape(distorted.shape)
 
 
 def _fisheye_undistort(distorted: Array, params: Array) -> Array:

@@ -74,7 +74,7 @@ def base_tags() -> tuple[Tag, ...]:
 
 
 def film_board(folder: Path, seed: int, progress: Progress | None = None) -> None:
-    """`calibration/<camera>.mkv`: a board carried through the field of view."""
+    """`calibration/<camera>.avi`: a board carried through the field of view."""
     board = charuco_patch(
         (9, 6), BOARD["square_m"], BOARD["marker_m"], str(BOARD["dictionary"])
     ).moved(_facing(np.zeros(3), 0.0), "platform")
@@ -86,7 +86,7 @@ def film_board(folder: Path, seed: int, progress: Progress | None = None) -> Non
 def film_swing(
     folder: Path, swing: Swing, cut_s: float, seed: int, progress: Progress | None = None
 ) -> None:
-    """`runs/<name>/<camera>.mkv` of one swing, but for `cut_s` at either end."""
+    """`runs/<name>/<camera>.avi` of one swing, but for `cut_s` at either end."""
     start, end = cut_s, swing.motion.end_s - cut_s
     stamps = start + np.arange(round((end - start) * RATE_HZ)) / RATE_HZ
     patches = [tag_patch(t.family, t.id, t.size_m, t.T_platform_tag) for t in demo_target().tags]
@@ -105,7 +105,10 @@ def _film(
     """All cameras at once, one thread each: the renderer leaves the interpreter free."""
     cameras = true_cameras()
     with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
-        jobs = [pool.submit(record, folder, [c], scene, stamps, LOOK, seed) for c in cameras]
+        jobs = [
+            pool.submit(record, folder, [c], scene, stamps, LOOK, seed, suffix=".avi")
+            for c in cameras
+        ]
         for done, job in enumerate(jobs):
             if progress is not None:
                 progress(label, done / len(jobs))

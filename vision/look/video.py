@@ -19,13 +19,16 @@ Array = NDArray[np.float64]
 Image = NDArray[np.uint8]
 
 MUXERS = {".mkv": "matroska", ".avi": "avi", ".mp4": "mp4", ".mov": "mov"}
+CODECS = {".mkv": "ffv1", ".avi": "magicyuv", ".mp4": "ffv1", ".mov": "ffv1"}
 _CLOCK = Fraction(1, 1_000_000)
 
 
 def write_video(
-    path: Path, frames: Iterable[Image], stamps_s: Array, *, codec: str = "ffv1"
+    path: Path, frames: Iterable[Image], stamps_s: Array, *, codec: str | None = None
 ) -> None:
-    """Writes grey frames (h, w) as a lossless video (FFV1, every frame a key frame).
+    """Writes grey frames (h, w) as a lossless video, every frame a key frame.
+
+    The codec is MagicYUV for .avi, else FFV1.
 
     The file appears under its name only when complete. Stamps become presentation times in
     microseconds, counted from the first.
@@ -39,7 +42,7 @@ def write_video(
         draft_of(path) as draft,
         av.open(draft.name, "w", format=MUXERS[path.suffix.lower()]) as container,
     ):
-        stream = _add_stream(container, codec, first.shape, stamps_s)
+        stream = _add_stream(container, codec or CODECS[path.suffix.lower()], first.shape, stamps_s)
         for frame, stamp in zip(chain([first], pictures), stamps_s, strict=True):
             picture = av.VideoFrame.from_ndarray(frame, format="gray")
             picture.pts = round((float(stamp) - float(stamps_s[0])) / _CLOCK)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import cv2
@@ -14,7 +14,6 @@ from freeswing.vision.look.video import write_stamps, write_video
 from freeswing.vision.render.render_scene import Look, Renderer, Scene
 
 Array = NDArray[np.float64]
-Progress = Callable[[str, float], None]
 
 
 def record(
@@ -27,9 +26,11 @@ def record(
     *,
     images: bool = False,
     stamps_file: bool = True,
-    progress: Progress | None = None,
+    suffix: str = ".mkv",
 ) -> None:
     """Films the scene with every camera: `<camera>.mkv` (FFV1) or `<camera>/*.png`, and stamps.
+
+    `.avi` (MagicYUV) is written and read four times as fast and takes a fifth more room.
 
     Args:
         folder: the run's or the calibration's folder; made when absent.
@@ -40,13 +41,11 @@ def record(
         seed: decides noise and background.
         images: numbered PNG files instead of a video.
         stamps_file: whether `<camera>.csv` is written.
-        progress: told the camera and the fraction done.
+        suffix: of the videos.
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    for k, camera in enumerate(cameras):
-        if progress is not None:
-            progress(camera.name, k / len(cameras))
+    for camera in cameras:
         frames = Renderer(camera, scene, look or Look(), seed).frames(stamps_s)
         if images:
             place = folder / camera.name
@@ -54,8 +53,6 @@ def record(
             for index, frame in enumerate(frames):
                 cv2.imwrite(str(place / f"{index:06d}.png"), frame)
         else:
-            write_video(folder / f"{camera.name}.mkv", frames, stamps_s)
+            write_video(folder / f"{camera.name}{suffix}", frames, stamps_s)
         if stamps_file:
             write_stamps(folder / f"{camera.name}.csv", stamps_s)
-    if progress is not None:
-        progress("recorded", 1.0)
