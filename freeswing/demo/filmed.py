@@ -15,9 +15,10 @@ from freeswing.demo.rig import (
     BOARD,
     RATE_HZ,
     base_tags,
+    board_shots,
     demo_target,
-    film_board,
-    film_swing,
+    film,
+    swing_shots,
     true_cameras,
 )
 from freeswing.demo.truth import EFFECT_VALUES, Swing, demo_robot, demo_swings
@@ -41,9 +42,10 @@ def write_filmed_session(
     generator = np.random.default_rng(seed)
     swings = demo_swings(generator, DURATION_S, effect_values)
     swings = tuple(swing for swing in swings if swing.name in filmed)
-    film_board(folder / "calibration", seed, progress)
+    shots = board_shots(folder / "calibration", seed)
     for swing in swings:
-        film_swing(folder / "runs" / swing.name, swing, CUT_S, seed, progress)
+        shots += swing_shots(folder / "runs" / swing.name, swing, CUT_S, seed)
+    film(shots, progress)
     write_robot(folder / "robot.toml", demo_robot())
     write_target(folder / "target.toml", demo_target())
     cameras = {camera.name: {"clock_offset_s": camera.clock_offset_s} for camera in true_cameras()}

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,7 @@ from freeswing.vision.render.record import record
 from freeswing.vision.render.render_scene import Look, Motion, Scene, motion_of
 
 Progress = Callable[[str, float], None]
+Shot = Callable[[], None]  # one camera's recording of one scene, taken when called
 
 SIZE_PX = (640, 480)
 RATE_HZ = 40.0
@@ -73,45 +75,37 @@ def base_tags() -> tuple[Tag, ...]:
     )
 
 
-def film_board(folder: Path, seed: int, progress: Progress | None = None) -> None:
+def board_shots(folder: Path, seed: int) -> list[Shot]:
     """`calibration/<camera>.avi`: a board carried through the field of view."""
     board = charuco_patch(
         (9, 6), BOARD["square_m"], BOARD["marker_m"], str(BOARD["dictionary"])
     ).moved(_facing(np.zeros(3), 0.0), "platform")
     stamps = np.arange(round(BOARD_SECONDS * BOARD_RATE_HZ)) / BOARD_RATE_HZ
-    scene = Scene((*_still_patches(), board), _carried)
-    _film(folder, scene, stamps, seed, progress, "filming the board")
+    return _shots(folder, Scene((*_still_patches(), board), _carried), stamps, seed)
 
 
-def film_swing(
-    folder: Path, swing: Swing, cut_s: float, seed: int, progress: Progress | None = None
-) -> None:
+def swing_shots(folder: Path, swing: Swing, cut_s: float, seed: int) -> list[Shot]:
     """`runs/<name>/<camera>.avi` of one swing, but for `cut_s` at either end."""
     start, end = cut_s, swing.motion.end_s - cut_s
     stamps = start + np.arange(round((end - start) * RATE_HZ)) / RATE_HZ
     patches = [tag_patch(t.family, t.id, t.size_m, t.T_platform_tag) for t in demo_target().tags]
-    scene = Scene((*_still_patches(), *patches), _motion(swing))
-    _film(folder, scene, stamps, seed, progress, f"filming {swing.name}")
+    return _shots(folder, Scene((*_still_patches(), *patches), _motion(swing)), stamps, seed)
 
 
-def _film(
-    folder: Path,
-    scene: Scene,
-    stamps: Array,
-    seed: int,
-    progress: Progress | None,
-    label: str,
-) -> None:
-    """All cameras at once, one thread each: the renderer leaves the interpreter free."""
-    cameras = true_cameras()
+def _shots(folder: Path, scene: Scene, stamps: Array, seed: int) -> list[Shot]:
+    return [
+        partial(record, folder, [camera], scene, stamps, LOOK, seed, suffix=".avi")
+        for camera in true_cameras()
+    ]
+
+
+def film(shots: Sequence[Shot], progress: Progress | None = None) -> None:
+    """Takes all shots, one thread a core: the renderer leaves the interpreter free."""
     with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
-        jobs = [
-            pool.submit(record, folder, [c], scene, stamps, LOOK, seed, suffix=".avi")
-            for c in cameras
-        ]
+        jobs = [pool.submit(shot) for shot in shots]
         for done, job in enumerate(jobs):
             if progress is not None:
-                progress(label, done / len(jobs))
+                progress("filming the board and the swings", done / len(jobs))
             job.result()
 
 
