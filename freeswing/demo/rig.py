@@ -24,7 +24,7 @@ Progress = Callable[[str, float], None]
 Shot = Callable[[], None]  # one camera's recording of one scene, taken when called
 
 SIZE_PX = (640, 480)
-RATE_HZ = 40.0
+RATE_HZ = 30.0
 BOARD_RATE_HZ = 10.0
 SPLINE_HZ = 400.0
 BOARD_SECONDS = 5.0
