@@ -22,6 +22,7 @@ from freeswing.cdpr.driven.motion import (
     LARGEST_REACH,
     MOST_DECAY,
     DrivenMotion,
+    memory_for,
     pace_of,
     substeps_for,
 )
@@ -242,15 +243,7 @@ def _machine(model: DrivenModel, stretch: Stretch, theta: Array) -> ElasticMachi
     inputs = np.zeros(code.n_in)
     inputs[size + n], inputs[size + n + 1] = stretch.stiffness_EA_N, stretch.relaxation_s
     inputs[size + n + 2 :] = theta
-    return ElasticMachine(
-        code.address,
-        inputs,
-        np.zeros(code.n_out),
-        evaluate(model.lags, theta)[0],
-        np.zeros((4, size)),
-        np.zeros((4, n)),
-        np.zeros((4, size)),
-    )
+    return ElasticMachine(*memory_for(code, inputs, evaluate(model.lags, theta)[0], size))
 
 
 def _substeps(

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from freeswing.cdpr.compiled.native import native
+from freeswing.cdpr.compiled.native import Native, native
 from freeswing.cdpr.driven.kernels.rigid_kernels import Machine, Pace, all_samples, one_sample
 from freeswing.cdpr.driven.model import N_STATE, DrivenModel
 from freeswing.cdpr.model.batch import evaluate
@@ -139,19 +139,25 @@ class Stepper:
 
 def machine_of(model: DrivenModel, theta: Array) -> Machine:
     """The model's equations as machine code with memory of its own."""
-    n = model.n_cables
     code = native(model.motion)
     inputs = np.zeros(code.n_in)
-    inputs[N_STATE + n :] = theta
-    return Machine(
-        code.address,
-        inputs,
-        np.zeros(code.n_out),
-        evaluate(model.lags, theta)[0],
-        np.zeros((4, N_STATE)),
-        np.zeros((4, n)),
-        np.zeros((4, N_STATE)),
-    )
+    inputs[N_STATE + model.n_cables :] = theta
+    return Machine(*memory_for(code, inputs, evaluate(model.lags, theta)[0], N_STATE))
+
+
+def memory_for(
+    code: Native, inputs: Array, lags: Array, size: int
+) -> tuple[int, Array, Array, Array, Array, Array, Array]:
+    """What a machine of `size` states is made of: its code and memory for the four stages.
+
+    Args:
+        code: of the equations.
+        inputs: of the code, its constants in place.
+        lags: time constant of each current loop, (n,).
+        size: how many states.
+    """
+    outputs, stages = np.zeros(code.n_out), np.zeros((4, size))
+    return code.address, inputs, outputs, lags, stages, np.zeros((4, len(lags))), stages.copy()
 
 
 def pace_of(model: DrivenModel, theta: Array, period_s: float, least: int | None) -> Pace:

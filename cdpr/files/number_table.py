@@ -19,6 +19,8 @@ MOST_TEXT_BYTES = 64 * 2**20
 MOST_ROWS = 2_000_000
 MOST_COLUMNS = 4000
 LARGEST_NUMBER = 1e12
+# Quaternions are written with two decimals and more; scaled or shuffled entries are off by more.
+QUATERNION_TOLERANCE = 0.02
 MISSING = ("", "nan", "-nan", "+nan", "na", "n/a", "null")
 
 
@@ -123,6 +125,21 @@ def check_times(path: Path | str, table: NumberTable, column: int, name: str) ->
         raise InputError(
             f"{path}: line {table.lines[i + 1]}: {name} is {times[i + 1]:.9g} after "
             f"{times[i]:.9g}; times must increase: sort the rows and drop repeated ones"
+        )
+
+
+def check_quaternions(path: Path | str, table: NumberTable, q: Array, order: str) -> None:
+    """Check that quaternions (n, 4) have length 1, NaN rows aside; `order` as the file has it.
+
+    Raises:
+        InputError: naming the line.
+    """
+    norm = np.linalg.norm(q, axis=1)
+    wrong = np.flatnonzero(np.abs(norm - 1.0) > QUATERNION_TOLERANCE)
+    if len(wrong):
+        raise InputError(
+            f"{path}: line {table.lines[wrong[0]]}: the quaternion's length is "
+            f"{norm[wrong[0]]:.4g}, must be 1 (order {order})"
         )
 
 

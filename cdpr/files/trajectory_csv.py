@@ -23,6 +23,7 @@ from freeswing.cdpr.files.noise_columns import (
 )
 from freeswing.cdpr.files.number_table import (
     NumberTable,
+    check_quaternions,
     check_times,
     check_width,
     read_lines,
@@ -39,7 +40,6 @@ from freeswing.cdpr.rotation import (
 Array = NDArray[np.float64]
 
 POSE_COLUMNS = ("x_m", "y_m", "z_m", *QUATERNION)
-QUATERNION_TOLERANCE = 0.02
 _ROWS_AT_ONCE = 2000
 WIDEST_SWING_RAD = 2.5  # from one side to the other: more than any hanging platform turns freely
 
@@ -147,13 +147,7 @@ def _known(is_pose: bool) -> str:
 def _poses(path: Path | str, table: NumberTable, columns: dict[str, Array]) -> Trajectory:
     position = np.stack([columns[name] for name in POSE_COLUMNS[:3]], axis=1)
     quaternion = np.stack([columns[name] for name in QUATERNION], axis=1)
-    norm = np.linalg.norm(quaternion, axis=1)
-    wrong = np.flatnonzero(np.abs(norm - 1.0) > QUATERNION_TOLERANCE)
-    if len(wrong):
-        raise InputError(
-            f"{path}: line {table.lines[wrong[0]]}: the quaternion's length is "
-            f"{norm[wrong[0]]:.4g}, must be 1 (order qw, qx, qy, qz)"
-        )
+    check_quaternions(path, table, quaternion, "qw, qx, qy, qz")
     angles = unwrapped(angles_from_matrix(matrix_from_quaternion(quaternion)))
     values = np.concatenate([position, angles], axis=1)
     is_known = np.asarray(np.isfinite(values).all(axis=1))

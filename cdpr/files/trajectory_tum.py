@@ -6,13 +6,17 @@ from pathlib import Path
 
 import numpy as np
 
-from freeswing.cdpr.files.documents import InputError, replace_file
-from freeswing.cdpr.files.number_table import check_times, read_lines, read_numbers
+from freeswing.cdpr.files.documents import replace_file
+from freeswing.cdpr.files.number_table import (
+    check_quaternions,
+    check_times,
+    read_lines,
+    read_numbers,
+)
 from freeswing.cdpr.measured.trajectory import Trajectory
 from freeswing.cdpr.rotation import matrix_from_quaternion, quaternion_from_matrix
 
 TUM_COLUMNS = ("t", "x", "y", "z", "qx", "qy", "qz", "qw")
-QUATERNION_TOLERANCE = 0.02
 
 
 def read_tum(path: Path | str) -> Trajectory:
@@ -26,13 +30,7 @@ def read_tum(path: Path | str) -> Trajectory:
     table = read_numbers(path, rows, None, TUM_COLUMNS)
     check_times(path, table, 0, "t")
     quaternion = table.values[:, [7, 4, 5, 6]]
-    norm = np.linalg.norm(quaternion, axis=1)
-    wrong = np.flatnonzero(np.abs(norm - 1.0) > QUATERNION_TOLERANCE)
-    if len(wrong):
-        raise InputError(
-            f"{path}: line {table.lines[wrong[0]]}: the quaternion's length is "
-            f"{norm[wrong[0]]:.4g}, must be 1 (order qx qy qz qw)"
-        )
+    check_quaternions(path, table, quaternion, "qx qy qz qw")
     return Trajectory.from_poses(
         table.values[:, 0],
         table.values[:, 1:4],

@@ -53,6 +53,19 @@ def add_workers(parser: ArgumentParser) -> None:
     )
 
 
+def add_effects(parser: ArgumentParser, name: str, asked: str, numbers: str) -> None:
+    """--effect and --set: how an effect is named, and what naming it and its numbers does."""
+    parser.add_argument("--effect", action="append", default=[], metavar=name, help=asked)
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        type=setting,
+        metavar="PARAMETER=VALUE",
+        help=numbers,
+    )
+
+
 def worker_count(text: str) -> int:
     """A number of processes, at least one."""
     count = int(text) if text.strip().isdecimal() else 0

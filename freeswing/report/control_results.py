@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TypeVar
 
-from freeswing.cdpr.files.documents import load_json, read_text
+from freeswing.cdpr.files.documents import InputError, load_json, read_text
+from freeswing.results.codec import Document
+from freeswing.results.control import ControllerResult, Controllers, Robustness, ServoResult
 
-FORMATS = {
-    "controller.json": "freeswing-controller/1",
-    "controllers.json": "freeswing-controllers/1",
-    "robustness.json": "freeswing-robustness/1",
-    "servo.json": "freeswing-servo/1",
-}
+D = TypeVar("D", bound=Document)
 # The paper's Figs. 12 to 15, with what they show.
 PICTURES = {
     "controller-gains.svg": "Gains of the controller (the paper's Fig. 12).",
@@ -31,11 +27,17 @@ class ControlResults:
     """The documents by file name, and the pictures as addresses that hold them.
 
     Attributes:
-        documents: those of `FORMATS` that are there.
+        controller: `controller.json`, None where it is not there, like the others.
+        controllers: `controllers.json`.
+        robustness: `robustness.json`.
+        servo: `servo.json`.
         pictures: caption and `data:` address, in the order of `PICTURES`.
     """
 
-    documents: Mapping[str, dict[str, Any]] = field(default_factory=dict)
+    controller: ControllerResult | None = None
+    controllers: Controllers | None = None
+    robustness: Robustness | None = None
+    servo: ServoResult | None = None
     pictures: tuple[tuple[str, str], ...] = ()
 
 
@@ -45,12 +47,8 @@ def read_control(results: Path) -> ControlResults | None:
     Raises:
         InputError: for a document that is not what its name says.
     """
-    documents = {
-        name: load_json(results / name, format_, LARGEST_BYTES, "delete it and run again")
-        for name, format_ in FORMATS.items()
-        if (results / name).is_file()
-    }
-    if not {"controller.json", "servo.json"} & set(documents):
+    controller, servo = _read(results, ControllerResult), _read(results, ServoResult)
+    if controller is None and servo is None:
         return None
     pictures = []
     for name, caption in PICTURES.items():
@@ -58,4 +56,21 @@ def read_control(results: Path) -> ControlResults | None:
             # As an image's address the drawing stays one: nothing in it can act on the page.
             drawn = base64.b64encode(read_text(results / name, LARGEST_BYTES).encode()).decode()
             pictures.append((caption, f"data:image/svg+xml;base64,{drawn}"))
-    return ControlResults(documents, tuple(pictures))
+    return ControlResults(
+        controller,
+        _read(results, Controllers),
+        _read(results, Robustness),
+        servo,
+        tuple(pictures),
+    )
+
+
+def _read(results: Path, kind: type[D]) -> D | None:
+    path = results / f"{kind.kind}.json"
+    if not path.is_file():
+        return None
+    table = load_json(path, kind.format(), LARGEST_BYTES, "delete it and run again")
+    try:
+        return kind.from_json(table)
+    except ValueError as error:
+        raise InputError(f"{path}: {error}; delete it and run again") from error

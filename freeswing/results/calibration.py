@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from freeswing.results.codec import Document, Entry, Numbers, absent, empty, entry
 
@@ -97,6 +97,36 @@ class Covariance(Entry):
 
 
 @entry
+class BaseFrame(Entry):
+    """Where the base frame comes from, and how well base tags hold it."""
+
+    source: str = absent(default="")
+    tags: tuple[str, ...] = absent(default=())
+    survey_std_m: float | None = absent(default=None)
+    reprojection_px: float | None = absent(default=None)
+
+
+@entry
+class CalibratedBoard(Entry):
+    """The board, and how it differs from its drawing."""
+
+    kind: str = absent(default="")
+    points: int = absent(default=0)
+    warp_m: Numbers = absent(default=())
+
+
+@entry
+class Adjustment(Entry):
+    """How the bundle adjustment went; the condition is null where the rank does not suffice."""
+
+    stop: str = absent(default="")
+    iterations: int | None = absent(default=None)
+    unknowns: int | None = absent(default=None)
+    rank: int | None = absent(default=None)
+    condition: float | None = absent(default=0.0)
+
+
+@entry
 class Calibration(Document):
     """What `freeswing calibrate` found.
 
@@ -118,14 +148,14 @@ class Calibration(Document):
     kind: ClassVar[str] = "calibration"
 
     verdict: Trust | None = None
-    base_frame: Mapping[str, Any] = empty(default_factory=dict)
+    base_frame: BaseFrame = empty(default_factory=BaseFrame)
     cameras: tuple[CalibratedCamera, ...] = ()
     checks: Checks | None = None
     moments: int | None = None
-    board: Mapping[str, Any] = empty(default_factory=dict)
+    board: CalibratedBoard = empty(default_factory=CalibratedBoard)
     dropped_views: tuple[str, ...] = ()
     trimmed_corners: int | None = None
-    adjustment: Mapping[str, Any] = empty(default_factory=dict)
+    adjustment: Adjustment = empty(default_factory=Adjustment)
     covariance: Covariance | None = None
     vertical: Vertical | None = absent(default=None)
     beside_colmap: tuple[BesideColmap, ...] = absent(default=())

@@ -14,7 +14,7 @@ from scipy.stats import chi2
 
 from freeswing.cdpr.robot import Array
 
-LEAST_RUNS = 3
+LEAST_RUNS = 3  # of two, leaving out one leaves one: nothing it could be compared with
 # Runs scatter by chance too: only a variance that chance exceeds once in twenty replaces another.
 CHANCE = 0.05
 

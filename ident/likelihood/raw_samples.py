@@ -8,11 +8,12 @@ from freeswing.cdpr.robot import POSE_COORDINATES, Array
 from freeswing.ident.likelihood.run_residuals import Samples
 from freeswing.ident.runs import SwingRun
 
+# Motion capture's noise; a fit scales it by what the residuals are, so that its ratio counts.
 UNIT_NOISE_M = 1e-4
 UNIT_NOISE_RAD = 5e-4
-UNSTATED_LENGTH_STD_M = 1e-3
-SMALLEST_LENGTH_STD_M = 1e-7
-LEAST_SAMPLES = 50
+UNSTATED_LENGTH_STD_M = 1e-3  # encoders are finer, the zero of a winch is not
+SMALLEST_LENGTH_STD_M = 1e-7  # stiffer walls leave a fit no digits for the rest
+LEAST_SAMPLES = 50  # beside 12 numbers of the run's own: half a second of motion capture
 
 
 def prepare(run: SwingRun, window_s: tuple[float, float]) -> Samples:

@@ -52,7 +52,48 @@ DECISION = "tests/ident/diagnose/test_decision_limits.py"
 INCLUSION = "tests/ident/diagnose/lengths/test_inclusion.py"
 BENCH = "tests/ident/bench/test_bench_limits.py"
 
+DRIVE = "tests/ident/drive/test_drive_limits.py"
+LIKELIHOOD = "tests/ident/likelihood/test_likelihood_limits.py"
+FILES = "tests/cdpr/files/test_file_limits.py"
+SERVO = "tests/servo/test_servo_limits.py"
+
 HELD = (
+    Held(
+        "ident/drive/checks.py",
+        (
+            "JUMP", "WRONG_RATE", "MILLI", "UNLIKE_CURRENT", "LEAST_DEGREES", "MOST_DEGREES",
+            "COUNTS", "ALIKE", "STRANGER", "LATENCY_S", "START_S", "START_COUNTS", "LEAST_MOTION",
+            "ODD_ROW",
+        ),
+        DRIVE,
+    ),
+    Held("ident/likelihood/calibration_modes.py", ("UNLIKELY",), LIKELIHOOD),
+    Held("ident/likelihood/fit_swings.py", ("COLOURED", "LOW_BAND_HZ"), LIKELIHOOD),
+    Held("ident/likelihood/payload_runs.py", ("LEAST_SIGNIFICANCE",), LIKELIHOOD),
+    Held("ident/likelihood/between_runs.py", ("LEAST_RUNS",), LIKELIHOOD),
+    Held(
+        "ident/likelihood/raw_samples.py",
+        (
+            "UNIT_NOISE_M", "UNIT_NOISE_RAD", "UNSTATED_LENGTH_STD_M", "SMALLEST_LENGTH_STD_M",
+            "LEAST_SAMPLES",
+        ),
+        LIKELIHOOD,
+    ),
+    Held("ident/likelihood/session_estimates.py", ("_ASTRAY", "_AS_BAD"), LIKELIHOOD),
+    Held("cdpr/files/number_table.py", ("QUATERNION_TOLERANCE",), FILES),
+    Held("cdpr/files/trajectory_csv.py", ("WIDEST_SWING_RAD",), FILES),
+    Held("cdpr/files/trajectory_trc.py", ("RATE_TOLERANCE",), FILES),
+    Held("cdpr/files/mocap/gaps.py", ("LEAST_FILL",), FILES),
+    Held("cdpr/files/trajectory_c3d.py", ("SPARE_SHARE",), FILES),
+    Held("cdpr/files/drive_csv.py", ("NORM_TOLERANCE",), FILES),
+    Held("cdpr/files/drive_file.py", ("LARGEST_FRAME_M", "LARGEST_DRUM_M"), FILES),
+    Held("cdpr/files/robot_file.py", ("MOST_DRIVEN", "AXIS_TOLERANCE"), FILES),
+    Held("servo/loop/judge.py", ("HELD_M", "HELD_RAD", "SETTLED_S"), SERVO),
+    Held("servo/loop/closed_loop.py", ("LOST_M",), SERVO),
+    Held("servo/design/hinf.py", ("NOTHING",), SERVO),
+    Held("servo/design/tuning.py", ("LEAST_MARGIN",), SERVO),
+    Held("servo/files/identified_file.py", ("NEGATIVE",), SERVO),
+    Held("servo/files/task_file.py", ("LAST_HOLD_S", "LARGEST_POSITION_M", "LONGEST_S"), SERVO),
     Held(
         "ident/likelihood/minimise.py",
         ("SHORTER", "MOST_RISES"),

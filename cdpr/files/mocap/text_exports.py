@@ -14,7 +14,12 @@ from numpy.typing import NDArray
 
 from freeswing.cdpr.files.documents import InputError
 from freeswing.cdpr.files.mocap.gaps import without_gaps
-from freeswing.cdpr.files.number_table import check_times, read_lines, read_numbers
+from freeswing.cdpr.files.number_table import (
+    QUATERNION_TOLERANCE,
+    check_times,
+    read_lines,
+    read_numbers,
+)
 from freeswing.cdpr.measured.marker_recording import MarkerRecording
 from freeswing.cdpr.measured.trajectory import Trajectory
 from freeswing.cdpr.rotation import matrix_from_quaternion
@@ -31,7 +36,6 @@ METRES_PER_UNIT = {
 }
 Array = NDArray[np.float64]
 
-UNIT_TOLERANCE = 0.02
 MOTIVE_MARKERS = ("marker", "rigid body marker", "labeled marker")
 
 
@@ -137,7 +141,7 @@ def read_motive_body(path: Path | str) -> Trajectory | None:
     quaternion = values[:, [turn + 3, turn, turn + 1, turn + 2]]  # Motive writes X Y Z W
     length = np.linalg.norm(quaternion, axis=1)
     off = np.nanmax(np.abs(length - 1.0), initial=0.0)
-    if off > UNIT_TOLERANCE:
+    if off > QUATERNION_TOLERANCE:
         raise InputError(f"{path}: rigid body {name}: a quaternion's length is off 1 by {off:.3g}")
     positions = head.layout.metres * values[:, place : place + 3]
     R = matrix_from_quaternion(quaternion / length[:, None])

@@ -11,6 +11,7 @@ from freeswing.console import Console
 
 if TYPE_CHECKING:
     from freeswing.cdpr.driven.model import DrivenModel
+    from freeswing.results.control import ControllerResult
     from freeswing.servo.design.controller import Controller
     from freeswing.servo.design.draws import Cloud
     from freeswing.servo.design.offer import Order
@@ -64,6 +65,7 @@ def run(options: Namespace, console: Console) -> None:
     """Design, examine, write controller.json and what goes with it."""
     from freeswing.cdpr.files.documents import DataError, InputError, write_json
     from freeswing.cdpr.system.confine import results_folder
+    from freeswing.results.control import Controllers
     from freeswing.servo.design.family import METHODS as FAMILY
     from freeswing.servo.design.hinf import AssumptionError
     from freeswing.servo.design.offer import Order, offer
@@ -80,7 +82,7 @@ def run(options: Namespace, console: Console) -> None:
     folder = results_folder(path.parent, options.results)
     wanted = FAMILY if options.method == "all" else (options.method,)
     order = Order(goals, tuple(options.at), options.order, by_encoders=options.encoders)
-    documents, first = {}, None
+    rows, first = {}, None
     for k, method in enumerate(wanted):
         console.progress("design", k / len(wanted))
         try:
@@ -90,11 +92,11 @@ def run(options: Namespace, console: Console) -> None:
         except ValueError as error:
             raise DataError(f"{path}: {method}: {error}") from error
         first = first or found
-        documents[method] = _write(folder, found, method == wanted[0])
+        rows[method] = _write(folder, found, method == wanted[0]).row()
         _say(console, found, order)
     result = folder / "controller.json"
     if options.method == "all":
-        write_json(folder / "controllers.json", _table(documents))
+        write_json(folder / "controllers.json", Controllers(controllers=rows).to_json())
     if first is not None:
         _figures(folder, model, order, first)
         if cloud is not None:
@@ -103,23 +105,18 @@ def run(options: Namespace, console: Console) -> None:
     console.show_file(result)
 
 
-def _write(folder: Path, found: Controller, is_first: bool) -> dict:
+def _write(folder: Path, found: Controller, is_first: bool) -> ControllerResult:
     from freeswing.cdpr.files.documents import replace_file, write_json
+    from freeswing.results.control import ControllerResult
     from freeswing.servo.files.controller_file import c_header, mat_bytes, npz_bytes, to_document
 
     name = "controller" if is_first else f"controller-{found.method}"
-    document = to_document(found)
-    write_json(folder / f"{name}.json", document)
+    document = ControllerResult.from_json(to_document(found))
+    write_json(folder / f"{name}.json", document.to_json())
     replace_file(folder / f"{name}.npz", npz_bytes(found))
     replace_file(folder / f"{name}.mat", mat_bytes(found))
     replace_file(folder / f"{name}.h", c_header(found).encode())
     return document
-
-
-def _table(documents: dict) -> dict:
-    keys = ("gamma", "order", "margins", "bandwidth_rad_s", "delay_margin_s", "with_delay")
-    rows = {method: {key: d.get(key) for key in keys} for method, d in documents.items()}
-    return {"format": "freeswing-controllers/1", "controllers": rows}
 
 
 def _cloud(model: DrivenModel, identified: str | None) -> Cloud:
@@ -173,11 +170,13 @@ def _robustness(
     folder: Path,
 ) -> None:
     from freeswing.cdpr.files.documents import write_json
+    from freeswing.results.control import Robustness
     from freeswing.servo.design.robustness import survey_document
 
-    document = survey_document(model, found, order, cloud, console.progress)
-    write_json(folder / "robustness.json", document)
-    for line in document["sentences"]:
+    survey = survey_document(model, found, order, cloud, console.progress)
+    document = Robustness.from_json(survey)
+    write_json(folder / "robustness.json", document.to_json())
+    for line in document.sentences:
         console.say(line)
 
 

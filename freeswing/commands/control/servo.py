@@ -5,13 +5,14 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from freeswing.commands.arguments import add_results, add_robot
 from freeswing.console import Console
 
 if TYPE_CHECKING:
     from freeswing.cdpr.driven.model import DrivenModel
+    from freeswing.results.control import TrialResult
     from freeswing.servo.files.controller_file import Stored
     from freeswing.servo.files.task_file import Task
     from freeswing.servo.loop.trials import Outcome, Trial
@@ -58,6 +59,7 @@ def run(options: Namespace, console: Console) -> None:
     """Check the task, run every trial, write the table, the samples and the figures."""
     from freeswing.cdpr.files.documents import InputError, write_json
     from freeswing.cdpr.system.confine import results_folder
+    from freeswing.results.control import ServoResult
     from freeswing.servo.driven_file import read_driven
     from freeswing.servo.files.controller_file import read_controller
     from freeswing.servo.files.task_file import read_task
@@ -88,12 +90,9 @@ def run(options: Namespace, console: Console) -> None:
         console.progress("trials", k / len(pairs))
         outcomes.append(carry_out(trial, controller))
         _say(console, outcomes[-1])
-    document = {
-        "format": "freeswing-servo/1",
-        "task": str(Path(options.task).name),
-        "trials": [_entry(outcome) for outcome in outcomes],
-    }
-    write_json(folder / "servo.json", document)
+    trials = tuple(_entry(outcome) for outcome in outcomes)
+    document = ServoResult(task=str(Path(options.task).name), trials=trials)
+    write_json(folder / "servo.json", document.to_json())
     _write_run(folder, model, task, outcomes)
     console.say(str(folder / "servo.json"))
     console.show_file(folder / "servo.json")
@@ -133,18 +132,22 @@ def _say(console: Console, outcome: Outcome) -> None:
     )
 
 
-def _entry(outcome: Outcome) -> dict[str, Any]:
+def _entry(outcome: Outcome) -> TrialResult:
     from dataclasses import asdict
 
-    return {
-        "controller": outcome.method,
-        "trial": outcome.trial.name,
-        "friction_feed": outcome.trial.feed,
-        "encoders": outcome.trial.by_encoders,
-        "schedule": outcome.trial.schedule,
-        "seed": outcome.trial.seed,
-        **asdict(outcome.judgement),
-    }
+    from freeswing.results.control import TrialResult
+
+    return TrialResult.from_json(
+        {
+            "controller": outcome.method,
+            "trial": outcome.trial.name,
+            "friction_feed": outcome.trial.feed,
+            "encoders": outcome.trial.by_encoders,
+            "schedule": outcome.trial.schedule,
+            "seed": outcome.trial.seed,
+            **asdict(outcome.judgement),
+        }
+    )
 
 
 def _write_run(folder: Path, model: DrivenModel, task: Task, outcomes: list[Outcome]) -> None:

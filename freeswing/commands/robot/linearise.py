@@ -48,7 +48,7 @@ def run(options: Namespace, console: Console) -> None:
     from freeswing.cdpr.files.robot_file import read_robot
     from freeswing.cdpr.system.confine import results_folder
     from freeswing.printing.curves import log_log_svg
-    from freeswing.results.linear import linear_document, linear_panels
+    from freeswing.results.control import linear_document, linear_panels
 
     path = options.robot
     robot = read_robot(path)
@@ -66,8 +66,9 @@ def run(options: Namespace, console: Console) -> None:
     found, rates = modes(linear), np.geomspace(*RATES, N_RATES)
     folder = results_folder(path.parent, options.results)
     response = linear.response(rates)
-    document = linear_document(robot.name, linear, found, rates, response)
-    write_json(folder / "linear.json", document | {"currents_A": _holding(model, at, console)})
+    held = _holding(model, at, console)
+    document = linear_document(robot.name, linear, found, rates, response, held)
+    write_json(folder / "linear.json", document.to_json())
     replace_file(folder / "linear.svg", log_log_svg(linear_panels(rates, response)))
     console.say(f"  at {' '.join(f'{v:.4f}' for v in at)} (m, rad)")
     for mode in found:

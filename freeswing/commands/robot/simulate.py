@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from freeswing.commands.arguments import add_robot, not_negative, positive, setting, whole
+from freeswing.commands.arguments import add_effects, add_robot, not_negative, positive, whole
 from freeswing.commands.robot.simulate_drive import add_drive_arguments, run_drive
 from freeswing.console import Console
 
@@ -25,17 +25,8 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--lengths-m", type=_numbers, metavar="L1,L2,..", help="cable lengths of a free swing"
     )
-    parser.add_argument(
-        "--effect", action="append", default=[], metavar="NAME", help="an effect; may be repeated"
-    )
-    parser.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        type=setting,
-        metavar="PARAMETER=VALUE",
-        help="value of an effect's parameter, such as rate_1_s=0.05",
-    )
+    numbers = "value of an effect's parameter, such as rate_1_s=0.05"
+    add_effects(parser, "NAME", "an effect; may be repeated", numbers)
     parser.add_argument("--amplitude-m", type=positive, default=0.03, help="release, default 0.03")
     parser.add_argument("--duration-s", type=positive, default=10.0, help="default 10")
     parser.add_argument("--rate-hz", type=positive, help="default 100; of a driven robot 1000")

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from freeswing.commands.arguments import add_results, setting
+from freeswing.commands.arguments import add_effects, add_results
 from freeswing.console import Console
 
 if TYPE_CHECKING:
@@ -23,21 +23,12 @@ def add_arguments(parser: ArgumentParser) -> None:
     """The session."""
     parser.add_argument("session", metavar="SESSION", help="a session's folder or drive.toml")
     add_results(parser, "SESSION/results")
-    parser.add_argument(
-        "--effect",
-        action="append",
-        default=[],
-        metavar="NAME[.PART]",
-        help="estimate the numbers of an effect too, of all motors or cables or of one, such as "
+    add_effects(
+        parser,
+        "NAME[.PART]",
+        "estimate the numbers of an effect too, of all motors or cables or of one, such as "
         "drum_radius.4; may be repeated",
-    )
-    parser.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        type=setting,
-        metavar="PARAMETER=VALUE",
-        help="where a number of an effect starts, or stays if it is not asked for",
+        "where a number of an effect starts, or stays if it is not asked for",
     )
 
 

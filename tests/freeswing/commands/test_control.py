@@ -11,6 +11,7 @@ from scipy.io import loadmat
 
 from freeswing.commands.control import servo
 from freeswing.main import main
+from freeswing.results.control import ControllerResult, Robustness, ServoResult
 from freeswing.servo.design import robustness
 from freeswing.servo.driven_file import read_driven
 from freeswing.servo.files.controller_file import read_controller
@@ -33,6 +34,7 @@ def designed(tmp_path_factory):
 def test_design_writes_the_papers_controller(designed):
     found = json.loads((designed / "controller.json").read_text())
     assert found["format"] == "freeswing-controller/1"
+    assert ControllerResult.from_json(found).to_json() == found
     assert 0.93 < found["gamma"] <= 0.945, found["gamma"]
     assert (found["order"], found["sample_rate_hz"]) == (30, 1000)
     assert found["margins"]["position"] == pytest.approx(0.55, abs=0.02)
@@ -93,6 +95,7 @@ def test_a_short_task_is_run_and_told(designed, tmp_path, capsys):
     words = ["servo", str(INCA), "--task", str(task), "--results", str(tmp_path)]
     assert main([*words, "--controller", str(designed / "controller.json")]) == 0
     document = json.loads((tmp_path / "servo.json").read_text())
+    assert ServoResult.from_json(document).to_json() == document
     assert [t["trial"] for t in document["trials"]] == ["no Coulomb friction", "Coulomb friction"]
     assert all(trial["held"] for trial in document["trials"])
     assert "held" in capsys.readouterr().out
@@ -136,6 +139,10 @@ def test_a_driven_robots_report_shows_controllers_runs_and_pictures(designed, tm
     assert page.count("data:image/svg+xml;base64,") == 4
     for text in ("Under control", "0.940", "no Coulomb friction", "Fig. 12", "Fig. 15"):
         assert text in page, text
+    wrong = {"format": "freeswing-servo/1", "task": "task.toml", "trials": [{}]}
+    (results / "servo.json").write_text(json.dumps(wrong))
+    assert main(["report", str(INCA), "--results", str(results)]) == 2
+    assert "trials[0] lacks controller" in capsys.readouterr().err
     (results / "servo.json").write_text("{}")
     assert main(["report", str(INCA), "--results", str(results)]) == 2
     assert "must be 'freeswing-servo/1'; delete it and run again" in capsys.readouterr().err
@@ -157,6 +164,7 @@ def test_robustness_is_told_with_the_identified_covariance(tmp_path, monkeypatch
     words = ["design", str(INCA), "--results", str(tmp_path)]
     assert main([*words, "--robustness", "--identified", str(drive)]) == 0
     found = json.loads((tmp_path / "robustness.json").read_text())
+    assert Robustness.from_json(found).to_json() == found
     assert found["method"].startswith("gridding")
     assert found["draws"]["unstable"] == found["draws"]["failing"] == 0
     assert found["draws"]["std"] == {"mass_kg": 1e-3}

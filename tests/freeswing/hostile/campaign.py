@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import Any
 
 from freeswing.cdpr.files.problems import DataError, InputError
-from tests.freeswing.hostile.hostile_files import HOSTILE, NUMBER
+from tests.freeswing.hostile.hostile_files import vandalised
 from tests.freeswing.hostile.more_files import more_cases
 from tests.freeswing.hostile.text_files import Case, text_cases
 
@@ -52,31 +52,6 @@ class Told:
     wrong: dict[str, int]
     slowest_s: float
     peak_bytes: int
-
-
-def vandalised(whole: bytes, chance: random.Random) -> bytes:
-    """`whole` after one to three acts of vandalism, as `hostile_files.broken` commits them."""
-    data = whole
-    for _ in range(chance.randint(1, 3)):
-        start = chance.randrange(len(data) + 1)
-        end = start + chance.randint(1, 40)
-        act = chance.choice(("number", "bytes", "bit", "out", "twice", "end"))
-        if act == "number" and (found := list(NUMBER.finditer(data))):
-            start, end = chance.choice(found).span()
-            data = data[:start] + chance.choice(HOSTILE) + data[end:]
-        elif act == "bytes":
-            data = data[:start] + chance.randbytes(chance.randint(1, 8)) + data[end:]
-        elif act == "bit" and data:
-            place = min(start, len(data) - 1)
-            flipped = bytes([data[place] ^ 1 << chance.randrange(8)])
-            data = data[:place] + flipped + data[place + 1 :]
-        elif act == "out":
-            data = data[:start] + data[end:]
-        elif act == "twice":
-            data = data[:end] + data[start:]
-        else:
-            data = data[:start]
-    return data
 
 
 class HangError(Exception):

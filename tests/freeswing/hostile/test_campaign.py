@@ -10,7 +10,8 @@ import pytest
 
 from freeswing.cdpr.files.problems import DataError, InputError
 from freeswing.servo.files.controller_file import read_controller
-from tests.freeswing.hostile.campaign import SLOW_KINDS, vandalised
+from tests.freeswing.hostile.campaign import SLOW_KINDS
+from tests.freeswing.hostile.hostile_files import vandalised
 from tests.freeswing.hostile.more_files import more_cases
 
 FILES_A_KIND = 4

@@ -1,0 +1,124 @@
+"""What the likelihood decides, on both sides of every limit, without fitting anything."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from freeswing.cdpr.robot import POSE_COORDINATES
+from freeswing.ident.likelihood import fit_swings, session_estimates
+from freeswing.ident.likelihood.between_runs import jackknife_std, widened
+from freeswing.ident.likelihood.calibration_modes import Calibrated
+from freeswing.ident.likelihood.fit_swings import low_band_factor
+from freeswing.ident.likelihood.payload_runs import mass_of
+from freeswing.ident.likelihood.raw_samples import prepare
+from freeswing.ident.runs import SwingRun
+from tests.ident.swings import recorded, swing
+
+
+@pytest.mark.parametrize(("largest", "said"), [(4.4, 0), (-4.6, 1)])
+def test_cameras_are_off_from_four_and_a_half_deviations(largest, said):
+    modes = np.array([0.1, largest, 2.0])
+    assert len(Calibrated(None, modes, np.ones(3)).notes()) == said
+
+
+@pytest.mark.parametrize(("correlation", "by"), [(1.18, 1.0), (1.22, 1.22)])
+def test_deviations_are_enlarged_from_a_fifth_of_colour(correlation, by):
+    assert fit_swings._enlargement(correlation) == by
+
+
+@pytest.mark.parametrize(("rate_hz", "low"), [(4.8, True), (5.2, False)])
+def test_the_band_of_the_motion_ends_at_five_hertz(rate_hz, low):
+    times = np.arange(1000) / 100.0
+    factor = low_band_factor([(np.sin(2.0 * np.pi * rate_hz * times)[:, None], times)])
+    assert (factor > 1.0) == low, factor
+
+
+@pytest.mark.parametrize(("inverse", "usable"), [(1.95, False), (2.05, True)])
+def test_a_mass_stands_out_by_two_deviations(inverse, usable):
+    if usable:
+        assert mass_of(inverse, 1.0).mass_kg == 1.0 / inverse
+        return
+    with pytest.raises(ValueError, match="no usable mass"):
+        mass_of(inverse, 1.0)
+
+
+def test_two_runs_say_nothing_of_each_other():
+    """Three do, a jackknife needs as many."""
+    large = np.full(2, 100.0)
+    assert widened(np.eye(2), large, 2).tolist() == np.eye(2).tolist()
+    assert widened(np.eye(2), large, 3)[0, 0] == pytest.approx(1e4)
+    rows = [np.array([[1.0, value]]) for value in (0.0, 1.0, 3.0)]
+    free, unit, none = np.ones(1, dtype=bool), np.ones(1), np.zeros((0, 2))
+    assert jackknife_std(rows[:2], none, free, unit).tolist() == [0.0]
+    assert jackknife_std(rows, none, free, unit)[0] > 0.5
+
+
+def run_of(count: int, coordinates: tuple[str, ...] = ("x", "y")) -> SwingRun:
+    """A recorded run of so many samples."""
+    run = recorded(swing(2, duration_s=0.6), "a", coordinates=coordinates)
+    trajectory = run.trajectory.take(np.arange(len(run.trajectory)) < count)
+    return replace(run, trajectory=trajectory)
+
+
+def test_fifty_samples_are_a_run():
+    run = run_of(50)
+    whole = (float(run.trajectory.times_s[0]), float(run.trajectory.times_s[-1]))
+    assert len(prepare(run, whole).times_s) == 50
+    with pytest.raises(ValueError, match="at least 50 are needed"):
+        prepare(run_of(49), whole)
+
+
+def test_noise_that_is_not_stated_is_taken_as_the_manual_says():
+    """0.1 mm, 0.5 mrad, lengths to 1 mm; a millionth of that at least."""
+    run = run_of(60, POSE_COORDINATES)
+    whole = (float(run.trajectory.times_s[0]), float(run.trajectory.times_s[-1]))
+    bare = replace(run, lengths_std_m=None)
+    found = prepare(bare, whole)
+    np.testing.assert_allclose(np.diagonal(found.whitener[0]), np.repeat([1e4, 2e3], 3))
+    assert found.lengths_std_m == 1e-3
+    assert prepare(replace(run, lengths_std_m=1e-12), whole).lengths_std_m == 1e-7
+
+
+class Entry(SimpleNamespace):
+    """An estimate's entry, of which the values alone are looked at."""
+
+
+@pytest.mark.parametrize(("astray", "taken"), [(0.48, 0), (0.52, 1)])
+def test_a_start_has_led_astray_where_half_the_motion_is_left(monkeypatch, astray, taken):
+    """Then the next one is tried; here it is likelier."""
+    fits = [SimpleNamespace(deviance=2.0, left=astray), SimpleNamespace(deviance=1.0, left=0.1)]
+    monkeypatch.setattr(
+        session_estimates, "ml_estimate", lambda *words: (Entry(), fits[int(words[3][0])])
+    )
+    monkeypatch.setattr(session_estimates, "_is_refuted", lambda *_: False)
+    monkeypatch.setattr(session_estimates, "astray", lambda found: found.left)
+    starts = [np.zeros(9), np.ones(9)]
+    found = session_estimates._from_starts(None, [], None, starts, (), None, None)[1]
+    assert found is fits[taken]
+
+
+@pytest.mark.parametrize(("share", "left"), [(0.94, ["b", "c"]), (0.96, ["c"])])
+def test_runs_that_are_off_nearly_as_far_as_the_worst_leave_with_it(monkeypatch, share, left):
+    shares = {"a": 1.0, "b": share, "c": 0.01}
+    kept: list[list[str]] = []
+
+    def fitted(model, runs, *_):
+        kept.append([run.name for run in runs])
+        return Entry(values=np.zeros(9)), SimpleNamespace(samples=runs)
+
+    def lawless(told, **_):
+        return told > 0.9 if len(told) == 3 else told > 2.0
+
+    monkeypatch.setattr(session_estimates, "_from_starts", fitted)
+    monkeypatch.setattr(session_estimates, "_is_refuted", lambda *_: False)
+    monkeypatch.setattr(session_estimates, "is_lawless", lawless)
+    monkeypatch.setattr(
+        session_estimates,
+        "unexplained_motion",
+        lambda found: np.array([shares[run.name] for run in found.samples]),
+    )
+    runs = [SimpleNamespace(name=name) for name in shares]
+    session_estimates.best_ml_estimate(None, runs, None, [])
+    assert kept == [["a", "b", "c"], left], kept
