@@ -120,7 +120,8 @@ HELD = (
     Held(
         "freeswing/doctor/motion.py",
         (
-            "WORTHWHILE_WINDOW_S", "MOST_MISSING", "LONGEST_GAP_S", "RATE_TOLERANCE", "FARTHEST_M",
+            "WORTHWHILE_WINDOW_S", "MOST_MISSING", "LONGEST_GAP_S", "RATE_TOLERANCE", "ROUNDING_S",
+            "FARTHEST_M",
             "FARTHEST_REACHES", "LENGTH_CHANGE_M", "HARDLY_MOVES_M",
             "LEAST_SAMPLES", "SKIPPED_STEPS",
         ),

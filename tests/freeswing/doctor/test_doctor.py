@@ -81,10 +81,12 @@ def said(run, words, rate_hz=None):
 
 
 @pytest.mark.parametrize(
-    ("rate_hz", "levels"), [(99.96, []), (100.04, []), (99.85, ["warning"]), (100.15, ["warning"])]
+    ("share", "levels"),
+    [(6.4e-4, []), (-6.4e-4, []), (7.0e-4, ["warning"]), (-7.0e-4, ["warning"])],
 )
-def test_rates(rate_hz, levels) -> None:
-    assert said(swing(), "the session says", rate_hz) == levels
+def test_rates(share, levels) -> None:
+    """Half a thousandth, and a millisecond of rounded stamps over six seconds."""
+    assert said(swing(), "the session says", 100.0 / (1.0 + share)) == levels
 
 
 @pytest.mark.parametrize(("step", "levels"), [(1.45, []), (1.55, ["note"])])
