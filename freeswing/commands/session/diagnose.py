@@ -92,6 +92,12 @@ def _summarise(document: Diagnosis, console: Console) -> None:
         console.say(f"  accepted: {plain(entry.effect)} ({values})")
         for sentence in seen_directions(entry.directions):
             console.say(f"    {sentence}")
+    for place in (document.lengths or {}).get("wrong", ()):
+        if place.get("equilibria", {}).get("agrees"):
+            console.say(
+                f"    {plain(place['part'].replace(':', ' '))}: cable lengths, and where "
+                "the platform hangs, say so each by itself, and agree"
+            )
     for sentence in verdict(document):
         console.say(f"  {sentence}")
     before, after = document.before, document.after

@@ -35,19 +35,29 @@ class Geometry:
 
 def _place(one: dict[str, Any]) -> list[dict[str, str]]:
     ways = [one, *one.get("rivals", ())]
+    witness = one.get("equilibria") if len(ways) == 1 else None
     rows = []
     for k, way in enumerate(ways):
         name, _, part = way["part"].partition(":")
-        pairs = [(1e3 * v, 1e3 * s) for v, s in zip(way["values"], way["std"], strict=True)]
-        sizes = "; ".join(f"{number(v)} ± {number(HALF_WIDTH_95 * s)}" for v, s in pairs)
         rows.append(
             {
                 "place": ("or " if k else "") + plain(name) + (f" of {part}" if part else ""),
-                "off by ± 95 % (mm or mrad)": sizes,
+                "off by ± 95 % (mm or mrad)": _sizes(way),
                 "probability (%)": f"{100.0 * way['probability']:.1f}",
+                **({} if witness is None else {"by where it hangs alone": _said(witness)}),
             }
         )
     return rows
+
+
+def _sizes(told: dict[str, Any]) -> str:
+    pairs = [(1e3 * v, 1e3 * s) for v, s in zip(told["values"], told["std"], strict=True)]
+    return "; ".join(f"{number(v)} ± {number(HALF_WIDTH_95 * s)}" for v, s in pairs)
+
+
+def _said(witness: dict[str, Any]) -> str:
+    """What the equilibria say of a place without any cable length."""
+    return _sizes(witness) + ("" if witness["agrees"] else " (contradicts: not used)")
 
 
 def _run(one: dict[str, Any]) -> dict[str, str]:

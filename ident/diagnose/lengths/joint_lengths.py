@@ -104,11 +104,15 @@ def normal_equations(rows: Sequence[LengthRows], widest: Array) -> Normal:
         left = [_left(one, part, solution.values) for one, part in zip(rows, found, strict=True)]
         own = [_own_size(*run) for run in zip(rows, left, freedom, strict=True)]
         sizes = np.maximum(least, own)
-    sizes = _in_proportion(rows, sizes, widest)
+    return renewed(tuple(rows), _in_proportion(rows, sizes, widest))
+
+
+def renewed(rows: tuple[LengthRows, ...], sizes: Array) -> Normal:
+    """Normal equations of rows whose slow errors have known sizes (r,)."""
     found = [_reduced(*pair) for pair in zip(rows, sizes, strict=True)]
     matrices = np.array([part.matrix for part in found])
     rights, squares = np.array([p.right for p in found]), np.array([p.square for p in found])
-    return Normal(matrices, rights, squares, tuple(rows), sizes)
+    return Normal(matrices, rights, squares, rows, sizes)
 
 
 def _in_proportion(rows: Sequence[LengthRows], usual: Array, widest: Array) -> Array:
@@ -192,6 +196,9 @@ def _reduced(rows: LengthRows, size: float) -> _Part:
     gram = np.einsum("bia,bij,bjc->ac", everything, weights, everything, optimize=True)
     prior = np.zeros(n_own)
     prior[n:] = 1.0
+    if rows.beside is not None:
+        gram = rows.weight * gram + rows.beside.T @ rows.beside
+        prior[:n] = float(rows.weight == 0.0)
     own = gram[:n_own, :n_own] + np.diag(prior)
     inverse = np.linalg.inv(own)
     rest = gram[n_own:, n_own:] - gram[n_own:, :n_own] @ inverse @ gram[:n_own, n_own:]

@@ -14,7 +14,7 @@ from scipy.signal import savgol_filter
 
 from freeswing.cdpr.model.batch import evaluate, with_jacobian
 from freeswing.cdpr.model.equations import Model
-from freeswing.cdpr.robot import Array
+from freeswing.cdpr.robot import Array, Robot
 from freeswing.cdpr.rotation import angle_rate_matrix, matrix_from_angles
 from freeswing.ident.likelihood.run_residuals import Samples
 
@@ -44,6 +44,8 @@ class LengthRows:
         white: covariance of the white noise, (b, n, n).
         slow: of slow errors of unit size, (b, n, n).
         least_size: of the slow errors.
+        beside: further equations of unit noise over [own; shared; right], (k, o + p + 1), or None.
+        weight: of the lengths beside these.
     """
 
     run: str
@@ -53,6 +55,8 @@ class LengthRows:
     white: Array
     slow: Array
     least_size: float
+    beside: Array | None = None
+    weight: float = 1.0
 
 
 def measured_rates(times_s: Array, values: Array) -> Array:
@@ -115,9 +119,7 @@ def length_rows(
     if samples.slow is not None:
         least = LEAST_SIZE
         drift = drift + samples.slow.drift_covariance
-        known = model.robot.tolerances
-        usual = np.diag([known.frame_m**2] * 3 + [known.frame_rad**2] * 3)
-        own.append(in_platform @ _root(samples.slow.frame_covariance + usual))
+        own.append(in_platform @ frame_root(model.robot, samples))
     mean_in_platform = _means(in_platform, blocks)
     counts = np.bincount(blocks)[:, None, None]
     return LengthRows(
@@ -129,6 +131,19 @@ def length_rows(
         mean_in_platform @ drift @ np.swapaxes(mean_in_platform, 1, 2) + RUN_OUT_M**2 * np.eye(n),
         least,
     )
+
+
+def frame_root(robot: Robot, samples: Samples) -> Array:
+    """A factor of the covariance of a run's platform frame, (6, 6); (6, 0) where none is stated.
+
+    Source:
+        Golub, Van Loan 2013, Matrix Computations, ch. 8: by its eigenvectors.
+    """
+    if samples.slow is None:
+        return np.zeros((6, 0))
+    known = robot.tolerances
+    usual = np.diag([known.frame_m**2] * 3 + [known.frame_rad**2] * 3)
+    return _root(samples.slow.frame_covariance + usual)
 
 
 def _blocks(times_s: Array) -> np.ndarray:

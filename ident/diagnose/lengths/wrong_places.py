@@ -16,6 +16,7 @@ from freeswing.cdpr.effects import catalogue, effect_named
 from freeswing.cdpr.model.batch import evaluate, only
 from freeswing.cdpr.model.equations import Model, build_model
 from freeswing.cdpr.robot import Array, Robot
+from freeswing.ident.diagnose.lengths.equilibria import Equilibrium, Witness, equilibrium, heard
 from freeswing.ident.diagnose.lengths.inclusion import (
     Chances,
     alone,
@@ -85,6 +86,7 @@ class WrongPlace:
         delta_bic: twice the log odds against the first, its unknowns counted, negative for it.
         before_m: what lengths vary along the runs by the declared geometry, root mean square.
         after_m: and by the joint model.
+        witness: what the equilibria of the runs say of the values.
     """
 
     keys: tuple[str, ...]
@@ -95,6 +97,7 @@ class WrongPlace:
     delta_bic: float
     before_m: float
     after_m: float
+    witness: Witness
 
     @property
     def key(self) -> str:
@@ -109,7 +112,7 @@ class WrongPlace:
             f"{1e3 * self.before_m:.2g} mm along the runs"
         )
         if len(self.keys) == 1:
-            return told
+            return f"{told}; {self.witness}"
         ways = " or ".join(f"{way} ({100 * way.probability:.0f} %)" for way in self.ways)
         return f"{told}; these recordings cannot tell {ways}"
 
@@ -149,9 +152,14 @@ class Kinematics:
     besides: dict[str, tuple[Array, Array]]
 
     def notes(self) -> list[str]:
-        """Runs that deserve less trust, a sentence each."""
+        """Runs that deserve less trust, and witnesses that contradict lengths, a sentence each."""
         usual = float(np.median([one.slow_errors for one in self.runs])) if self.runs else 0.0
-        return [
+        against = [
+            f"{' or '.join(one.keys)}: {one.witness}"
+            for one in self.wrong
+            if not one.witness.agrees
+        ]
+        return against + [
             f"run {one.run}: its cable lengths keep {one.slow_errors / usual:.1f} times the usual "
             "run's variation whatever the geometry: its poses are worse than they say, and it "
             "weighs less where lengths are judged"
@@ -169,6 +177,7 @@ class Kinematics:
                     "rivals": [way.document() for way in one.ways[1:]],
                     "before_m": one.before_m,
                     "after_m": one.after_m,
+                    "equilibria": one.witness.document(),
                 }
                 for one in self.wrong
             ],
@@ -188,6 +197,7 @@ class _Linearised(NamedTuple):
     chances: dict[tuple[str, ...], float]
     wrong: tuple[str, ...]
     found: Solved
+    at: Array
 
 
 def _linearised(
@@ -207,7 +217,8 @@ def _linearised(
     normal = normal_equations(rows, blocks.gross)
     chances = set_probabilities(normal, blocks)
     best = max(chances, key=lambda one: chances[one])
-    return _Linearised(normal, chances, best, solved(total(normal), blocks.spread(best)))
+    found = solved(total(normal), blocks.spread(best))
+    return _Linearised(normal, chances, best, found, at)
 
 
 def kinematics(fit: LikelihoodFit, keys: Sequence[str], noise_scales: Array) -> Kinematics | None:
@@ -237,10 +248,11 @@ def kinematics(fit: LikelihoodFit, keys: Sequence[str], noise_scales: Array) -> 
     runs = _runs(normal, everything.values)
     before, after = (np.array([one[k] for one in runs]) for k in (1, 2))
     variation = float(np.sqrt(np.mean(before**2))), float(np.sqrt(np.mean(after**2)))
-    places = tuple(
-        _place(model, last, blocks, group, variation)
-        for group in groups(chances, _shown(chances, keys))
-    )
+    sure = groups(chances, _shown(chances, keys))
+    balances = [
+        equilibrium(model, fit.inertia, samples, last.at) for samples in fit.samples if sure
+    ]
+    places = tuple(_place(model, last, blocks, group, variation, balances) for group in sure)
     singles = {key: probability(chances, [key]) for key in blocks.columns}
     rest = {name: _told(blocks.columns[name], everything) for name in patterns[0]}
     return Kinematics(places, singles, runs, rest)
@@ -262,11 +274,14 @@ def _shown(chances: Chances, keys: Sequence[str]) -> list[str]:
 def _place(
     model: Model,
     last: _Linearised,
-    blocks: Blocks,
+    lengths: Blocks,
     group: tuple[str, ...],
     variation: tuple[float, float],
+    balances: Sequence[Equilibrium],
 ) -> WrongPlace:
-    normal, chances = last.normal, last.chances
+    chances = last.chances
+    told = heard(last.normal, lengths, chances, group, balances)
+    normal, blocks = told.normal, told.blocks
     found = mixed(normal, blocks, chances, group)
     ways = []
     for key in group:
@@ -276,11 +291,12 @@ def _place(
         ways.append(Way(key, probability(chances, [key]), values, stds, unit))
     where = np.concatenate([blocks.columns[key] for key in group])
     beside = [key for key in last.wrong if key not in group]
-    against = -2.0 * float(log_odds(normal, blocks, [*beside, group[0]], group[0]))
+    against = -2.0 * float(log_odds(last.normal, lengths, [*beside, group[0]], group[0]))
     covariance = found.covariance[np.ix_(where, where)]
     chance = probability(chances, group)
     values = found.values[where]
-    return WrongPlace(group, values, covariance, tuple(ways), chance, against, *variation)
+    ways = tuple(ways)
+    return WrongPlace(group, values, covariance, ways, chance, against, *variation, told.witness)
 
 
 def _told(columns: np.ndarray, found: Solved) -> tuple[Array, Array]:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from freeswing.ident.diagnose.lengths import inclusion
+from freeswing.ident.diagnose.lengths.equilibria import Witness
 from freeswing.ident.diagnose.lengths.inclusion import (
     groups,
     mixed,
@@ -100,7 +101,8 @@ def test_runs_that_deserve_less_trust_are_named_and_both_places_are_told():
         Way("anchor_offset:2", 0.3, np.array([-4e-3]), np.array([1e-3]), "m"),
     )
     keys = tuple(way.key for way in ways)
-    place = WrongPlace(keys, np.zeros(2), np.eye(2), ways, 0.99, -20.0, 1e-4, 5e-5)
+    witness = Witness(np.zeros(2), np.ones(2), 0.5, 0.5)
+    place = WrongPlace(keys, np.zeros(2), np.eye(2), ways, 0.99, -20.0, 1e-4, 5e-5, witness)
     assert "cannot tell attachment_offset:2 by 1.0 +- 0.2 mm (80 %)" in str(place)
     assert "or anchor_offset:2 by -4.0 +- 1.0 mm (30 %)" in str(place)
 
