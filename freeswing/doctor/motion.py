@@ -15,7 +15,11 @@ from freeswing.cdpr.robot import Robot
 from freeswing.cdpr.rotation import transform
 from freeswing.doctor.finding import Finding
 from freeswing.ident.runs import SwingRun
-from freeswing.session.exchanged_lengths import LENGTH_DIFFERENCE_M, exchanged_sentence
+from freeswing.session.exchanged_lengths import (
+    LENGTH_DIFFERENCE_M,
+    exchanged_at_rest,
+    exchanged_sentence,
+)
 
 # The slowest modes of a metre of cable take 2 s: two and a half periods tell its frequency.
 WORTHWHILE_WINDOW_S = 5.0
@@ -68,6 +72,8 @@ def run_findings(run: SwingRun, robot: Robot, frame_rate_hz: float | None) -> It
     yield from _places(subject, part, robot)
     if part.is_pose:
         yield from _cables(subject, run, part, robot)
+    elif exchanged := exchanged_at_rest(run, robot)[1]:
+        yield Finding("error", subject, exchanged, "put each cable's length in its place")
 
 
 def stamp_findings(

@@ -2,19 +2,30 @@
 
 from __future__ import annotations
 
+import re
+import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from freeswing.cdpr.files.problems import DataError
 from freeswing.cdpr.files.robot_file import read_robot
+from freeswing.cdpr.files.trajectory_csv import write_csv
 from freeswing.cdpr.measured.trajectory import Trajectory
 from freeswing.ident.runs import SwingRun
 from freeswing.main import main
-from freeswing.session.exchanged_lengths import exchanged_sentence, pose_lengths
+from freeswing.session.exchanged_lengths import (
+    exchanged_at_rest,
+    exchanged_sentence,
+    pose_lengths,
+    refuse_exchanged_lengths,
+)
 from freeswing.session.load_swings import load_swings
 from freeswing.session.session_file import read_session
 from tests.oracle.robots import declared_robot
+from tests.places import SAMPLES
 
 ROBOT = declared_robot("bologna-4")
 OWN = np.array([1.5, 1.6, 1.7, 1.8])
@@ -79,3 +90,70 @@ def test_commands_refuse_them(
     names = [cable.name for cable in ROBOT.cables]
     assert f"lengths of cables {names[1]} and {names[3]} are exchanged" in told.out + told.err
     assert not (exchanged / "results" / "identification.json").exists()
+
+
+@pytest.fixture(scope="module")
+def free_alone(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The three-cable sample, three runs of it, of which x, y and chi alone were measured."""
+    folder = tmp_path_factory.mktemp("free") / "session"
+    shutil.copytree(SAMPLES / "three-cables", folder)
+    path = folder / "session.toml"
+    path.write_text("[[runs]]".join(path.read_text("utf-8").split("[[runs]]")[:4]), "utf-8")
+    read = read_session(folder)
+    robot = read_robot(read.robot)
+    for run, swing in zip(read.runs, load_swings(read, robot, None), strict=True):
+        assert run.trajectory is not None
+        write_csv(run.trajectory, swing.trajectory.select(("x", "y", "chi")))
+    return folder
+
+
+def exchange(session: Path, order: tuple[int, ...], runs: int) -> None:
+    """Puts the lengths of the first runs in other places."""
+
+    def exchanged_line(match: re.Match[str]) -> str:
+        words = match.group(1).split(", ")
+        return f"cable_lengths_m = [{', '.join(words[k] for k in order)}]"
+
+    path = session / "session.toml"
+    pattern = r"cable_lengths_m = \[(.*?)\]"
+    path.write_text(re.sub(pattern, exchanged_line, path.read_text("utf-8"), count=runs), "utf-8")
+
+
+@pytest.mark.parametrize("command", ["check", "identify"])
+def test_free_coordinates_alone_name_them_too(
+    free_alone: Path, command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.copytree(free_alone, tmp_path / "session")
+    exchange(tmp_path / "session", (1, 0, 2), 1)
+    assert main([command, str(tmp_path / "session")]) == 1
+    told = capsys.readouterr()
+    said = "lengths of cables 1 and 2, up to 148 mm apart, are exchanged"
+    assert f"run swing-01: cable_lengths_m: the {said}" in told.out + told.err
+    assert "swing-02: cable_lengths_m" not in told.out + told.err
+
+
+@pytest.mark.parametrize("order", [(0, 2, 1), (1, 0, 2), (2, 1, 0), (1, 2, 0)])
+def test_every_run_where_lengths_stand_in_other_places(
+    free_alone: Path, order: tuple[int, ...], tmp_path: Path
+) -> None:
+    shutil.copytree(free_alone, tmp_path / "session")
+    exchange(tmp_path / "session", order, 3)
+    read = read_session(tmp_path / "session")
+    robot = read_robot(read.robot)
+    swings = load_swings(read, robot, None)
+    apart = [np.abs(np.subtract(s.lengths_m, s.lengths_m[list(order)])).max() for s in swings]
+    named = [bool(exchanged_at_rest(swing, robot)[1]) for swing in swings]
+    assert named == [bool(one > 0.02) for one in apart]
+    with pytest.raises(DataError, match="put each cable's length in its place"):
+        refuse_exchanged_lengths(swings, robot)
+
+
+def test_lengths_as_they_are_rest_where_they_were_measured(free_alone: Path) -> None:
+    read = read_session(free_alone)
+    robot = read_robot(read.robot)
+    swings = load_swings(read, robot, None)
+    refuse_exchanged_lengths(swings, robot)
+    wrong = [replace(s, lengths_m=s.lengths_m + np.array([0.1, 0.0, 0.0])) for s in swings]
+    refuse_exchanged_lengths(wrong, robot)  # merely wrong: another matter
+    unknown = replace(robot, platform=replace(robot.platform, com_m=None))
+    refuse_exchanged_lengths(swings, unknown)
