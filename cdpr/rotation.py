@@ -153,6 +153,36 @@ def log_rotation(R: ArrayLike) -> Array:
     return q[..., 1:] * np.where(small, series, 2.0 * np.arctan2(safe, w) / safe)
 
 
+def pose_differences(zetas: ArrayLike, from_zetas: ArrayLike) -> Array:
+    """How far poses x y z phi theta chi are from others. (..., 6), (..., 6) -> (..., 6).
+
+    The last three are the rotation vector, base frame, that takes the others' orientation to
+    theirs: no choice of axes changes its length, as it changes differences of angles.
+    """
+    zetas, from_zetas = (np.asarray(one, dtype=np.float64) for one in (zetas, from_zetas))
+    R, R_from = matrix_from_angles(zetas[..., 3:]), matrix_from_angles(from_zetas[..., 3:])
+    turn = log_rotation(R @ np.swapaxes(R_from, -1, -2))
+    return np.concatenate([zetas[..., :3] - from_zetas[..., :3], turn], axis=-1)
+
+
+def log_slope(rotvec: ArrayLike) -> Array:
+    """J with log(exp(w) exp(v)) = v + J @ w to first order in w. (..., 3) [rad] -> (..., 3, 3).
+
+    Source:
+        Sola, Deray, Atchuthan 2018, A micro Lie theory for state estimation in robotics, eq. (146).
+    """
+    v = np.asarray(rotvec, dtype=np.float64)
+    squared = np.sum(v * v, axis=-1)[..., None, None]
+    half = 0.5 * np.sqrt(squared)
+    small = half < SMALL_ANGLE_RAD
+    safe = np.where(small, 1.0, half)
+    # (1 - h cot h) / (4 h^2) with h half the angle.
+    curved = (1.0 - safe / np.tan(safe)) / (4.0 * safe * safe)
+    factor = np.where(small, 1.0 / 12.0 + squared / 720.0, curved)
+    S = skew(v)
+    return np.eye(3) - 0.5 * S + factor * (S @ S)
+
+
 def transform(R: ArrayLike, t: ArrayLike) -> Array:
     """Homogeneous T with x_a = T x_b. (..., 3, 3), (..., 3) -> (..., 4, 4).
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.robot import POSE_COORDINATES, Array, frozen_array
+from freeswing.cdpr.rotation import pose_differences
 from freeswing.ident.likelihood.blocks import none_free
 from freeswing.ident.likelihood.fit_swings import LikelihoodFit, fit
 from freeswing.ident.likelihood.joint_problem import State
@@ -46,14 +47,17 @@ class Prediction:
 
     @property
     def rmse_rad(self) -> float | None:
-        """Root mean square of the angles' residuals, an angle; None without angles."""
+        """Root mean square of the orientation's residuals, an axis; None without angles."""
         return self._rmse(POSE_COORDINATES[3:])
 
     def _rmse(self, names: tuple[str, ...]) -> float | None:
         places = [i for i, name in enumerate(self.coordinates) if name in names]
         if not places:
             return None
-        residuals = (self.measured - self.predicted)[:, places]
+        if self.coordinates == POSE_COORDINATES:
+            residuals = pose_differences(self.measured, self.predicted)[:, places]
+        else:
+            residuals = (self.measured - self.predicted)[:, places]
         return float(np.sqrt(np.mean(residuals**2)))
 
 

@@ -30,7 +30,7 @@ from freeswing.ident.likelihood.fit_blocks import Solution
 from freeswing.ident.likelihood.joint_problem import TOLERANCE_M, Problem, State, Step
 from freeswing.ident.likelihood.minimise import minimised
 from freeswing.ident.likelihood.payload_runs import Loads
-from freeswing.ident.likelihood.run_residuals import Samples, predicted, residuals
+from freeswing.ident.likelihood.run_residuals import Samples, differences, predicted, residuals
 from freeswing.ident.likelihood.unknowns import Unknowns
 
 Progress = Callable[[str, float], None]
@@ -239,7 +239,7 @@ def _packed(problem: Problem, state: State, step: Step, taken: int, stop: Stop) 
     correlation = correlation_factor(state.motions, problem.samples, state.scales)
     squares, counts = np.zeros(2), np.zeros(2)
     for motion, samples in zip(state.motions, problem.samples, strict=True):
-        difference = predicted(motion, samples.times_s)[:, samples.columns] - samples.values
+        difference = differences(predicted(motion, samples.times_s), samples)
         for g in (0, 1):
             squares[g] += np.sum(difference[:, samples.groups == g] ** 2)
             counts[g] += difference[:, samples.groups == g].size

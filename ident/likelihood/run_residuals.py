@@ -16,7 +16,7 @@ from freeswing.cdpr.measured.slow_errors import SlowErrors
 from freeswing.cdpr.model.batch import evaluate, with_jacobian
 from freeswing.cdpr.model.free_motion import coordinate_indices
 from freeswing.cdpr.robot import POSE_COORDINATES, Array
-from freeswing.cdpr.rotation import angle_rate_matrix
+from freeswing.cdpr.rotation import angle_rate_matrix, log_slope, pose_differences
 from freeswing.cdpr.simulation.free_swing import Motion
 from freeswing.cdpr.simulation.sensitivity import Linearised
 from freeswing.ident.runs import Payload
@@ -124,9 +124,21 @@ def predicted(motion: Motion, times_s: Array) -> Array:
     return evaluate(motion.model.measured, *arguments)[0]
 
 
+def differences(seen: Array, samples: Samples) -> Array:
+    """Prediction minus measurement, (n, c); of full poses `pose_differences`.
+
+    Args:
+        seen: what `predicted` gives, (n, 6).
+        samples: what was measured.
+    """
+    if samples.is_pose:
+        return pose_differences(seen, samples.values)
+    return seen[:, samples.columns] - samples.values
+
+
 def residuals(motion: Motion, samples: Samples, scales: Array) -> Array:
-    """Whitened prediction minus measurement, (n, c)."""
-    return _whitened(predicted(motion, samples.times_s), samples, scales)
+    """Whitened `differences` of a motion, (n, c)."""
+    return _whitened(differences(predicted(motion, samples.times_s), samples), samples, scales)
 
 
 def lengths_residual(motion: Motion, samples: Samples) -> Array:
@@ -155,8 +167,10 @@ def reduce_run(
             pose, (n, 6, r).
     """
     motion = linear.motion
-    matrix = _sample_rows(linear, samples, scales)
-    white = residuals(motion, samples, scales)
+    seen = predicted(motion, samples.times_s)
+    off = differences(seen, samples)
+    matrix = _whitened_change(_pose_change(linear, samples), seen, off, samples, scales)
+    white = _whitened(off, samples, scales)
     rows = np.concatenate([matrix.reshape(-1, matrix.shape[-1]), _length_rows(motion, samples)])
     lengths = lengths_residual(motion, samples)
     right = np.concatenate([white.reshape(-1), lengths])
@@ -170,7 +184,8 @@ def reduce_run(
     n_own = own.shape[1]
     further = np.zeros((len(rows), 0 if shifts is None else shifts.shape[2]))
     if shifts is not None:
-        further[: white.size] = _whitened_change(shifts, samples, scales).reshape(white.size, -1)
+        modes = _whitened_change(shifts, seen, off, samples, scales)
+        further[: white.size] = modes.reshape(white.size, -1)
     together = np.column_stack([own, shared, further, right + body[:, -1]])
     together = np.vstack([together, _own_priors(motion, directions, together.shape[1])])
     triangle = np.linalg.qr(together, mode="r")
@@ -205,19 +220,13 @@ def _changes_measurement(motion: Motion) -> bool:
     return any(effect_named(name).changes_measurement for name in motion.model.effects)
 
 
-def _whitened(poses: Array, samples: Samples, scales: Array) -> Array:
-    if samples.is_pose:
-        difference = poses - samples.values
-        turn = angle_rate_matrix(samples.values[:, 3:])
-        difference[:, 3:] = (turn @ difference[:, 3:, None])[..., 0]
-    else:
-        difference = poses[:, samples.columns] - samples.values
+def _whitened(off: Array, samples: Samples, scales: Array) -> Array:
     noise = samples.temper * scales[samples.groups]
-    return (samples.whitener @ difference[..., None])[..., 0] / noise
+    return (samples.whitener @ off[..., None])[..., 0] / noise
 
 
-def _sample_rows(linear: Linearised, samples: Samples, scales: Array) -> Array:
-    """Derivatives of the whitened residuals by the unknowns, (n, c, 21 + k)."""
+def _pose_change(linear: Linearised, samples: Samples) -> Array:
+    """Derivatives of the predicted pose by the unknowns, (n, 6, 21 + k)."""
     motion = linear.motion
     change, change_rates = linear.at(samples.times_s)
     if _changes_measurement(motion):
@@ -228,13 +237,23 @@ def _sample_rows(linear: Linearised, samples: Samples, scales: Array) -> Array:
         direct = slopes[:, :, STATE:]
         change = slopes[:, :, :6] @ change + slopes[:, :, 6:STATE] @ change_rates
         change[:, :, STATE:] += direct
-    return _whitened_change(change, samples, scales)
+    return change
 
 
-def _whitened_change(change: Array, samples: Samples, scales: Array) -> Array:
-    """A change of the predicted pose (n, 6, m), as it shows in the whitened residuals."""
+def _whitened_change(
+    change: Array, seen: Array, off: Array, samples: Samples, scales: Array
+) -> Array:
+    """A change of the predicted pose (n, 6, m), as it shows in the whitened residuals.
+
+    Args:
+        change: of x y z phi theta chi.
+        seen: the prediction, (n, 6).
+        off: its `differences`, (n, c).
+        samples: what was measured.
+        scales: noise scale of metres and of radians, (2,).
+    """
     if samples.is_pose:
-        turn = angle_rate_matrix(samples.values[:, 3:])
+        turn = log_slope(off[:, 3:]) @ angle_rate_matrix(seen[:, 3:])
         change = np.concatenate([change[:, :3], turn @ change[:, 3:]], axis=1)
     else:
         change = change[:, samples.columns]

@@ -10,6 +10,7 @@ from freeswing.cdpr.rotation import (
     exp_rotation,
     invert,
     log_rotation,
+    log_slope,
     matrix_from_angles,
     matrix_from_quaternion,
     quaternion_from_matrix,
@@ -131,3 +132,13 @@ def test_invert_undoes_transform():
     T = transform(exp_rotation(rng.normal(size=(7, 3))), rng.normal(size=(7, 3)))
     error = np.abs(invert(T) @ T - np.eye(4)).max()
     assert error < 1e-14, error
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-6, 1.9e-3, 2.1e-3, 0.5, 3.0])
+def test_slope_of_the_log_is_its_difference_quotient(angle):
+    rotvec, h = angle * np.array([0.6, -0.64, 0.48]), 1e-6
+    steps = h * np.concatenate([np.eye(3), -np.eye(3)])
+    moved = log_rotation(exp_rotation(steps) @ exp_rotation(rotvec))
+    quotient = (moved[:3] - moved[3:]).T / (2.0 * h)
+    error = np.abs(log_slope(rotvec) - quotient).max()
+    assert error < 1e-8, error
