@@ -158,6 +158,9 @@ def pose_differences(zetas: ArrayLike, from_zetas: ArrayLike) -> Array:
 
     The last three are the rotation vector, base frame, that takes the others' orientation to
     theirs: no choice of axes changes its length, as it changes differences of angles.
+
+    Source:
+        Sola, Deray, Atchuthan 2018, A micro Lie theory for state estimation in robotics, eq. (28).
     """
     zetas, from_zetas = (np.asarray(one, dtype=np.float64) for one in (zetas, from_zetas))
     R, R_from = matrix_from_angles(zetas[..., 3:]), matrix_from_angles(from_zetas[..., 3:])

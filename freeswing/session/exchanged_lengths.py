@@ -103,6 +103,10 @@ def exchanged_at_rest(
     Returns:
         Which cable's stated length is each cable's own, (n,), None where they are not exchanged,
         and a sentence, empty then.
+
+    Source:
+        Carricato, Merlet 2013, Stability analysis of underconstrained cable-driven parallel robots,
+        sec. II: lengths and weight settle where a platform rests.
     """
     stated = swing.lengths_m
     part = None if stated is None else _free_part(swing)
