@@ -79,7 +79,7 @@ HELD = (
         ),
         LIKELIHOOD,
     ),
-    Held("ident/likelihood/session_estimates.py", ("_ASTRAY", "_AS_BAD"), LIKELIHOOD),
+    Held("ident/likelihood/session_estimates.py", ("_ASTRAY",), LIKELIHOOD),
     Held("cdpr/files/number_table.py", ("QUATERNION_TOLERANCE",), FILES),
     Held("cdpr/files/trajectory_csv.py", ("WIDEST_SWING_RAD",), FILES),
     Held("cdpr/files/trajectory_trc.py", ("RATE_TOLERANCE",), FILES),

@@ -92,33 +92,8 @@ def test_a_start_has_led_astray_where_half_the_motion_is_left(monkeypatch, astra
     monkeypatch.setattr(
         session_estimates, "ml_estimate", lambda *words: (Entry(), fits[int(words[3][0])])
     )
-    monkeypatch.setattr(session_estimates, "_is_refuted", lambda *_: False)
+    monkeypatch.setattr(session_estimates, "is_refuted", lambda *_: False)
     monkeypatch.setattr(session_estimates, "astray", lambda found: found.left)
     starts = [np.zeros(9), np.ones(9)]
-    found = session_estimates._from_starts(None, [], None, starts, (), None, None)[1]
+    found = session_estimates.from_starts(None, [], None, starts, (), None, None)[1]
     assert found is fits[taken]
-
-
-@pytest.mark.parametrize(("share", "left"), [(0.94, ["b", "c"]), (0.96, ["c"])])
-def test_runs_that_are_off_nearly_as_far_as_the_worst_leave_with_it(monkeypatch, share, left):
-    shares = {"a": 1.0, "b": share, "c": 0.01}
-    kept: list[list[str]] = []
-
-    def fitted(model, runs, *_):
-        kept.append([run.name for run in runs])
-        return Entry(values=np.zeros(9)), SimpleNamespace(samples=runs)
-
-    def lawless(told, **_):
-        return told > 0.9 if len(told) == 3 else told > 2.0
-
-    monkeypatch.setattr(session_estimates, "_from_starts", fitted)
-    monkeypatch.setattr(session_estimates, "_is_refuted", lambda *_: False)
-    monkeypatch.setattr(session_estimates, "is_lawless", lawless)
-    monkeypatch.setattr(
-        session_estimates,
-        "unexplained_motion",
-        lambda found: np.array([shares[run.name] for run in found.samples]),
-    )
-    runs = [SimpleNamespace(name=name) for name in shares]
-    session_estimates.best_ml_estimate(None, runs, None, [])
-    assert kept == [["a", "b", "c"], left], kept
