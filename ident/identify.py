@@ -140,17 +140,9 @@ def identify(
         prepared = prepare_runs(runs, model, settings.signals, progress)
     except ValueError as error:
         raise DataError(str(error)) from error
-    how = settings.weighting, progress, settings.consistent
-    prepared, by_fidim, failures = fidim_estimates(model, prepared, *how)
-    fitted: dict[str, Fitted] = {}
-    lawless = False
-    if settings.maximum_likelihood:
-        fitted, more, lawless = _likelihood_estimates(prepared, by_fidim, settings, robot, progress)
-        left = [drop for one in fitted.values() for drop in one.estimate.dropped if drop.lawless]
-        if left:  # what maximum likelihood cannot explain has no place in FIDIM either
-            prepared = without(prepared, {drop.run: drop.why for drop in left})
-            prepared, by_fidim, failures = fidim_estimates(model, prepared, *how)
-        failures.update(more)
+    prepared, by_fidim, fitted, failures, lawless = _estimated(
+        model, prepared, settings, robot, progress
+    )
     meaningless = _meaningless(model, prepared, by_fidim, fitted, lawless)
     failures.update(meaningless)
     estimates = {name: one for name, one in by_fidim.items() if name not in meaningless}
@@ -193,6 +185,39 @@ class Fitted:
     estimate: Estimate
     robot: Robot
     motions: tuple[Prediction, ...]
+
+
+def _estimated(
+    model: Model,
+    prepared: PreparedRuns,
+    settings: IdentifySettings,
+    robot: Robot,
+    progress: Progress | None,
+) -> tuple[PreparedRuns, dict[str, Estimate], dict[str, Fitted], dict[str, str], bool]:
+    """Both methods on the runs that are taut and obey the law of a free swing.
+
+    What maximum likelihood cannot explain has no place in FIDIM either; and which runs are slack
+    is asked again, since FIDIM's inertia with a lawless run in it may say so of any.
+
+    Returns:
+        The runs that serve, FIDIM's estimates, maximum likelihood's, why others are absent, and
+        whether it is because no run follows any law.
+    """
+    how = settings.weighting, progress, settings.consistent
+    taut, by_fidim, failures = fidim_estimates(model, prepared, *how)
+    if not settings.maximum_likelihood:
+        return taut, by_fidim, {}, failures, False
+    while True:
+        fitted, more, lawless = _likelihood_estimates(taut, by_fidim, settings, robot, progress)
+        left = [drop for one in fitted.values() for drop in one.estimate.dropped if drop.lawless]
+        if not left:
+            break
+        served = {run.name for run in taut.runs}
+        prepared = without(prepared, {drop.run: drop.why for drop in left})
+        taut, by_fidim, failures = fidim_estimates(model, prepared, *how)
+        if served >= {run.name for run in taut.runs}:
+            break
+    return taut, by_fidim, fitted, {**failures, **more}, lawless
 
 
 def _likelihood_estimates(

@@ -47,7 +47,7 @@ from freeswing.ident.likelihood.fit_swings import LikelihoodFit
 
 Progress = Callable[[str, float], None]
 
-MOST_ROUNDS = 4
+MOST_ROUNDS = 8
 
 
 @dataclass(frozen=True, slots=True)

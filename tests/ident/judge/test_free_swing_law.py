@@ -92,9 +92,9 @@ def test_made_up_poses_are_refused():
 
 
 @cache
-def with_a_curve() -> Identification:
+def with_a_curve(seed: int = 2) -> Identification:
     """Four swings and a curve that obeys no law."""
-    generator = np.random.default_rng(2)
+    generator = np.random.default_rng(seed)
     runs = [
         recorded(tilted_swing(k, duration_s=5.0), f"swing-{k}", generator, 1e-4)
         for k in (5, 7, 9, 11)
@@ -111,8 +111,10 @@ def test_one_made_up_run_leaves_by_name(method: str):
 
 
 @pytest.mark.slow
-def test_no_swing_leaves_with_a_made_up_run():
-    dropped = {drop.run for drop in with_a_curve().estimates["ml_free"].dropped}
+@pytest.mark.parametrize("seed", [1, 2])
+def test_no_swing_leaves_with_a_made_up_run(seed: int):
+    """The fit of all explains swing-7 least of seed 2; of seed 1 FIDIM calls swing-11 slack."""
+    dropped = {drop.run for drop in with_a_curve(seed).estimates["ml_free"].dropped}
     assert dropped == {"made-6"}, f"left out {dropped}"
 
 
