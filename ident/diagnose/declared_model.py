@@ -13,8 +13,8 @@ from freeswing.cdpr.robot import Array
 from freeswing.ident.diagnose.outstanding_runs import tempered
 from freeswing.ident.diagnose.spectrum import residual_powers
 from freeswing.ident.judge.consistency import is_possible
+from freeswing.ident.likelihood.blocks import first_unknowns, state_of
 from freeswing.ident.likelihood.fit_swings import LikelihoodFit, fit
-from freeswing.ident.likelihood.joint_problem import State
 from freeswing.ident.likelihood.session_estimates import astray, begun
 from freeswing.ident.signals.prepare import PreparedRun
 
@@ -58,7 +58,8 @@ def base_fit(
         try:
             kept, samples, states, left = begun(model, runs, free, inertia)
             refuse_few(kept)
-            start = State(inertia, model.start_values, states, noise_scales)
+            unknowns = first_unknowns(model, inertia, [run.payload for run in samples])
+            start = state_of(unknowns, model, states, noise_scales)
             rough = fit(model, samples, start, progress=progress, tolerance=ROUGH_TOLERANCE)
         except (ValueError, np.linalg.LinAlgError) as error:
             failure = failure or str(error)

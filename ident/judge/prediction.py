@@ -9,7 +9,7 @@ import numpy as np
 from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.robot import POSE_COORDINATES, Array, frozen_array
 from freeswing.cdpr.rotation import pose_differences
-from freeswing.ident.likelihood.blocks import none_free
+from freeswing.ident.likelihood.blocks import first_unknowns, none_free, state_of
 from freeswing.ident.likelihood.fit_swings import LikelihoodFit, fit
 from freeswing.ident.likelihood.joint_problem import State
 from freeswing.ident.likelihood.run_residuals import Samples, predicted
@@ -80,10 +80,10 @@ def predict(
     Raises:
         ValueError: when the motion cannot be simulated.
     """
-    values = model.start_values if values is None else values
     samples, first = started(model, run, free, inertia)
     samples = _thinned(samples)
-    state = State(np.array(inertia), values, first[None], np.ones(2))
+    unknowns = first_unknowns(model, inertia, [samples.payload], values)
+    state = state_of(unknowns, model, first[None], np.ones(2))
     found = _followed(model, samples, state)
     seen = _seen(found)
     return Prediction(

@@ -7,6 +7,8 @@ mean square; the values of the runs are a block of their own.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,6 +17,7 @@ from freeswing.cdpr.robot import Array
 from freeswing.ident.likelihood.joint_problem import INERTIA, INERTIA_UNIT, PAYLOADS, State
 from freeswing.ident.likelihood.payload_runs import Loads
 from freeswing.ident.likelihood.unknowns import Gaussian, Mask, Unknown, Unknowns
+from freeswing.ident.runs import Payload
 
 
 def each_run(effect: str) -> str:
@@ -76,6 +79,54 @@ def payload_block(loads: Loads, values: Array, estimated: Mask) -> Unknown:
     """One over the mass, of which nothing is known, and the payloads' own inertia."""
     prior = Gaussian(np.zeros(loads.count), loads.prior_std, "the likely size of payloads")
     return Unknown(PAYLOADS, values, loads.unit, prior, estimated)
+
+
+def model_unknowns(
+    model: Model, inertia: Array, values: Array, own: Array, loads: Loads, added: Array, free: Mask
+) -> Unknowns:
+    """All unknowns of a fit by name: inertia, a model's effects, what payloads add where there are.
+
+    Args:
+        model: with the effects.
+        inertia: (9,).
+        values: effect values, (k,).
+        own: those that each run has for itself, (runs, o).
+        loads: the runs' payloads.
+        added: what they add, (u,).
+        free: which of the shared ones are estimated, (9 + k + u,).
+    """
+    each = split_own(model, own)
+    body, effects, payloads = np.split(free, np.cumsum([len(inertia), len(values)]))
+    blocks = [inertia_block(inertia, body)]
+    for name in model.effects:
+        where = model.place_of(name)
+        mine = each.get(name, np.zeros((len(own), 0)))
+        blocks += effect_blocks(model, name, values[where], effects[where], mine)
+    if loads.count:
+        blocks.append(payload_block(loads, added, payloads))
+    return Unknowns(tuple(blocks))
+
+
+def first_unknowns(
+    model: Model,
+    inertia: Array,
+    payloads: Sequence[Payload | None],
+    values: Array | None = None,
+    mass_kg: float | None = None,
+) -> Unknowns:
+    """Where a fit starts of which nothing but an inertia is guessed.
+
+    Args:
+        model: to be fitted.
+        inertia: (9,).
+        payloads: of each run.
+        values: effect values, (k,); None for those that leave the declared model as it is.
+        mass_kg: a guess of the mass, where runs carry payloads.
+    """
+    values = model.start_values if values is None else values
+    loads, own = Loads.of(payloads), np.tile(values[model.own_values], (len(payloads), 1))
+    free = np.ones(shared_size(model) + loads.count, dtype=bool)
+    return model_unknowns(model, inertia, values, own, loads, loads.start(mass_kg), free)
 
 
 def split_own(model: Model, own: Array) -> dict[str, Array]:

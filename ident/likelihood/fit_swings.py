@@ -18,14 +18,7 @@ from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.robot import Array
 from freeswing.cdpr.simulation.free_swing import Motion
 from freeswing.ident.likelihood.between_runs import jackknife_std
-from freeswing.ident.likelihood.blocks import (
-    effect_blocks,
-    inertia_block,
-    none_free,
-    payload_block,
-    split_own,
-    state_of,
-)
+from freeswing.ident.likelihood.blocks import model_unknowns, none_free, state_of
 from freeswing.ident.likelihood.fit_blocks import Solution
 from freeswing.ident.likelihood.joint_problem import TOLERANCE_M, Problem, State, Step
 from freeswing.ident.likelihood.minimise import minimised
@@ -109,20 +102,11 @@ class LikelihoodFit:
     @property
     def unknowns(self) -> Unknowns:
         """All of them by name (see `ident.likelihood.blocks`)."""
-        model = self.model
-        own = np.array([motion.values[model.own_values] for motion in self.motions])
-        each = split_own(model, own)
+        own = np.array([motion.values[self.model.own_values] for motion in self.motions])
         loads = Loads.of([run.payload for run in self.samples])
-        sizes = [len(self.inertia), len(self.values)]
-        body, values, payloads = np.split(self.free, np.cumsum(sizes))
-        blocks = [inertia_block(self.inertia, body)]
-        for name in model.effects:
-            where = model.place_of(name)
-            mine = each.get(name, np.zeros((len(own), 0)))
-            blocks += effect_blocks(model, name, self.values[where], values[where], mine)
-        if loads.count:
-            blocks.append(payload_block(loads, self.loads, payloads))
-        return Unknowns(tuple(blocks))
+        return model_unknowns(
+            self.model, self.inertia, self.values, own, loads, self.loads, self.free
+        )
 
     @property
     def solution(self) -> Solution:

@@ -13,12 +13,11 @@ from freeswing.ident.fidim.fidim import WELL_IDENTIFIED_PERCENT, near_zero
 from freeswing.ident.judge.consistency import consistency, is_possible, nearest_possible
 from freeswing.ident.judge.free_swing_law import unexplained_motion
 from freeswing.ident.likelihood.between_runs import widened
-from freeswing.ident.likelihood.blocks import INERTIA, PAYLOADS
+from freeswing.ident.likelihood.blocks import INERTIA, PAYLOADS, first_unknowns, state_of
 from freeswing.ident.likelihood.cable_ends import geometry_document, weighed_against_priors
 from freeswing.ident.likelihood.calibration_modes import with_calibration
 from freeswing.ident.likelihood.fit_swings import LikelihoodFit, fit
 from freeswing.ident.likelihood.guess_run_start import first_state
-from freeswing.ident.likelihood.joint_problem import State
 from freeswing.ident.likelihood.payload_runs import Loads, mass_of
 from freeswing.ident.likelihood.raw_samples import prepare
 from freeswing.ident.likelihood.run_residuals import Samples
@@ -66,8 +65,9 @@ def ml_estimate(
     """
     asked = asked or Asked()
     kept, samples, states, more = begun(model, runs, free, inertia, asked.mass_kg)
-    loads = Loads.of([run.payload for run in samples]).start(asked.mass_kg)
-    state = State(np.array(inertia), model.start_values, states, np.ones(2), loads=loads)
+    payloads = [run.payload for run in samples]
+    unknowns = first_unknowns(model, inertia, payloads, mass_kg=asked.mass_kg)
+    state = state_of(unknowns, model, states, np.ones(2))
     found, cost = fit(model, samples, state, progress=progress), None
     if asked.consistent and not is_possible(found.inertia):
         held = _held(found, progress)
