@@ -2,43 +2,40 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 from freeswing.report.words import number
+from freeswing.results.identification import BodyParameter, ClassicRow, Identification
 
 HALF_WIDTH_95 = 1.959964
 
 
-def bench_lines(document: Mapping[str, Any]) -> list[str]:
+def bench_lines(document: Identification) -> list[str]:
     """What `identify` says of a bench: bodies, the classic formula, held-out runs, notes."""
     lines = ["all runs of the bench in one fit, ± 95 %"]
-    for one in document["objects"]:
-        lines.append(f"{one['name']}")
-        lines += [f"  {object_row(row)}" for row in one["parameters"]]
-    for row in document["classic"]:
-        lines.append(f"  classic formula, {row['run']}: {classic_row(row)}")
-    for row in document["validation"]:
+    for one in document.objects or ():
+        lines.append(one.name)
+        lines += [f"  {object_row(row)}" for row in one.parameters]
+    for row in document.classic or ():
+        lines.append(f"  classic formula, {row.run}: {classic_row(row)}")
+    for run in document.validation:
         lines.append(
-            f"  {row['run']}: predicted {row['column']} off by {number(row['prediction_rmse'])} "
-            f"(noise {number(row['noise_floor'])})"
+            f"  {run.run}: predicted {run.column} off by {number(run.prediction_rmse)} "
+            f"(noise {number(run.noise_floor)})"
         )
-    return [*lines, *(f"  note: {note}" for note in document["notes"])]
+    return [*lines, *(f"  note: {note}" for note in document.notes)]
 
 
-def object_row(row: Mapping[str, Any]) -> str:
+def object_row(row: BodyParameter) -> str:
     """One parameter of a body."""
-    if row["value"] is None:
-        return f"{row['name']:14} not told by these runs"
-    half = HALF_WIDTH_95 * row["std"]
-    weak = "" if row["identifiable"] else "  as given: these runs tell no more"
-    return f"{row['name']:14} {number(row['value'], 5)} ± {number(half, 2)}{weak}"
+    if row.value is None or row.std is None:
+        return f"{row.name:14} not told by these runs"
+    weak = "" if row.identifiable else "  as given: these runs tell no more"
+    return f"{row.name:14} {number(row.value, 5)} ± {number(HALF_WIDTH_95 * row.std, 2)}{weak}"
 
 
-def classic_row(row: Mapping[str, Any]) -> str:
+def classic_row(row: ClassicRow) -> str:
     """The classic formula's value beside the fit's, and why they differ."""
-    told = [f"{one['what']} {one['percent']:+.2f} %" for one in row["reasons"]]
+    told = [f"{one.what} {one.percent:+.2f} %" for one in row.reasons]
     return (
-        f"{number(row['Izz_kg_m2'], 5)} kg m2 against {number(row['fitted_Izz_kg_m2'], 5)} "
-        f"({row['off_percent']:+.2f} %; {'; '.join(told)})"
+        f"{number(row.Izz_kg_m2, 5)} kg m2 against {number(row.fitted_Izz_kg_m2, 5)} "
+        f"({row.off_percent:+.2f} %; {'; '.join(told)})"
     )

@@ -46,6 +46,16 @@ class HeldOut(Entry):
 
 
 @entry
+class NextSwing(Entry):
+    """The swing that would part two models: like which run, how far, how long, how much better."""
+
+    like: str
+    reach_m: float
+    duration_s: float
+    times_better: float | None
+
+
+@entry
 class Candidate(Entry):
     """An effect that was considered.
 
@@ -71,7 +81,7 @@ class Candidate(Entry):
     confounded_with: tuple[str, ...] = ()
     reason: str = ""
     experiment: str = absent(default="")
-    next_swing: Any = absent(default=None)
+    next_swing: NextSwing | None = absent(default=None)
 
 
 @entry
@@ -100,6 +110,86 @@ class Decay(Entry):
     measured_m_s: Numbers = ()
     before_m_s: Numbers = ()
     after_m_s: Numbers = ()
+
+
+@entry
+class LengthWitness(Entry):
+    """What the places where the platform hangs say of a displacement, without any length."""
+
+    values: Numbers = ()
+    std: Numbers = ()
+    agrees: bool = False
+    agreement: float | None = None
+
+
+@entry
+class LengthWay(Entry):
+    """A part of the geometry that may be off: by how much, and how probably."""
+
+    part: str
+    probability: float
+    values: Numbers = ()
+    std: Numbers = ()
+
+
+@entry
+class WrongLengths(Entry):
+    """A part of the geometry that is off, or one of several that may be; lengths in rms.
+
+    Attributes:
+        part: an effect, or one cable's part of it; the likeliest.
+        probability: that at least one of the parts is off.
+        values: of its parameters.
+        std: their deviations.
+        rivals: the other parts that may be it.
+        before_m: along the runs, by the declared geometry.
+        after_m: by the joint one.
+        equilibria: what the resting places say.
+    """
+
+    part: str
+    probability: float
+    values: Numbers = ()
+    std: Numbers = ()
+    rivals: tuple[LengthWay, ...] = ()
+    before_m: float | None = absent(default=None)
+    after_m: float | None = absent(default=None)
+    equilibria: LengthWitness | None = absent(default=None)
+
+
+@entry
+class RunLengths(Entry):
+    """How a run's lengths vary along it, before and after, and its slow errors over the usual."""
+
+    run: str
+    before_m: float | None = None
+    after_m: float | None = None
+    slow_errors: float | None = None
+
+
+@entry
+class LengthValues(Entry):
+    """Values of an effect that makes lengths vary, and their deviations."""
+
+    values: Numbers = ()
+    std: Numbers = ()
+
+
+@entry
+class Lengths(Entry):
+    """What the constancy of cable lengths says without any dynamics.
+
+    Attributes:
+        wrong: parts of the geometry that are off, the surest first.
+        probabilities: of each part to be off.
+        runs: each.
+        besides: effects that were fitted with them and are left to the dynamics to accept.
+    """
+
+    wrong: tuple[WrongLengths, ...] = ()
+    probabilities: Mapping[str, float] = empty(default_factory=dict)
+    runs: tuple[RunLengths, ...] = ()
+    besides: Mapping[str, LengthValues] = empty(default_factory=dict)
 
 
 @entry
@@ -135,5 +225,5 @@ class Diagnosis(Document):
     ladder: tuple[HeldOut, ...] = ()
     unexplained: Unexplained | None = None
     decay: tuple[Decay, ...] = absent(default=())
-    lengths: Any = absent(default=None)
+    lengths: Lengths | None = absent(default=None)
     notes: tuple[str, ...] = ()

@@ -92,10 +92,10 @@ def _summarise(document: Diagnosis, console: Console) -> None:
         console.say(f"  accepted: {plain(entry.effect)} ({values})")
         for sentence in seen_directions(entry.directions):
             console.say(f"    {sentence}")
-    for place in (document.lengths or {}).get("wrong", ()):
-        if place.get("equilibria", {}).get("agrees"):
+    for place in document.lengths.wrong if document.lengths else ():
+        if place.equilibria is not None and place.equilibria.agrees:
             console.say(
-                f"    {plain(place['part'].replace(':', ' '))}: cable lengths, and where "
+                f"    {plain(place.part.replace(':', ' '))}: cable lengths, and where "
                 "the platform hangs, say so each by itself, and agree"
             )
     for sentence in verdict(document):

@@ -128,9 +128,9 @@ def _make_bench(session: Session, console: Console, robot: Robot) -> Made:
     from freeswing.session.made import Made
 
     told = identify_bench(load_bench(session, robot, load_target(session)), robot).document()
-    for line in bench_lines(told):
-        console.say(line)
     document = Identification.from_json({**told, "entries_m": robot.entries_m})
+    for line in bench_lines(document):
+        console.say(line)
     return Made((("identification.json", document), ("motion.json", Motion())))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from matplotlib.figure import Figure
@@ -9,6 +10,7 @@ from matplotlib.figure import Figure
 from freeswing.report.figures import AFTER, FAINT, figure
 from freeswing.report.material import Material
 from freeswing.report.words import HALF_WIDTH_95, millimetres, number, plain
+from freeswing.results.diagnosis import LengthWay, LengthWitness, RunLengths, WrongLengths
 
 MOST_SHOWN = 10
 CAPTION = "How probable it is that a part of the geometry is off, by cable lengths along the runs."
@@ -23,53 +25,56 @@ class Geometry:
     def values(self, material: Material) -> dict[str, Any] | None:
         """Places that are off, probabilities of all, and each run's lengths before and after."""
         diagnosis = material.diagnosis
-        if diagnosis is None or not diagnosis.lengths:
+        if diagnosis is None or diagnosis.lengths is None:
             return None
         lengths = diagnosis.lengths
         return {
-            "places": [row for one in lengths.get("wrong", ()) for row in _place(one)],
-            "chart": _chart(lengths.get("probabilities", {})),
-            "rows": [_run(one) for one in lengths.get("runs", ())],
+            "places": [row for one in lengths.wrong for row in _place(one)],
+            "chart": _chart(lengths.probabilities),
+            "rows": [_run(one) for one in lengths.runs],
         }
 
 
-def _place(one: dict[str, Any]) -> list[dict[str, str]]:
-    ways = [one, *one.get("rivals", ())]
-    witness = one.get("equilibria") if len(ways) == 1 else None
+def _place(one: WrongLengths) -> list[dict[str, str]]:
+    ways = [one, *one.rivals]
+    witness = one.equilibria if len(ways) == 1 else None
     rows = []
     for k, way in enumerate(ways):
-        name, _, part = way["part"].partition(":")
+        name, _, part = way.part.partition(":")
         rows.append(
             {
                 "place": ("or " if k else "") + plain(name) + (f" of {part}" if part else ""),
                 "off by ± 95 % (mm or mrad)": _sizes(way),
-                "probability (%)": f"{100.0 * way['probability']:.1f}",
+                "probability (%)": "–"
+                if way.probability is None
+                else f"{100.0 * way.probability:.1f}",
                 **({} if witness is None else {"by where it hangs alone": _said(witness)}),
             }
         )
     return rows
 
 
-def _sizes(told: dict[str, Any]) -> str:
-    pairs = [(1e3 * v, 1e3 * s) for v, s in zip(told["values"], told["std"], strict=True)]
-    return "; ".join(f"{number(v)} ± {number(HALF_WIDTH_95 * s)}" for v, s in pairs)
+def _sizes(told: WrongLengths | LengthWay | LengthWitness) -> str:
+    pairs = zip(told.values, told.std, strict=False)
+    known = [(1e3 * v, 1e3 * s) for v, s in pairs if v is not None and s is not None]
+    return "; ".join(f"{number(v)} ± {number(HALF_WIDTH_95 * s)}" for v, s in known)
 
 
-def _said(witness: dict[str, Any]) -> str:
+def _said(witness: LengthWitness) -> str:
     """What the equilibria say of a place without any cable length."""
-    return _sizes(witness) + ("" if witness["agrees"] else " (contradicts: not used)")
+    return _sizes(witness) + ("" if witness.agrees else " (contradicts: not used)")
 
 
-def _run(one: dict[str, Any]) -> dict[str, str]:
+def _run(one: RunLengths) -> dict[str, str]:
     return {
-        "run": one["run"],
-        "lengths vary by": millimetres(one["before_m"]),
-        "with the joint geometry": millimetres(one["after_m"]),
-        "slow errors over the usual": f"{one['slow_errors']:.1f}",
+        "run": one.run,
+        "lengths vary by": millimetres(one.before_m),
+        "with the joint geometry": millimetres(one.after_m),
+        "slow errors over the usual": "–" if one.slow_errors is None else f"{one.slow_errors:.1f}",
     }
 
 
-def _chart(probabilities: dict[str, float]) -> object:
+def _chart(probabilities: Mapping[str, float]) -> object:
     shown = sorted(probabilities.items(), key=lambda one: -one[1])[:MOST_SHOWN]
     if not shown:
         return ""
