@@ -53,6 +53,7 @@ INCLUSION = "tests/ident/diagnose/lengths/test_inclusion.py"
 BENCH = "tests/ident/bench/test_bench_limits.py"
 
 DRIVE = "tests/ident/drive/test_drive_limits.py"
+CHOICE = "tests/ident/drive/test_drive_decisions.py"
 LIKELIHOOD = "tests/ident/likelihood/test_likelihood_limits.py"
 FILES = "tests/cdpr/files/test_file_limits.py"
 SERVO = "tests/servo/test_servo_limits.py"
@@ -61,12 +62,18 @@ HELD = (
     Held(
         "ident/drive/checks.py",
         (
-            "JUMP", "WRONG_RATE", "MILLI", "UNLIKE_CURRENT", "LEAST_DEGREES", "MOST_DEGREES",
-            "COUNTS", "ALIKE", "STRANGER", "LATENCY_S", "START_S", "START_COUNTS", "LEAST_MOTION",
-            "ODD_ROW",
+            "JUMP", "MILLI", "UNLIKE_CURRENT", "COUNTS", "ALIKE", "STRANGER", "LATENCY_S",
+            "START_S", "START_COUNTS", "LEAST_MOTION", "ODD_ROW",
         ),
         DRIVE,
     ),
+    Held(
+        "ident/drive/diagnose/diagnose.py",
+        ("LEAST_BIC", "CONFOUNDED", "MOST_EFFECTS", "WELL", "HALVED", "LEAD"),
+        CHOICE,
+    ),
+    Held("ident/drive/joint.py", ("DYNAMIC_REACH", "KINEMATIC_REACH"), CHOICE),
+    Held("freeswing/results/drive.py", ("LARGEST_SHARE",), CHOICE),
     Held("ident/likelihood/calibration_modes.py", ("UNLIKELY",), LIKELIHOOD),
     Held("ident/likelihood/fit_swings.py", ("COLOURED", "LOW_BAND_HZ"), LIKELIHOOD),
     Held("ident/likelihood/payload_runs.py", ("LEAST_SIGNIFICANCE",), LIKELIHOOD),

@@ -27,8 +27,18 @@ def run_of(**record):
     return SimpleNamespace(name="a", rate_hz=1000.0, record=SimpleNamespace(**record))
 
 
+class Seen(tuple):
+    """What encoders and poses tell of the angles, and what the poses' own noise makes of it."""
+
+    def __new__(cls, read, told, speed):
+        seen = super().__new__(cls, (read, told, speed))
+        seen.read, seen.told, seen.speed = read, told, speed
+        seen.noise = np.zeros(read.shape[1])
+        return seen
+
+
 def told(monkeypatch, read, poses, speed=None):
-    monkeypatch.setattr(checks, "_told", lambda *_: (read, poses, speed))
+    monkeypatch.setattr(checks, "_told", lambda *_: Seen(read, poses, speed))
 
 
 @pytest.mark.parametrize(("gap", "found"), [(1.45, 0), (1.55, 1)])
