@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from freeswing.calib.board.board_check import marker_warning, settled_board
+from freeswing.calib.board.board_check import settled_board
 from freeswing.calib.board.boards import Board, board_from
 from freeswing.calib.board.recordings import find_recordings
 from freeswing.calib.board.sightings import Sightings, gather, see_boards
@@ -17,9 +17,18 @@ from freeswing.calib.camera.camera import Camera
 from freeswing.calib.camera.intrinsics import CameraStart
 from freeswing.calib.camera.lens_choice import lens_warnings, weigh_lenses
 from freeswing.calib.camera.lens_models import Array
-from freeswing.calib.rig.coarse_clocks import board_moves, coarse_offsets_s
+from freeswing.calib.remarks import (
+    clock_warnings,
+    group_warnings,
+    marker_said,
+    moved_warnings,
+    no_base_warning,
+    spread_warnings,
+)
+from freeswing.calib.rig.coarse_clocks import board_moves, coarse_clocks
 from freeswing.calib.rig.rig_start import BaseTie, base_tie, board_groups
 from freeswing.calib.rig.solve_rig import Rig, solve_rig, start_cameras, tie_to_base
+from freeswing.calib.rig.swing_tie import Joined, SwingFilms, joined
 from freeswing.calib.rig.views import Views
 from freeswing.calib.tags.base_tags import SURVEY_STD_M, SurveyedTag, find_base_tags
 from freeswing.calib.tags.tag_bend import straightened
@@ -33,7 +42,7 @@ from freeswing.calib.verdict.plumb_line import StringView, find_vertical
 from freeswing.calib.verdict.plumb_line_file import read_plumb_line, vertical_entry
 from freeswing.calib.verdict.survey_check import SurveyCheck, check_survey
 from freeswing.calib.verdict.trust import Verdict, judge
-from freeswing.calib.verdict.truth_checks import check_truth
+from freeswing.calib.verdict.truth_checks import check_truth, widened
 from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.robot import STANDARD_GRAVITY_M_S2
 
@@ -74,6 +83,19 @@ class PlumbLine:
     gravity_m_s2: Sequence[float] | Array = (0.0, 0.0, -STANDARD_GRAVITY_M_S2)
 
 
+@dataclass(frozen=True, slots=True)
+class Aids:
+    """What a calibration may use beside the board and the surveyed tags.
+
+    Attributes:
+        plumb_line: hanging strings, or None.
+        swings: gives recordings of the platform, asked for where no board joins the cameras.
+    """
+
+    plumb_line: PlumbLine | None = None
+    swings: Callable[[], SwingFilms | None] | None = None
+
+
 def calibrate_session(
     recordings: Path | str,
     board: Board | Mapping[str, object],
@@ -83,7 +105,7 @@ def calibrate_session(
     kept_boards: Path | str | None = None,
     model: str = DEFAULT_MODEL,
     survey_std_m: float | None = None,
-    plumb_line: PlumbLine | None = None,
+    beside: Aids | None = None,
     progress: Progress | None = None,
 ) -> CalibrationResult:
     """Calibrate cameras, clocks and base frame from recordings of a board.
@@ -105,7 +127,7 @@ def calibrate_session(
             goes on; None for none.
         model: lens model of every camera.
         survey_std_m: standard deviation of a surveyed coordinate; measured from the fit when None.
-        plumb_line: hanging strings, or None.
+        beside: hanging strings and swings, where there are any.
         progress: told a label and the fraction done.
 
     Raises:
@@ -113,7 +135,8 @@ def calibrate_session(
         DataError: the recordings give no calibration at all; one that is not to be trusted is
             returned as `refused`.
     """
-    told = progress or _silent
+    told, beside = progress or _silent, beside or Aids()
+    plumb_line = beside.plumb_line
     board = board if isinstance(board, Board) else board_from(board)
     told("finding the board", 0.0)
     found = find_recordings(recordings)
@@ -130,19 +153,23 @@ def calibrate_session(
     told("adjusting", 0.7)
     board, said = settled_board(board, np.concatenate([s.pixels for s in sightings]))
     std = SURVEY_STD_M if survey_std_m is None else survey_std_m
-    rig, alone_px = rig_from_sightings(sightings, board, frame_rate_hz, model, base_tags, std)
-    warnings = [text for text in (said, _marker(board, rig)) if text is not None]
+    rig, alone_px = rig_from_sightings(
+        sightings, board, frame_rate_hz, model, base_tags, std, beside.swings
+    )
+    warnings = [text for text in (said, marker_said(board, rig)) if text is not None]
     survey: SurveyCheck | None = None
     if base_tags:
         told("base tags", 0.8)
         rig, survey, moved = _tied(rig, sightings, base_tags, std, measured=survey_std_m is None)
         warnings += moved
     else:
-        warnings.append(_no_base_warning(rig.cameras[rig.reference].name))
+        warnings.append(no_base_warning(rig.cameras[rig.reference].name))
     told("checking against truth", 0.9)
-    verdict = judge(rig, check_truth(rig, board.edges), survey, alone_px)
+    rig, truth = widened(rig, check_truth(rig, board.edges))
+    verdict = judge(rig, truth, survey, alone_px)
     lenses = weigh_lenses(rig)
-    warnings += [*_group_warnings(rig), *clock_warnings(rig), *lens_warnings(rig.cameras, lenses)]
+    warnings += spread_warnings(truth.spread)
+    warnings += [*group_warnings(rig), *clock_warnings(rig), *lens_warnings(rig.cameras, lenses)]
     verdict = replace(verdict, warnings=(*warnings, *verdict.warnings))
     vertical: dict[str, Any] = {}
     if plumb_line is not None and strings and verdict.usable:
@@ -170,7 +197,7 @@ def _tied(
     survey = check_survey(rig.cameras, seen.fixed)
     if not survey.reasons:
         rig = tie_to_base(rig, seen.fixed, estimate_survey=measured)
-    return rig, survey, _moved_warnings(seen.moved)
+    return rig, survey, moved_warnings(seen.moved)
 
 
 def _with_vertical(
@@ -191,10 +218,12 @@ def rig_from_sightings(
     model: str = DEFAULT_MODEL,
     base_tags: Sequence[SurveyedTag] = (),
     survey_std_m: float = SURVEY_STD_M,
+    swings: Callable[[], SwingFilms | None] | None = None,
 ) -> tuple[Rig, Array]:
     """The rig in a frame of its own, and what each camera reached alone, px.
 
-    Base tags take part, and give the frame, where cameras share no board.
+    Where cameras share no board the platform in the swings takes part, and base tags, which then
+    give the frame.
 
     Raises:
         DataError: when a camera never sees the board or the sightings make no rig.
@@ -207,11 +236,12 @@ def rig_from_sightings(
             )
     seen = gather(sightings, frame_rate_hz)
     starts = _starts(sightings, board, model, seen.views)
-    offsets = np.zeros(len(sightings))
+    offsets, unknown = np.zeros(len(sightings)), ()
     line = seen.line
     if line is not None and board_moves(seen.speed_px_s, seen.views.camera, len(sightings)):
         stamps = tuple(line.times_s[start.views.moment] + start.views.lag_s for start in starts)
-        offsets = coarse_offsets_s(starts, stamps)
+        coarse = coarse_clocks(starts, stamps)
+        offsets, unknown = coarse.offsets_s, coarse.unknown
         seen = gather(sightings, frame_rate_hz, offsets)
         line = seen.line
         starts = _starts(sightings, board, model, seen.views)
@@ -219,15 +249,22 @@ def rig_from_sightings(
         line = None
     alone = np.array([start.rms_px for start in starts])
     borders = [camera.border_cells for camera in sightings]
+    tie = _tie(sightings, starts, seen.views, base_tags, survey_std_m)
+    films = swings() if swings and board_groups(len(starts), seen.views).any() else None
+    all_seen = Joined(board.points_m, starts, offsets, line, unknown)
+    if films is not None:
+        all_seen = joined(all_seen, films.tags, films.seen(sightings, frame_rate_hz), frame_rate_hz)
+    tags = None if films is None else films.tags
     rig = solve_rig(
-        board.points_m,
-        starts,
-        offsets,
-        line,
-        lambda scene, views: straightened(scene, views, board, borders),
-        _tie(sightings, starts, seen.views, base_tags, survey_std_m),
+        all_seen.points_m,
+        all_seen.starts,
+        all_seen.offsets_s,
+        all_seen.line,
+        lambda scene, views: straightened(scene, views, board, borders, tags),
+        tie,
     )
-    return rig, alone
+    guessed = tuple(sightings[k].name for k in all_seen.unknown)
+    return replace(rig, guessed_clocks=guessed), alone
 
 
 def _tie(
@@ -253,50 +290,6 @@ def _starts(
     names = tuple(camera.name for camera in sightings)
     sizes = tuple(camera.size_px for camera in sightings)
     return start_cameras(names, sizes, (model,) * len(names), board.points_m, views)
-
-
-def _moved_warnings(moved: tuple[tuple[str, float], ...]) -> list[str]:
-    return [
-        f"camera {name}: its base tags moved by {drift:.1f} px during the recording; fasten it and "
-        "record again"
-        for name, drift in moved
-    ]
-
-
-def clock_warnings(rig: Rig) -> list[str]:
-    """Says when several cameras' clocks were not measured."""
-    if len(rig.cameras) < 2 or rig.adjustment.scene.motion.any():
-        return []
-    return [
-        "the board moved too little for the cameras' clocks: they are taken to agree here, and "
-        "`track` measures them from the swing; wave the board about to have them calibrated"
-    ]
-
-
-def _marker(board: Board, rig: Rig) -> str | None:
-    return marker_warning(board, float(rig.adjustment.scene.warp_m[2]))
-
-
-def _group_warnings(rig: Rig) -> list[str]:
-    """Says which cameras only the base tags join, and that their clocks are not measured."""
-    groups = board_groups(len(rig.cameras), rig.problem.views)
-    if not groups.any():
-        return []
-    parts = [
-        " ".join(c.name for c, own in zip(rig.cameras, groups, strict=True) if own == group)
-        for group in np.unique(groups)
-    ]
-    return [
-        f"no board view joins these cameras: {' | '.join(parts)}. The base tags do; clocks are "
-        "measured within each group alone, between groups `track` finds them from the swing"
-    ]
-
-
-def _no_base_warning(reference: str) -> str:
-    return (
-        f"no base tags: camera {reference} is the base frame, so gravity and cable anchors in "
-        "robot.toml do not fit it; survey tags on the frame and name them in session.toml"
-    )
 
 
 def _document(

@@ -75,9 +75,7 @@ def track_run(
     corrected = correct_rig(views, watch, settings.survey_std_m, look=settings.correct_rig)
     poses = corrected.poses
     known = int(poses.known.sum())
-    share = None
-    if noise is not None:
-        share = run_share(poses, corrected.after, corrected.views, watch, noise)
+    share = run_share(poses, corrected.after, corrected.views, watch, noise, corrected.doubt)
     deviations = np.sqrt(np.diagonal(poses.covariances, axis1=1, axis2=2))
     steps = np.diff(poses.times_s)
     return RunTrack(

@@ -31,7 +31,7 @@ def settled_board(board: Board, pixels: Array) -> tuple[Board, str | None]:
     Raises:
         DataError: when the counts are stated the wrong way round.
     """
-    if board.kind == "chessboard" or len(pixels) < _LEAST_VIEWS:
+    if not board.has_tags or len(pixels) < _LEAST_VIEWS:
         return board, None
     bent = _bent(board, pixels)
     if not bent > FLAT:

@@ -22,6 +22,7 @@ from freeswing.cdpr.rotation import exp_rotation, log_rotation, transform
 DEGREE = 4
 PIECE = DEGREE + 1
 _START_DEGREE = 2
+NONE, REST = -1, -2
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +31,8 @@ class Timeline:
 
     Attributes:
         times_s: base time of each moment, (n_moments,).
-        piece: piece of each moment, -1 for those that belong to none, (n_moments,).
+        piece: piece of each moment, `NONE` for those that belong to none, `REST` for those at which
+            what is seen rests, (n_moments,).
     """
 
     times_s: Array
@@ -67,14 +69,17 @@ def in_pieces(scene: Scene, views: Views, line: Timeline) -> tuple[Scene, Views]
     Raises:
         DataError: when no piece is left.
     """
-    present = line.piece[np.unique(views.moment)]
-    whole = np.bincount(present[present >= 0], minlength=int(line.piece.max()) + 1) >= PIECE
-    if not whole.any():
+    piece, at_rest = _with_rests(line)
+    moments = np.unique(views.moment)
+    present = piece[moments]
+    counts = np.bincount(present[present >= 0], minlength=int(piece.max(initial=0)) + 1)
+    whole = counts >= np.where(at_rest, 1, PIECE)
+    if not (whole & ~at_rest).any():
         raise DataError(
             f"no {PIECE} frames on end show the board moving smoothly; film it without cuts"
         )
-    views = views.select((line.piece[views.moment] >= 0) & whole[line.piece[views.moment]])
-    _, number = np.unique(line.piece[views.moment], return_inverse=True)
+    views = views.select((piece[views.moment] >= 0) & whole[piece[views.moment]])
+    _, number = np.unique(piece[views.moment], return_inverse=True)
     count = int(number.max()) + 1
     own = [np.unique(views.moment[number == k]) for k in range(count)]
     middles = np.array([0.5 * (line.times_s[m[0]] + line.times_s[m[-1]]) for m in own])
@@ -87,8 +92,18 @@ def in_pieces(scene: Scene, views: Views, line: Timeline) -> tuple[Scene, Views]
         times = (line.times_s[moments] - at) / scale
         poses[k], motion[k, :_START_DEGREE] = _fitted(times, scene.T_base_boards[moments])
     lag = views.lag_s + line.times_s[views.moment] - middles[number]
+    lag[line.piece[views.moment] == REST] = np.nan
     moved = replace(scene, T_base_boards=poses, motion=motion, motion_scale_s=scale)
     return moved, replace(views, piece=number, lag_s=lag)
+
+
+def _with_rests(line: Timeline) -> tuple[np.ndarray, np.ndarray]:
+    """Piece of each moment, those at rest pieces of their own, and which pieces are at rest."""
+    piece = line.piece.copy()
+    rests = np.flatnonzero(piece == REST)
+    first = int(piece.max(initial=-1)) + 1
+    piece[rests] = first + np.arange(len(rests))
+    return piece, np.arange(first + len(rests)) >= first
 
 
 def _fitted(times: Array, poses: Array) -> tuple[Array, Array]:
@@ -126,7 +141,8 @@ def boards_at(scene: Scene, piece: np.ndarray, times_s: Array) -> Array:
         rotation vectors; polynomials in them are plain algebra.
     """
     order = np.arange(1, scene.motion.shape[1] + 1)
-    powers = (times_s[:, None] / scene.motion_scale_s) ** order
+    known = np.nan_to_num(times_s)  # a board at rest is where it is at any time
+    powers = (known[:, None] / scene.motion_scale_s) ** order
     change = np.einsum("nj,nji->ni", powers, scene.motion[piece])
     poses = scene.T_base_boards[piece]
     turns = exp_rotation(change[:, 3:]) @ poses[:, :3, :3]

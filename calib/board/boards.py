@@ -2,7 +2,8 @@
 
 Board frame: x along the columns, y along the rows as the corners are counted, origin at the
 middle of the corners, z = 0 on the print. A ChArUco board and an AprilGrid are known by the corners
-of their tags, four a tag, TL TR BR BL; a chessboard by its inner corners, row by row.
+of their tags, four a tag, TL TR BR BL; a chessboard by its inner corners, a grid of circles by
+their middles, row by row.
 """
 
 from __future__ import annotations
@@ -18,7 +19,8 @@ from freeswing.calib.camera.lens_models import Array
 from freeswing.calib.tags.tag_patterns import tag_dictionary
 from freeswing.cdpr.files.documents import InputError, read_text
 
-KINDS = ("charuco", "chessboard", "aprilgrid")
+CIRCLES = ("circles", "asymmetric_circles")
+KINDS = ("charuco", "chessboard", "aprilgrid", *CIRCLES)
 _MOST_YAML_BYTES = 1 << 20
 LARGEST_SQUARE_M = 1.0
 """A board that a person can wave has squares of 10 to 200 mm."""
@@ -29,11 +31,13 @@ class Board:
     """One planar board.
 
     Attributes:
-        kind: `charuco`, `chessboard` or `aprilgrid`.
-        columns: squares across (charuco), inner corners across (chessboard) or tags across.
+        kind: `charuco`, `chessboard`, `aprilgrid`, `circles` or `asymmetric_circles`.
+        columns: squares (charuco), inner corners (chessboard), tags or circles across.
         rows: the same downwards.
-        square_m: side of a square, or of an AprilGrid's tag.
-        marker_m: side of a ChArUco marker; gap between AprilGrid tags; 0 for a chessboard.
+        square_m: side of a square, or of an AprilGrid's tag; from a circle to the next, of an
+            asymmetric grid from a row to the next, in which they stand two such steps apart.
+        marker_m: side of a ChArUco marker; gap between AprilGrid tags; diameter of a circle; 0 for
+            a chessboard.
         dictionary: family of the markers, empty for a chessboard.
         legacy: ChArUco layout of OpenCV before 4.6.
     """
@@ -67,6 +71,21 @@ class Board:
             )
         if self.kind == "aprilgrid" and not self.marker_m > 0.0:
             raise ValueError(f"board: the gap between tags is {self.marker_m} m, must be above 0")
+        if self.kind in CIRCLES and not 0.0 < self.marker_m < self._nearest_m:
+            raise ValueError(
+                f"board: diameter_m is {self.marker_m}, must lie between 0 and the distance of two "
+                f"circles, {self._nearest_m:.6g}"
+            )
+
+    @property
+    def _nearest_m(self) -> float:
+        """From a circle to the nearest other."""
+        return self.square_m * (np.sqrt(2.0) if self.kind == "asymmetric_circles" else 1.0)
+
+    @property
+    def has_tags(self) -> bool:
+        """Whether it is known by tags that tell which they are."""
+        return self.n_tags > 0
 
     @property
     def points_m(self) -> Array:
@@ -74,6 +93,8 @@ class Board:
         plane = {
             "charuco": self._charuco_corners,
             "chessboard": self._inner_corners,
+            "circles": self._inner_corners,
+            "asymmetric_circles": self._shifted_rows,
             "aprilgrid": self._grid_corners,
         }[self.kind]()
         plane = plane - 0.5 * (plane.min(axis=0) + plane.max(axis=0))
@@ -89,7 +110,7 @@ class Board:
     @property
     def edges(self) -> np.ndarray:
         """Pairs of corners near each other, whose distance is known, (m, 2)."""
-        if self.kind == "chessboard":
+        if not self.has_tags:
             index = np.arange(self.columns * self.rows).reshape(self.rows, self.columns)
             right = np.stack([index[:, :-1].ravel(), index[:, 1:].ravel()], axis=-1)
             down = np.stack([index[:-1].ravel(), index[1:].ravel()], axis=-1)
@@ -104,6 +125,10 @@ class Board:
 
     def _inner_corners(self) -> Array:
         return _lattice(self.columns, self.rows) * self.square_m
+
+    def _shifted_rows(self) -> Array:
+        column, row = _lattice(self.columns, self.rows).T
+        return np.column_stack([2.0 * column + row % 2.0, row]) * self.square_m
 
     def _charuco_corners(self) -> Array:
         """Marker corners as OpenCV lays the markers out, y downwards, (4 n_tags, 2)."""
@@ -137,8 +162,8 @@ def _lattice(columns: int, rows: int) -> Array:
 def board_from(table: Mapping[str, object]) -> Board:
     """A board from the `board` table of session.toml or from Kalibr's yaml keys.
 
-    Kalibr counts chessboard corners as targetCols, targetRows and its AprilGrid as tagCols,
-    tagRows, tagSize, tagSpacing (a ratio of tagSize).
+    Kalibr counts chessboard corners and circles as targetCols, targetRows and its AprilGrid as
+    tagCols, tagRows, tagSize, tagSpacing (a ratio of tagSize); diameter_m it does not know.
 
     Raises:
         InputError: when a number is missing or makes no board.
@@ -146,6 +171,11 @@ def board_from(table: Mapping[str, object]) -> Board:
     kind = str(table.get("kind", table.get("target_type", "")))
     kind = "chessboard" if kind == "checkerboard" else kind
     try:
+        if kind == "circlegrid":
+            skewed = str(table.get("asymmetricGrid", "")).lower() in ("1", "true")
+            columns, rows = int(_number(table, "targetCols")), int(_number(table, "targetRows"))
+            step, across = _number(table, "spacingMeters"), _number(table, "diameter_m")
+            return Board(CIRCLES[skewed], columns, rows, step, across)
         if kind == "aprilgrid":
             size = _number(table, "tagSize")
             gap = _number(table, "tagSpacing") * size
@@ -163,6 +193,8 @@ def board_from(table: Mapping[str, object]) -> Board:
         square = _number(table, "square_m")
         if kind == "chessboard":
             return Board(kind, columns, rows, square)
+        if kind in CIRCLES:
+            return Board(kind, columns, rows, square, _number(table, "diameter_m"))
         family = str(table.get("dictionary", ""))
         tag_dictionary(family)
         legacy = table.get("legacy") is True

@@ -14,6 +14,7 @@ import numpy as np
 
 from freeswing.calib.board.boards import Board
 from freeswing.calib.board.detection import BoardCorners, BoardDetector, Image
+from freeswing.calib.board.platform_tags import PlatformDetector, PlatformTags
 from freeswing.calib.board.recordings import Recording
 from freeswing.cdpr.system.arrays import Arrays, save_arrays, whole_arrays
 
@@ -34,7 +35,7 @@ class KeptBoards:
         n_frames: frames that will be looked at.
     """
 
-    detector: BoardDetector
+    detector: BoardDetector | PlatformDetector
     folder: Path | None
     recording: Recording
     n_frames: int
@@ -96,7 +97,7 @@ class KeptBoards:
         return [BoardCorners(*next(found)) if seen else None for seen in arrays["seen"]]
 
 
-def _belongs(arrays: Arrays, count: int, detector: BoardDetector) -> bool:
+def _belongs(arrays: Arrays, count: int, detector: BoardDetector | PlatformDetector) -> bool:
     """Whether a piece is of so many frames, of this board, and says what a detector may say."""
     blank = detector.nothing()
     seen = arrays.get("seen", np.zeros(0))
@@ -113,7 +114,7 @@ def _belongs(arrays: Arrays, count: int, detector: BoardDetector) -> bool:
     return state.dtype == np.int64 and detector.knows(state)
 
 
-def _input_hash(recording: Recording, board: Board) -> str:
+def _input_hash(recording: Recording, board: Board | PlatformTags) -> str:
     """Hash of what decides the sightings; recordings by their files' sizes and times."""
     digest = hashlib.sha256(f"{_VERSION} {board}".encode())
     for path in recording.images or (recording.path,):

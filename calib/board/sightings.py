@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +14,7 @@ from freeswing.calib.board.board_motion import Timeline, linked, timeline
 from freeswing.calib.board.boards import Board
 from freeswing.calib.board.detection import BoardDetector
 from freeswing.calib.board.kept_boards import KeptBoards
+from freeswing.calib.board.platform_tags import PlatformDetector, PlatformTags
 from freeswing.calib.board.recordings import Recording, read_frames
 from freeswing.calib.camera.lens_models import Array
 from freeswing.calib.footage.frame_times import frame_times
@@ -75,30 +76,65 @@ def see_boards(
     is not looked for again.
     """
     recordings = tuple(recordings)
-    done = [0]
+    done = np.zeros(len(recordings))
 
-    def run(recording: Recording) -> Sightings:
-        result = _see_board(recording, board, frame_rate_hz, n_still, kept)
-        done[0] += 1
-        if progress is not None:
-            progress(f"board in {recording.name}", done[0] / len(recordings))
-        return result
+    def run(index: int) -> Sightings:
+        def told(share: float) -> None:
+            done[index] = share
+            if progress is not None:
+                progress(f"board in {recordings[index].name}", float(done.mean()))
+
+        detector = BoardDetector(board)
+        return _see(recordings[index], detector, frame_rate_hz, n_still, kept, told)
 
     with ThreadPoolExecutor(_WORKERS) as pool:
-        return tuple(pool.map(run, recordings))
+        return tuple(pool.map(run, range(len(recordings))))
 
 
-def _see_board(
+def see_platform(
+    recordings: Mapping[str, Recording],
+    cameras: Iterable[tuple[str, tuple[int, int]]],
+    tags: PlatformTags,
+    frame_rate_hz: float | None,
+    progress: Progress | None = None,
+    kept: Path | None = None,
+) -> tuple[Sightings, ...]:
+    """The platform's tags in one run, camera by camera; nothing where a camera has no recording.
+
+    Of more than `MOST_FRAMES` frames those in the middle are looked at, without gaps.
+    """
+    cameras = tuple(cameras)
+    blank = PlatformDetector(tags).nothing()
+
+    def run(index: int) -> Sightings:
+        name, size_px = cameras[index]
+
+        def told(share: float) -> None:
+            if progress is not None:
+                progress(f"platform in {name}", (index + share) / len(cameras))
+
+        recording = recordings.get(name)
+        if recording is None:
+            none = np.zeros(0)
+            pixels, noise = blank.pixels[None][:0], blank.covariance_px2[None][:0]
+            return Sightings(name, size_px, 0, none.astype(int), none, (), pixels, noise)
+        return _see(recording, PlatformDetector(tags), frame_rate_hz, 0, kept, told)
+
+    with ThreadPoolExecutor(_WORKERS) as pool:
+        return tuple(pool.map(run, range(len(cameras))))
+
+
+def _see(
     recording: Recording,
-    board: Board,
+    detector: BoardDetector | PlatformDetector,
     frame_rate_hz: float | None,
     n_still: int,
     kept: Path | None,
+    told: Callable[[float], None],
 ) -> Sightings:
     count = len(recording.images) or _count_frames(recording)
-    wanted = _wanted(count)
+    wanted = _wanted(count) if isinstance(detector, BoardDetector) else _middle(count)
     still_at = set(np.linspace(0, count - 1, n_still).round().astype(int)) if n_still else set()
-    detector = BoardDetector(board)
     boards = KeptBoards(detector, kept, recording, len(wanted))
     without: list[np.ndarray] = []  # some images without a board
     numbers, labels, found, stills, size = [], [], [], [], (0, 0)
@@ -109,17 +145,17 @@ def _see_board(
         if position not in wanted:
             continue
         corners = boards.look(image)
+        if detector.other_board is not None:
+            raise DataError(f"{recording.path}: {detector.other_board}")
+        told((position + 1) / max(count, 1))
         if corners is not None:
             numbers.append(number)
             labels.append(label)
             found.append(corners)
         elif len(without) < _LOOKED_AT_AGAIN and position % _EVERY == 0:
             without.append(image)
-    if not found and board.kind != "chessboard" and is_mirrored(board, without):
-        raise DataError(
-            f"{recording.path}: shows the board's mirrored image: its pictures are flipped, or the "
-            "board is seen through its back. Record without a mirror"
-        )
+    if not found:
+        _refuse_mirrored(recording, detector, without)
     frames = np.array(numbers, dtype=int)
     empty = detector.nothing()
     return Sightings(
@@ -136,6 +172,22 @@ def _see_board(
     )
 
 
+def _refuse_mirrored(
+    recording: Recording, detector: BoardDetector | PlatformDetector, images: list[np.ndarray]
+) -> None:
+    """Passes images without a board that show none in a mirror either.
+
+    Raises:
+        DataError: where they do.
+    """
+    board = detector.board
+    if isinstance(board, Board) and board.has_tags and is_mirrored(board, images):
+        raise DataError(
+            f"{recording.path}: shows the board's mirrored image: its pictures are flipped, or the "
+            "board is seen through its back. Record without a mirror"
+        )
+
+
 def _count_frames(recording: Recording) -> int:
     """Frames of a video: from its header where it is believable, else by decoding it."""
     import av
@@ -149,6 +201,11 @@ def _wanted(count: int) -> set[int]:
         return set(range(count))
     starts = np.linspace(0, count - BURST, MOST_FRAMES // BURST).round().astype(int)
     return {int(start + k) for start in starts for k in range(BURST)}
+
+
+def _middle(count: int) -> set[int]:
+    first = max((count - MOST_FRAMES) // 2, 0)
+    return set(range(first, min(first + MOST_FRAMES, count)))
 
 
 def smoothness(sightings: Sightings) -> tuple[np.ndarray, Array]:

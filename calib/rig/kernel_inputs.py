@@ -69,7 +69,7 @@ class ViewArrays(NamedTuple):
         camera: of each view, rising, (n,).
         piece: of the board's motion, (n,).
         pixels: corners, not finite where unseen, (n, n_points, 2).
-        lags_s: each view's stamp from the piece's middle, (n,).
+        lags_s: each view's stamp from the piece's middle, NaN before a board at rest, (n,).
         whitening: lower triangles of each group of corners seen alike, (n, n_groups, 2c, 2c).
     """
 

@@ -7,7 +7,7 @@ arrow; eliminating the b x b blocks leaves a dense p x p system (Schur complemen
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 
 import numpy as np
@@ -34,16 +34,20 @@ class Problem:
     """Data and choices of one adjustment.
 
     Attributes:
-        board_points_m: the board's corners, (n_points, 3).
-        views: sightings of the board, ordered by camera, one per camera and moment.
+        board_points_m: the board's corners, and after rows of NaN those of another rigid body (the
+            platform), (n_points, 3).
+        views: sightings of the board or of that body, ordered by camera, one per camera and moment.
         fixed: surveyed points, None without.
         free: which shared unknowns may move, in the order of `calib.rig.reprojection`, bool (p,).
+        warp_std_m: how far the board's shape may be from its drawing, one standard deviation of
+            each of `warp_m`, infinite where nothing is known beforehand, (3,).
     """
 
     board_points_m: Array
     views: Views
     fixed: FixedPoints | None
     free: np.ndarray
+    warp_std_m: Array = field(default_factory=lambda: np.full(WARP, np.inf))
 
 
 @cache
@@ -66,9 +70,20 @@ def normal_equations(scene: Scene, problem: Problem, sigma: Array) -> Normal:
         end,
         len(problem.free),
     )
+    found = _with_shape(found, scene, problem.warp_std_m, end)
     if problem.fixed is None:
         return found
     return _with_fixed(found, scene, problem.fixed, sigma)
+
+
+def _with_shape(found: Normal, scene: Scene, std_m: Array, first: int) -> Normal:
+    """The equations with what is known of the board's shape beforehand added."""
+    shared, slope = found.shared.copy(), found.shared_slope.copy()
+    rows = first + np.arange(WARP)
+    shared[rows, rows] += 1.0 / std_m**2
+    slope[rows] -= scene.warp_m / std_m**2
+    cost = found.cost + 0.5 * float(np.sum((scene.warp_m / std_m) ** 2))
+    return found._replace(shared=shared, shared_slope=slope, cost=cost)
 
 
 def _with_fixed(found: Normal, scene: Scene, fixed: FixedPoints, sigma: Array) -> Normal:

@@ -65,29 +65,37 @@ def camera_slices(cameras: tuple[Camera, ...]) -> list[slice]:
     return [slice(int(end - size), int(end)) for size, end in zip(sizes, ends, strict=True)]
 
 
+def board_size(points_m: Array) -> int:
+    """How many points are the board's: those before the first row of NaN."""
+    gaps = np.flatnonzero(np.isnan(points_m[:, 0]))
+    return int(gaps[0]) if len(gaps) else len(points_m)
+
+
 def shape_modes(board_points_m: Array) -> Array:
     """How a board differs from its drawing: derivative of its points by `warp_m`, (n, 3, 3).
 
     Two are a paraboloid, zero on the middles of the edges: z changes by 1 - u^2 with u from -1 to 1
     (mrcal's model). The third moves every tag's corners away from its middle, half of it along each
-    side: ink that spread, or a marker of another size than stated. It is zero without tags.
+    side: ink that spread, or a marker of another size than stated. It is zero without tags. Points
+    of another body (`board_size`) keep their shape.
     """
     return _shape_modes(np.ascontiguousarray(board_points_m, dtype=np.float64).tobytes())
 
 
 @lru_cache(maxsize=8)
 def _shape_modes(points: bytes) -> Array:
-    plane = np.frombuffer(points).reshape(-1, 3)[:, :2]
+    everything = np.frombuffer(points).reshape(-1, 3)
+    plane = everything[: board_size(everything), :2]
     low, high = plane.min(axis=0), plane.max(axis=0)
     half = np.maximum(0.5 * (high - low), 1e-12)
-    modes = np.zeros((len(plane), 3, WARP))
-    modes[:, 2, :2] = 1.0 - ((plane - 0.5 * (low + high)) / half) ** 2
+    modes = np.zeros((len(everything), 3, WARP))
+    modes[: len(plane), 2, :2] = 1.0 - ((plane - 0.5 * (low + high)) / half) ** 2
     if len(plane) % 4 == 0:
         tags = plane.reshape(-1, 4, 2)
         arms = tags - tags.mean(axis=1, keepdims=True)
         reach = np.linalg.norm(arms, axis=-1, keepdims=True)
         if np.allclose(arms[:, :2], -arms[:, 2:]) and np.allclose(reach, reach[0, 0, 0]):
-            modes[:, :2, 2] = (arms / (np.sqrt(2.0) * reach)).reshape(-1, 2)
+            modes[: len(plane), :2, 2] = (arms / (np.sqrt(2.0) * reach)).reshape(-1, 2)
     modes.flags.writeable = False
     return modes
 

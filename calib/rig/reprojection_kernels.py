@@ -5,7 +5,8 @@ piece's middle over the problem's time scale,
 
     t(s) = t0 + sum v_j s^j,   R(s) = exp(w(s)) R0,   w(s) = sum w_j s^j,   j = 1 ... degree
 
-so that a corner is predicted at the very time at which its row was exposed. With g the derivative
+so that a corner is predicted at the very time at which its row was exposed. A view without a lag
+is of a board at rest: it is where it is at any time. With g the derivative
 of a pixel by the corner's place in the base frame and a the corner's arm about the board's origin,
 the derivative by a turn d of the board is d . (a x g); a turn of R0 arrives as exp(w) dr, a change
 of w_j as s^j J(w) dw_j, J the left Jacobian of the rotation group (Chirikjian 2012, eq. 10.86).
@@ -130,7 +131,9 @@ def view_of(views: ViewArrays, estimate: Estimate, v: int) -> View:
 def _carry(view: View, row_px: float, at: _Carried) -> float:
     """Carries the board to the time of an image row; gives that time in its scale."""
     T_board, motion = view.T_board, view.motion
-    s = (view.lag_s + view.clock[0] + row_px * view.clock[1]) / view.scale_s
+    s = 0.0
+    if math.isfinite(view.lag_s):
+        s = (view.lag_s + view.clock[0] + row_px * view.clock[1]) / view.scale_s
     w, m = at.w, at.rate
     w[:], at.speed[:] = 0.0, 0.0
     at.t[:], m[:] = T_board[:3, 3], 0.0

@@ -275,6 +275,8 @@ def _apart(cameras: tuple[Camera, ...], inside: list[int], outside: list[int]) -
     there = ", ".join(cameras[i].name for i in outside)
     return (
         f"cameras {there} and cameras {here} share at most {LEAST_SHARED - 1} moments with the "
-        f"board in both, need {LEAST_SHARED}; film the board where one of {here} and one of "
-        f"{there} see it at once, or survey base tags so that each of these cameras sees two"
+        f"board or the swinging platform in both, need {LEAST_SHARED}; film the board where one of "
+        f"{here} and one of {there} see it at once, or record a swing in which each of these "
+        "cameras sees two of the platform's tags (target.toml, a run with video and stamps of one "
+        "clock), or survey base tags so that each of these cameras sees two"
     )

@@ -18,14 +18,8 @@ from freeswing.calib.rig.bundle_adjustment import (
     Adjustment,
     adjust,
 )
-from freeswing.calib.rig.normal_equations import (
-    Problem,
-    covariances,
-    damped_step,
-    length_with_share,
-    normal_equations,
-)
-from freeswing.calib.rig.reprojection import Scene, camera_slices, moved, shape_modes
+from freeswing.calib.rig.normal_equations import Problem, length_with_share
+from freeswing.calib.rig.reprojection import Scene, board_size, camera_slices, shape_modes
 from freeswing.calib.rig.reprojection_kernels import CLOCK, POSE, WARP
 from freeswing.calib.rig.rig_start import BaseTie, board_groups, place_in_base, start_rig
 from freeswing.calib.rig.views import FixedPoints, Views
@@ -40,8 +34,10 @@ CORNER_SIGMAS = 6.0  # one in 1e8 by chance: none of a session's 1e5 corners
 CORNER_WITHIN = 1.0 - np.exp(-0.5 * CORNER_SIGMAS**2)
 _LEAST_CORNERS = 4
 LINE_TIME_SIGMAS = 5.0
-SHAPE_SIGMAS = 6.0
-LEAST_SHAPE_M = 2e-5
+SAG_STD = 0.002
+"""Of the board's width. Aluminium and glass keep 0.0003, foam and card on wood 0.001 to 0.005."""
+GROWTH_STD = 0.02
+"""Of a marker's side: ink spreads by some hundredths, and public boards state theirs 4 % off."""
 LEAST_READOUT_S = 5e-4
 _MOST_SWEEPS = 3
 _SURVEY_ROUNDS = 3
@@ -59,6 +55,7 @@ class Rig:
         reference: camera whose pose is the identity where there is no base frame.
         dropped: views left out, by name.
         n_trimmed: single corners left out.
+        guessed_clocks: cameras whose start is only known by their stamps, by name.
     """
 
     adjustment: Adjustment
@@ -66,6 +63,7 @@ class Rig:
     reference: int
     dropped: tuple[DroppedView, ...]
     n_trimmed: int
+    guessed_clocks: tuple[str, ...] = ()
 
     @property
     def cameras(self) -> tuple[Camera, ...]:
@@ -130,11 +128,12 @@ def solve_rig(
         cameras,
         held_pose=start.reference if fixed is None else None,
         n_fixed=0 if fixed is None else len(fixed.points_base_m),
+        warp=np.isfinite(shape_std_m(board_points_m)),
         clocks=clocks,
         held_clocks=frozenset(board_groups(len(cameras), views).tolist()),
     )
     dropped = tuple(drop for camera in starts for drop in camera.dropped)
-    problem = Problem(board_points_m, views, fixed, free)
+    problem = Problem(board_points_m, views, fixed, free, shape_std_m(board_points_m))
     rig = refine(scene, problem, start.reference, dropped, roughly=straighten is not None)
     if clocks:
         rig = _without_idle_lines(rig)
@@ -142,38 +141,20 @@ def solve_rig(
         scene = rig.adjustment.scene
         problem = replace(rig.problem, views=straighten(scene, rig.problem.views))
         rig = refine(scene, problem, rig.reference, rig.dropped, rig.n_trimmed)
-    return _with_board_shape(rig)
+    return rig
 
 
-def _with_board_shape(rig: Rig) -> Rig:
-    """Let the board bend and its tags grow where the views show it beyond doubt."""
-    end = camera_slices(rig.cameras)[-1].stop
-    free = rig.problem.free.copy()
-    free[end : end + WARP] = np.abs(shape_modes(rig.problem.board_points_m)).max(axis=(0, 1)) > 0
-    problem = replace(rig.problem, free=free)
-    # the rest has converged: one linear step tells what the shape would become
-    normal = normal_equations(rig.adjustment.scene, problem, rig.adjustment.sigma_px)
-    shared, boards = damped_step(normal, free, 0.0)
-    shape = shared[end : end + WARP]
-    std = np.sqrt(np.diag(covariances(normal, free)[0])[end : end + WARP])
-    shown = is_shown(shape, std)
-    if not shown.any():
-        return rig
-    free[end : end + WARP] &= shown
-    scene = moved(rig.adjustment.scene, shared, boards)
-    scene = replace(scene, warp_m=np.where(shown, shape, 0.0))
-    problem = replace(rig.problem, free=free)
-    return refine(scene, problem, rig.reference, rig.dropped, rig.n_trimmed)
-
-
-def is_shown(shape_m: Array, std_m: Array) -> NDArray[np.bool_]:
-    """Which of a board's deformations the views show beyond doubt, (k,).
-
-    Source:
-        Bishop 2006, Pattern Recognition and Machine Learning, sec. 2.3: deviations of a
-        Gaussian.
-    """
-    return (np.abs(shape_m) > SHAPE_SIGMAS * std_m) & (np.abs(shape_m) > LEAST_SHAPE_M)
+def shape_std_m(board_points_m: Array) -> Array:
+    """How far a board's shape is from its drawing before anything was seen: sags, growth, (3,)."""
+    board_points_m = board_points_m[: board_size(board_points_m)]
+    modes = np.abs(shape_modes(board_points_m))
+    plane = board_points_m[:, :2]
+    extent = np.ptp(plane, axis=0)
+    side = 0.0
+    if modes[:, :, 2].any():
+        tags = plane.reshape(-1, 4, 2)
+        side = float(np.linalg.norm(tags[:, 1] - tags[:, 0], axis=1).mean())
+    return np.array([*(SAG_STD * extent), GROWTH_STD * side if side else np.inf])
 
 
 def reads_in_lines(line_time_s: float, std_s: float, rows: int) -> bool:
@@ -205,7 +186,7 @@ def free_unknowns(
     *,
     held_pose: int | None = None,
     n_fixed: int = 0,
-    warp: bool = False,
+    warp: bool | NDArray[np.bool_] = False,
     held_lenses: bool = False,
     clocks: bool = False,
     held_clocks: frozenset[int] = frozenset({0}),
@@ -286,7 +267,9 @@ def _views_kept(result: Adjustment, problem: Problem) -> tuple[np.ndarray, Array
 def _determined(views: Views, scene: Scene) -> np.ndarray:
     """Whether a piece still has as many moments as its motion has coefficients, (n_pieces,)."""
     pairs = np.unique(np.stack([views.piece, views.moment]), axis=1)
-    return np.bincount(pairs[0], minlength=len(scene.motion)) > scene.motion.shape[1]
+    moments = np.bincount(pairs[0], minlength=len(scene.motion))
+    rests = np.bincount(views.piece, np.isnan(views.lag_s), len(scene.motion)) > 0
+    return moments > np.where(rests, 0, scene.motion.shape[1])
 
 
 def _trimmed(result: Adjustment, problem: Problem) -> Views:
@@ -323,7 +306,7 @@ def tie_to_base(rig: Rig, fixed: FixedPoints, *, estimate_survey: bool = True) -
             fixed = replace(fixed, std_m=np.full(len(fixed.std_m), std))
             problem = replace(problem, fixed=fixed)
         result = adjust(result.scene, problem, result.sigma_px, rounds=1)
-    return Rig(result, problem, rig.reference, rig.dropped, rig.n_trimmed)
+    return replace(rig, adjustment=result, problem=problem)
 
 
 def _survey_std(result: Adjustment, fixed: FixedPoints) -> float:

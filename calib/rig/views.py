@@ -21,7 +21,8 @@ class Views:
         moment: index of the moment, (n,).
         piece: index of the piece of the board's motion, (n,).
         pixels: corners, NaN where unseen, (n, n_points, 2).
-        lag_s: the view's own stamp minus the middle of its piece, (n,).
+        lag_s: the view's own stamp minus the middle of its piece, NaN before a board at rest while
+            others move, (n,).
         whitening: lower triangles F with F'F the inverse covariance of a group of corners that
             were found together (a tag's four), over that of the rig's typical corner,
             (n, n_groups, 2 c, 2 c).

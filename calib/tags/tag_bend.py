@@ -23,7 +23,9 @@ import numba
 import numpy as np
 
 from freeswing.calib.board.board_motion import boards_at
-from freeswing.calib.board.boards import Board
+from freeswing.calib.board.boards import CIRCLES, Board
+from freeswing.calib.board.circles import circle_bias
+from freeswing.calib.board.platform_tags import PlatformTags
 from freeswing.calib.camera.camera import Camera
 from freeswing.calib.camera.lens_kernels import lens_point
 from freeswing.calib.camera.lens_models import FISHEYE, Array, full_parameters
@@ -33,7 +35,13 @@ from freeswing.calib.tags.corners import rimmed_cells
 from freeswing.cdpr.rotation import log_rotation
 
 
-def straightened(scene: Scene, views: Views, board: Board, border_cells: Sequence[int]) -> Views:
+def straightened(
+    scene: Scene,
+    views: Views,
+    board: Board,
+    border_cells: Sequence[int],
+    platform: PlatformTags | None = None,
+) -> Views:
     """The views with the corners put right for what lens and rolling shutter do to each tag.
 
     Args:
@@ -41,6 +49,7 @@ def straightened(scene: Scene, views: Views, board: Board, border_cells: Sequenc
         views: as detected.
         board: the board.
         border_cells: width of its tags' borders as each camera's detector found it.
+        platform: tags whose corners are the last points of the views.
     """
     pixels = views.pixels.copy()
     for index, camera in enumerate(scene.cameras):
@@ -55,10 +64,16 @@ def straightened(scene: Scene, views: Views, board: Board, border_cells: Sequenc
             camera.T_camera_base @ boards_at(scene, some.piece, times + shift)
             for shift in (0.0, -step, step)
         )
+        if board.kind in CIRCLES:
+            bias = circle_bias(camera, board.points_m, board.marker_m, poses)
+            pixels[own, : bias.shape[1]] -= np.nan_to_num(bias)
+            continue
         shift = after[:, :3, 3] - before[:, :3, 3]
         turn = log_rotation(after[:, :3, :3] @ np.swapaxes(before[:, :3, :3], 1, 2))
         twists = np.concatenate([shift, turn], axis=1) / (2.0 * step)
         pixels[own] -= _board_bias(camera, board, border_cells[index], some, poses, twists)
+        if platform is not None:
+            pixels[own] -= _platform_bias(camera, platform, some, poses, twists)
     return replace(views, pixels=pixels)
 
 
@@ -72,6 +87,21 @@ def _board_bias(
         edges = pattern_edges(board.dictionary, tag, border_cells, board.kind == "aprilgrid")
         seen = np.isfinite(views.pixels[:, own, 0]).all(axis=1)
         bias[seen, own] = fit_bias(camera, board.points_m[own], poses[seen], edges, twists[seen])
+    return bias
+
+
+def _platform_bias(
+    camera: Camera, platform: PlatformTags, views: Views, poses: Array, twists: Array
+) -> Array:
+    """`fit_bias` of the platform's tags, zero elsewhere, (n, n_points, 2)."""
+    bias = np.zeros_like(views.pixels)
+    corners = platform.points_m.reshape(-1, 4, 3)
+    first = bias.shape[1] - 4 * len(corners)
+    for k, (family, number) in enumerate(platform.names):
+        own = slice(first + 4 * k, first + 4 * k + 4)
+        edges = pattern_edges(family, number, 1, False)
+        seen = np.isfinite(views.pixels[:, own, 0]).all(axis=1)
+        bias[seen, own] = fit_bias(camera, corners[k], poses[seen], edges, twists[seen])
     return bias
 
 

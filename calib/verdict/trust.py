@@ -10,7 +10,7 @@ import numpy as np
 from freeswing.calib.board.coverage import coverage_of
 from freeswing.calib.camera.lens_models import PARAMETER_NAMES
 from freeswing.calib.rig.bundle_adjustment import named
-from freeswing.calib.rig.reprojection import camera_slices
+from freeswing.calib.rig.reprojection import board_size, camera_slices
 from freeswing.calib.rig.solve_rig import Rig
 from freeswing.calib.verdict.grades import (
     CameraNumbers,
@@ -89,6 +89,8 @@ def camera_numbers(rig: Rig, index: int, truth: TruthChecks, alone_px: np.ndarra
     """What is known of one camera of a solution."""
     camera = rig.cameras[index]
     scene, views = rig.adjustment.scene, rig.problem.views
+    board = views.seen[:, : board_size(rig.problem.board_points_m)].any(axis=1)
+    views = views.select(board)
     coverage = coverage_of(camera, index, views, scene.T_base_boards)
     labels = (f"{camera.name}/", f"{camera.name}.")
     return CameraNumbers(

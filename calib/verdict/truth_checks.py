@@ -15,6 +15,8 @@ from freeswing.calib.rig.triangulation import triangulate
 
 LEAST_HALF = 4
 _VOLUME_POINTS = 200
+CHANCE = 0.999
+"""Halves that differ by more than so many of those of honest deviations: these are too small."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +32,8 @@ class TruthChecks:
         halves_shape_rms_m: the same after the best rigid fit.
         volume_std_m: rms of the standard deviation that the covariance gives volume points.
         volume_size_m: extent of the volume that the board was moved through, (3,).
+        spread: how many times larger than claimed the lenses' variances are by the two halves; 1
+            where that is no more than chance.
     """
 
     held_out_px: Array
@@ -40,6 +44,7 @@ class TruthChecks:
     halves_shape_rms_m: float
     volume_std_m: float
     volume_size_m: Array
+    spread: float = 1.0
 
 
 def check_truth(rig: Rig, edges: np.ndarray) -> TruthChecks:
@@ -58,7 +63,8 @@ def check_truth(rig: Rig, edges: np.ndarray) -> TruthChecks:
     halves = [_half(rig, parity) for parity in (0, 1)]
     if any(half is None for half in halves):
         return TruthChecks(nothing, np.nan, np.nan, 0, np.nan, np.nan, volume_std, size)
-    solved = [half for half in halves if half is not None]
+    adjusted = [half for half in halves if half is not None]
+    solved = [half.scene.cameras for half in adjusted]
     squares, numbers = np.zeros(count), np.zeros(count)
     errors: list[Array] = []
     true: list[Array] = []
@@ -86,11 +92,42 @@ def check_truth(rig: Rig, edges: np.ndarray) -> TruthChecks:
         halves_shape_rms_m=shape,
         volume_std_m=volume_std,
         volume_size_m=size,
+        spread=_spread(adjusted[0], adjusted[1]),
     )
 
 
-def _half(rig: Rig, parity: int) -> tuple[Camera, ...] | None:
-    """Cameras from the moments of one parity alone; None when they are too few."""
+def widened(rig: Rig, truth: TruthChecks) -> tuple[Rig, TruthChecks]:
+    """Both with the covariance that the two halves of the footage bear out."""
+    if truth.spread == 1.0:
+        return rig, truth
+    wider = replace(rig.adjustment, covariance=truth.spread * rig.adjustment.covariance)
+    scale = float(np.sqrt(truth.spread))
+    return replace(rig, adjustment=wider), replace(truth, volume_std_m=scale * truth.volume_std_m)
+
+
+def _spread(first: Adjustment, second: Adjustment) -> float:
+    """Normalised square of the difference between two halves' lenses, over their number."""
+    square, count = 0.0, 0
+    slices = camera_slices(first.scene.cameras)
+    for own, one, other in zip(slices, first.scene.cameras, second.scene.cameras, strict=True):
+        lens = slice(own.start, own.start + len(one.params))
+        both = first.covariance[lens, lens] + second.covariance[lens, lens]
+        apart = one.params - other.params
+        square += float(apart @ np.linalg.pinv(both, hermitian=True) @ apart)
+        count += len(apart)
+    return spread_of(square, count)
+
+
+def spread_of(square: float, count: int) -> float:
+    """Factor of variances that a normalised square of so many numbers asks for, 1 by chance."""
+    from scipy.special import gammaincinv
+
+    chance = 2.0 * float(gammaincinv(0.5 * count, CHANCE))
+    return square / count if square > chance else 1.0
+
+
+def _half(rig: Rig, parity: int) -> Adjustment | None:
+    """The rig from the moments of one parity alone; None when they are too few."""
     keep = rig.problem.views.piece % 2 == parity
     views, pieces = rig.problem.views.select(keep).compacted()
     per_camera = np.bincount(views.camera, minlength=len(rig.cameras))
@@ -98,7 +135,7 @@ def _half(rig: Rig, parity: int) -> tuple[Camera, ...] | None:
         return None
     start = rig.adjustment.scene.pieces(pieces)
     problem = replace(rig.problem, views=views)
-    return adjust(start, problem, rig.adjustment.sigma_px, rounds=1).scene.cameras
+    return adjust(start, problem, rig.adjustment.sigma_px, rounds=1)
 
 
 def _held_out(cameras: tuple[Camera, ...], rig: Rig, problem: Problem, parity: int) -> Adjustment:
@@ -149,6 +186,7 @@ def _volume_points(scene: Scene, board_points_m: Array) -> Array:
     poses = scene.T_base_boards
     placed = board_points_m @ np.swapaxes(poses[:, :3, :3], 1, 2) + poses[:, None, :3, 3]
     flat = placed.reshape(-1, 3)
+    flat = flat[np.isfinite(flat[:, 0])]
     return flat[np.unique(np.linspace(0, len(flat) - 1, _VOLUME_POINTS).round().astype(int))]
 
 

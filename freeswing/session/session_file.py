@@ -33,8 +33,10 @@ BOARD_KEYS = {
     "charuco": ("squares", "square_m", "marker_m", "dictionary"),
     "chessboard": ("squares", "square_m"),
     "aprilgrid": ("tagCols", "tagRows", "tagSize", "tagSpacing"),
+    "circles": ("squares", "square_m", "diameter_m"),
+    "asymmetric_circles": ("squares", "square_m", "diameter_m"),
 }
-OPTIONAL_BOARD_KEYS = {"charuco": ("legacy",), "chessboard": (), "aprilgrid": ("family",)}
+OPTIONAL_BOARD_KEYS = {"charuco": ("legacy",), "aprilgrid": ("family",)}
 MOST_RUNS = 10_000
 PORTS = (f"{port}{number}" for port in ("com", "lpt") for number in range(10))
 DEVICES = frozenset(("con", "prn", "aux", "nul", *PORTS))

@@ -279,12 +279,13 @@ HELD = (
         RIG,
     ),
     Held("vision/rig/kept_clocks.py", ("MOST_APART_S",), RIG),
+    Held("vision/rig/untied.py", ("KNOCKED_PX", "SURE_SIGMAS"), RIG),
     Held("vision/rig/alignment.py", ("CLEARLY_BETTER", "IN_EARNEST", "WORSE_M"), RIG),
     Held(
         "calib/rig/solve_rig.py",
         (
             "VIEW_OUTLIER_SIGMAS", "VIEW_OUTLIER_FLOOR_PX", "CORNER_SIGMAS", "LINE_TIME_SIGMAS",
-            "SHAPE_SIGMAS", "LEAST_SHAPE_M", "LEAST_READOUT_S", "_SURVEY_PRIOR",
+            "SAG_STD", "GROWTH_STD", "LEAST_READOUT_S", "_SURVEY_PRIOR",
             "LEAST_SURVEY_STD_M",
         ),
         "tests/calib/rig/test_rejections.py",
@@ -293,10 +294,16 @@ HELD = (
         "calib/rig/coarse_clocks.py",
         (
             "MOST_OFFSET_S", "LEAST_OVERLAP", "LEAST_CORRELATION", "LEAST_SPEED_PX_S",
-            "LEAST_MOVING", "_MOST_GAP",
+            "LEAST_MOVING", "_MOST_GAP", "LEAST_SIGMAS", "CLEAR_SIGMAS",
         ),
         "tests/calib/rig/test_rejections.py",
     ),
+    Held(
+        "calib/board/chessboards.py",
+        ("MOST_HARD", "LEAST_ALIKE"),
+        "tests/calib/board/test_plain_boards.py",
+    ),
+    Held("calib/verdict/truth_checks.py", ("CHANCE",), "tests/calib/verdict/test_grades.py"),
     Held("calib/rig/triangulation.py", ("_LEAST_ANGLE_RAD",), "tests/calib/rig/test_rejections.py"),
     Held("homing/best_fit.py", ("_FAR_OFF",), HOMING),
     Held("homing/home.py", ("_DOUBTFUL_FIT",), HOMING),

@@ -74,24 +74,44 @@ def read_calibration_noise(path: Path) -> CalibrationNoise | None:
 
 
 def run_share(
-    poses: Poses, fit: Fit, views: Sequence[CameraViews], watch: Watch, noise: CalibrationNoise
+    poses: Poses,
+    fit: Fit,
+    views: Sequence[CameraViews],
+    watch: Watch,
+    noise: CalibrationNoise | None,
+    doubt: Array | None = None,
 ) -> RunShare | None:
-    """The share of a run's poses, from instants spread over it; None where no pose is known."""
+    """The share of a run's poses, from instants spread over it; None where none is told.
+
+    Args:
+        poses: of the run.
+        fit: how its sightings agree with them.
+        views: its cameras.
+        watch: what was looked for.
+        noise: the calibration's, None where it is not known.
+        doubt: one cause more, what cameras that contradict each other leave open, (n, 6).
+    """
+    if noise is None and doubt is None:
+        return None
     known = np.flatnonzero(poses.known)
     if not len(known):
         return None
     chosen = known[:: max(1, len(known) // _INSTANTS_A_RUN)]
     focal = np.array([v.camera.focal_px.mean() for v in views])
-    roots = noise.roots()
+    roots = np.zeros((0, 0)) if noise is None else noise.roots()
     found = []
     for block in blocks(views, watch, poses.times_s, poses):
+        if noise is None:
+            break
         mine = chosen[(chosen >= block.first) & (chosen < block.first + len(block.starts) - 1)]
         if len(mine):
             slopes = _pose_slopes(
                 block, poses, views, fit.floor_px / focal, noise.names, mine, free_of(watch)
             )
             found.append(slopes @ roots)
-    slopes = np.concatenate(found)
+    slopes = np.concatenate(found) if found else np.zeros((len(chosen), 6, 0))
+    if doubt is not None:
+        slopes = np.concatenate([slopes, doubt[chosen, :, None]], axis=2)
     about = int(known[len(known) // 2])
     origin, turn = poses.positions_m[about], poses.rotations[about]
     terms = error_terms(
@@ -113,8 +133,9 @@ def common_errors(shares: Sequence[RunShare | None]) -> list[PoseErrors | None]:
     seen = [share for share in shares if share is not None]
     if not seen:
         return [None] * len(shares)
+    most = max(len(s.errors.modes) for s in seen)  # a run without doubt has a cause fewer
     weighted = [
-        np.moveaxis(s.errors.modes * s.spread, 0, 2).reshape(-1, len(s.errors.modes)) for s in seen
+        np.moveaxis(_padded(s.errors.modes, most) * s.spread, 0, 2).reshape(-1, most) for s in seen
     ]
     _, sizes, mixes = np.linalg.svd(np.concatenate(weighted), full_matrices=False)
     left = 1.0 - np.cumsum(sizes**2) / max(float(np.sum(sizes**2)), 1e-300)
@@ -122,8 +143,13 @@ def common_errors(shares: Sequence[RunShare | None]) -> list[PoseErrors | None]:
     return [None if share is None else _mixed(share.errors, mixes[:count]) for share in shares]
 
 
+def _padded(modes: Array, count: int) -> Array:
+    """With causes that do nothing up to so many."""
+    return np.concatenate([modes, np.zeros((count - len(modes), *modes.shape[1:]))])
+
+
 def _mixed(errors: PoseErrors, mixes: Array) -> PoseErrors:
-    modes = np.einsum("jr,rab->jab", mixes, errors.modes)
+    modes = np.einsum("jr,rab->jab", mixes, _padded(errors.modes, mixes.shape[1]))
     return PoseErrors(errors.about_m, errors.about_rotation, modes)
 
 

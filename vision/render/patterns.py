@@ -111,6 +111,26 @@ def chessboard_patch(
     return _board(_checker(squares, 2, first_black=True), 2, square_m, margin_squares)
 
 
+def circles_patch(middles_m: Array, diameter_m: float, cells_across: int = 24) -> Patch:
+    """Black circles about middles (n, 2), y downwards; cells on the outline are grey by area."""
+    cell = diameter_m / cells_across
+    low, high = middles_m.min(axis=0) - diameter_m, middles_m.max(axis=0) + diameter_m
+    columns, rows = np.ceil((high - low) / cell).astype(int)
+    centre = 0.5 * (low + high)
+    sheet = np.ones((rows, columns))
+    sub = (np.arange(4) + 0.5) / 4.0
+    for middle in middles_m:
+        at = (middle - centre) / cell + 0.5 * np.array([columns, rows])
+        first = np.maximum(np.floor(at - 0.5 * cells_across).astype(int) - 1, 0)
+        last = first + cells_across + 3
+        x = (np.arange(first[0], last[0])[:, None] + sub).ravel() - at[0]
+        y = (np.arange(first[1], last[1])[:, None] + sub).ravel() - at[1]
+        inside = (x[None] ** 2 + y[:, None] ** 2 < (0.5 * cells_across) ** 2).astype(float)
+        share = inside.reshape(len(y) // 4, 4, len(x) // 4, 4).mean(axis=(1, 3))
+        sheet[first[1] : last[1], first[0] : last[0]] -= share
+    return Patch(sheet, (columns * cell, rows * cell))
+
+
 def aprilgrid_patch(
     tag_columns: int,
     tag_rows: int,

@@ -20,7 +20,10 @@ REACH_FRAMES = 0.5
 CLEARLY_BETTER = 1.5
 """An offset is looked for when poses fit so many times better there than as stamped."""
 SURE_SIGMAS = 4.0
-"""A start is believed when the variance between cameras is so many deviations below any other's."""
+"""A start is believed when frame for frame any other misses by so many deviations more."""
+_LEAST_COMPARED = 20
+_SAME_START_S = 0.005
+"""Starts that end so near are one: they were frames apart, and the clocks were put right."""
 IN_EARNEST = 3.0
 """Starts that leave poses no more times as far apart as the best are tried with everything free."""
 MOST_TRIED = 10
@@ -45,9 +48,23 @@ class Aligned:
     remarks: tuple[str, ...]
 
 
-Misfit = Callable[[CameraViews, CameraViews], tuple[float, int]]
-"""How far the second camera is from what both agree on, in px, with clocks and rolling shutters
-free to be put right; and in how many frames it was compared."""
+@dataclass(frozen=True, slots=True)
+class Missed:
+    """How far the second camera is from what both agree on.
+
+    Attributes:
+        size_px: beyond the pixels' noise.
+        squares_px2: mean square of each of its frames that both could see, by frame number.
+        offset_s: between the clocks once they were put right.
+    """
+
+    size_px: float
+    squares_px2: dict[int, float]
+    offset_s: float = 0.0
+
+
+Misfit = Callable[[CameraViews, CameraViews], Missed]
+"""Of two cameras, clocks and rolling shutters free to be put right."""
 
 
 def aligned(views: Sequence[CameraViews], reference: int, misfit: Misfit) -> Aligned:
@@ -97,23 +114,35 @@ def aligned(views: Sequence[CameraViews], reference: int, misfit: Misfit) -> Ali
 def _chosen(
     pair: Pair, known: CameraViews, new: CameraViews, misfit: Misfit
 ) -> tuple[float, float, float, float]:
-    """The best lag, its misfit and the next best's in px, and how many deviations apart they are.
-
-    Logarithms of variances have deviations of sqrt(2 / n): n counts two numbers a frame, since the
-    errors of one frame's corners are much alike.
-    """
+    """The best lag, its misfit and the next best's in px, and how many deviations are between."""
     lags = [pair.lag_s]
     lags += [lag for lag, miss_m in pair.rivals if miss_m < IN_EARNEST * pair.decided_m]
     tried = [misfit(known, _later(new, lag)) for lag in lags[:MOST_TRIED]]
-    order = sorted(range(len(tried)), key=lambda k: tried[k][0])
-    best_px, count = tried[order[0]]
-    sure, rival_px = float("inf"), float("inf")
-    for k in order[1:]:
-        size, frames = tried[k]
-        rival_px = min(rival_px, size)
-        spread = np.sqrt(1.0 / max(count, 1) + 1.0 / max(frames, 1))
-        sure = min(sure, float(2.0 * np.log(size / best_px) / spread))
-    return lags[order[0]], best_px, rival_px, sure
+    order = sorted(range(len(tried)), key=lambda k: tried[k].size_px)
+    best = tried[order[0]]
+    others = [tried[k] for k in order[1:]]
+    rivals = [one for one in others if abs(one.offset_s - best.offset_s) > _SAME_START_S]
+    sure = min((deviations_apart(best, rival) for rival in rivals), default=float("inf"))
+    next_px = min((rival.size_px for rival in rivals), default=float("inf"))
+    return lags[order[0]], best.size_px, next_px, sure
+
+
+def deviations_apart(best: Missed, rival: Missed) -> float:
+    """By how many deviations the rival misses more, over the frames that both compared.
+
+    Both look at the same corners, so that what their noise does cancels in each frame's difference.
+    Starts without common frames are held against each other by the logarithm of their variances,
+    two numbers a frame, since the errors of one frame's corners are much alike.
+    """
+    if not np.isfinite(rival.size_px):
+        return float("inf")
+    both = sorted(best.squares_px2.keys() & rival.squares_px2.keys())
+    if len(both) >= _LEAST_COMPARED:
+        more = np.array([rival.squares_px2[k] - best.squares_px2[k] for k in both])
+        return float(more.mean() / max(float(more.std(ddof=1)), 1e-300) * np.sqrt(len(more)))
+    counts = (max(len(one.squares_px2), 1) for one in (best, rival))
+    spread = np.sqrt(sum(1.0 / count for count in counts))
+    return float(2.0 * np.log(rival.size_px / best.size_px) / spread)
 
 
 def own_track(view: CameraViews) -> OwnTrack:

@@ -18,32 +18,30 @@ from freeswing.cdpr.rotation import log_rotation
 from freeswing.vision.fuse.fuse_cameras import Fit, fuse
 from freeswing.vision.fuse.poses import Poses
 from freeswing.vision.fuse.run_views import CameraViews, instants_of
-from freeswing.vision.look.follow import USED
 from freeswing.vision.look.label import label_markers
 from freeswing.vision.look.watched_target import Watch
-from freeswing.vision.rig.alignment import aligned
+from freeswing.vision.rig.alignment import Missed, aligned
 from freeswing.vision.rig.gross_faults import moved_too_far, refuse_disagreement, refuse_gross
 from freeswing.vision.rig.rig_effects import (
     LEAST_CLOCK_S,
     LEAST_LINE_S,
     Finding,
     RigStep,
-    applied,
+    frame_squares_px2,
+    iterated,
     moved_cameras,
     repose_by_base_tags,
     rig_step,
 )
 from freeswing.vision.rig.rig_kernels import CLOCK, LINE, PER_CAMERA, POSE
 from freeswing.vision.rig.stamp_jitter import stamp_jitter_s, widened_poses, widened_step
+from freeswing.vision.rig.untied import untied_shifts
 
 Array = NDArray[np.float64]
 
 # A rig has two dozen numbers that could be off, deviations are good to some ten percent, and what
 # is changed for nothing spoils every pose: six of them leave no room for chance.
 SIGMAS = 6.0
-_STEPS, _MOST_STEPS = 3, 20
-_SETTLED = 0.3
-"""Steps go on while one changes a number by more than this share of its deviation."""
 _LEAST_KNOWN = 20
 
 
@@ -58,6 +56,9 @@ class Corrected:
         after: agreement with the corrected ones.
         findings: the effects found.
         remarks: what else was found, in words.
+        doubt: how far the poses would go where cameras that no base tag holds disagree beyond
+            their noise, position and small rotation, zero where they agree; None where all are
+            held, (n, 6).
     """
 
     views: tuple[CameraViews, ...]
@@ -66,6 +67,7 @@ class Corrected:
     after: Fit
     findings: tuple[Finding, ...]
     remarks: tuple[str, ...] = ()
+    doubt: Array | None = None
 
 
 def correct_rig(
@@ -86,7 +88,7 @@ def correct_rig(
     calibrated, started = tuple(views), None
     if look and watch.tags and len(views):
         started = aligned(
-            views, _reference(views), lambda a, b: _misfit_px([a, b], watch, survey_std_m)
+            views, _reference(views), lambda a, b: _missed([a, b], watch, survey_std_m)
         )
         views = started.views
         refuse_gross(views, watch, started.pairs)
@@ -115,8 +117,9 @@ def correct_rig(
     )
     if not (moved or clocks.any() or lines.any()):
         refuse_disagreement(views, before)
+        doubt, said = untied_shifts(views, watch, poses, before, survey_std_m)
         poses = widened_poses(poses, jitter)
-        return Corrected(tuple(views), poses, before, before, (), remarks)
+        return Corrected(tuple(views), poses, before, before, (), (*remarks, *said), doubt)
     final = [
         _decided(view, own, clock, line)
         for view, own, clock, line in zip(current, calibrated, clocks, lines, strict=True)
@@ -124,27 +127,26 @@ def correct_rig(
     _refuse_far(calibrated, final)
     poses, after = fuse(final, watch, instants_of(final), start=_restarted(final, watch, start))
     refuse_disagreement(final, after)
+    doubt, said = untied_shifts(final, watch, poses, after, survey_std_m)
     findings = _findings(calibrated, final, moved, clocks, lines, last)
     poses = widened_poses(poses, jitter)
-    return Corrected(tuple(final), poses, before, after, findings, remarks)
+    return Corrected(tuple(final), poses, before, after, findings, (*remarks, *said), doubt)
 
 
-def _misfit_px(
-    views: Sequence[CameraViews], watch: Watch, survey_std_m: float
-) -> tuple[float, int]:
-    """What the last camera misses, clocks and line times free, and in how many frames."""
+def _missed(views: Sequence[CameraViews], watch: Watch, survey_std_m: float) -> Missed:
+    """What the last camera misses, clocks and line times free."""
     instants, current = instants_of(views), list(views)
     poses, fit = fuse(current, watch, instants, passes=2, rough=True)
     if int(poses.known.sum()) < _LEAST_KNOWN:
-        return float("inf"), 0
+        return Missed(float("inf"), {})
     free = np.zeros((len(views), PER_CAMERA), dtype=bool)
     free[:, LINE] = True
     free[:, CLOCK] = np.arange(len(views)) != _reference(current)
-    _iterate(current, watch, poses, fit, free, np.zeros_like(free, dtype=float), survey_std_m)
-    _, fit = fuse(current, watch, instants, start=poses, passes=2, rough=True)
-    seen = [np.sort(view.middle_times()[view.status == USED]) for view in current]
-    both = (seen[-1] > seen[0][0]) & (seen[-1] < seen[0][-1])
-    return float(fit.floor_px[-1]), int(both.sum())
+    iterated(current, watch, poses, fit, free, np.zeros_like(free, dtype=float), survey_std_m)
+    poses, fit = fuse(current, watch, instants, start=poses, passes=2, rough=True)
+    squares = frame_squares_px2(current, watch, poses)
+    clocks = [view.camera.clock_offset_s for view in current]
+    return Missed(float(fit.floor_px[-1]), squares, clocks[-1] - clocks[0])
 
 
 def _refuse_far(views: Sequence[CameraViews], final: Sequence[CameraViews]) -> None:
@@ -180,7 +182,7 @@ def _estimate(
     free[:, CLOCK] = clock_free
     total = np.zeros((n_c, PER_CAMERA))
     poses, fit = fuse(current, watch, instants, start=poses if not moved else None, rough=True)
-    step = _iterate(current, watch, poses, fit, free, total, survey_std_m)
+    step = iterated(current, watch, poses, fit, free, total, survey_std_m)
     with_lines = free.copy()
     with_lines[:, LINE] = True
     poses, fit = fuse(current, watch, instants, start=poses, passes=2, rough=True)
@@ -192,7 +194,7 @@ def _estimate(
     real &= np.abs(lines) < _longest_lines(current)
     if real.any():
         free[:, LINE] = real
-        step = _iterate(current, watch, poses, fit, free, total, survey_std_m)
+        step = iterated(current, watch, poses, fit, free, total, survey_std_m)
     step = widened_step(step, current, jitter)
     clocks = total[:, CLOCK] - (np.median(total[:, CLOCK]) if n_c > 2 else 0.0)
     deviation = np.where(clock_free, step.deviations[:, CLOCK], step.deviations[:, CLOCK].max())
@@ -208,29 +210,6 @@ def is_real(values: Array, deviations: Array, least: float) -> NDArray[np.bool_]
         Gaussian.
     """
     return np.abs(values) > np.maximum(least, SIGMAS * deviations)
-
-
-def _iterate(
-    current: list[CameraViews],
-    watch: Watch,
-    poses: Poses,
-    fit: Fit,
-    free: NDArray[np.bool_],
-    total: Array,
-    survey_std_m: float,
-) -> RigStep:
-    """Gauss-Newton over rig and poses in turn; `current` and `total` are brought up to date."""
-    step = rig_step(current, watch, poses, fit, free, survey_std_m)
-    for k in range(_MOST_STEPS):
-        for index, change in enumerate(step.changes):
-            current[index] = applied(current[index], change)
-        total += step.changes
-        settled = bool((np.abs(step.changes) <= _SETTLED * step.deviations).all())
-        if k + 1 == _MOST_STEPS or (settled and k + 1 >= _STEPS):
-            break
-        poses, fit = fuse(current, watch, poses.times_s, start=poses, passes=2, rough=True)
-        step = rig_step(current, watch, poses, fit, free, survey_std_m)
-    return step
 
 
 def _longest_lines(views: Sequence[CameraViews]) -> Array:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from freeswing.calib.camera.camera import Camera
 from freeswing.cdpr.rotation import exp_rotation
 from freeswing.vision.fuse.blocks import blocks
-from freeswing.vision.fuse.fuse_cameras import Fit, whitened
+from freeswing.vision.fuse.fuse_cameras import Fit, fuse, whitened
 from freeswing.vision.fuse.linearised_block import linearised
 from freeswing.vision.fuse.poses import Poses
 from freeswing.vision.fuse.run_views import CameraViews
@@ -42,6 +42,9 @@ LEAST_CLOCK_S = 5e-5
 # The same over an image of 200 rows and more.
 LEAST_LINE_S = 3e-7
 _KEEP_SCORE = 400.0
+_STEPS, _MOST_STEPS = 3, 20
+_SETTLED = 0.3
+"""Steps go on while one changes a number by more than this share of its deviation."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -226,3 +229,43 @@ def applied(view: CameraViews, change: Array) -> CameraViews:
         line_time_s=camera.line_time_s + float(change[LINE]),
     )
     return view.believed(camera)
+
+
+def iterated(
+    current: list[CameraViews],
+    watch: Watch,
+    poses: Poses,
+    fit: Fit,
+    free: NDArray[np.bool_],
+    total: Array,
+    survey_std_m: float,
+) -> RigStep:
+    """Gauss-Newton over rig and poses in turn; `current` and `total` are brought up to date."""
+    step = rig_step(current, watch, poses, fit, free, survey_std_m)
+    for k in range(_MOST_STEPS):
+        for index, change in enumerate(step.changes):
+            current[index] = applied(current[index], change)
+        total += step.changes
+        settled = bool((np.abs(step.changes) <= _SETTLED * step.deviations).all())
+        if k + 1 == _MOST_STEPS or (settled and k + 1 >= _STEPS):
+            break
+        poses, fit = fuse(current, watch, poses.times_s, start=poses, passes=2, rough=True)
+        step = rig_step(current, watch, poses, fit, free, survey_std_m)
+    return step
+
+
+def frame_squares_px2(views: Sequence[CameraViews], watch: Watch, poses: Poses) -> dict[int, float]:
+    """Mean square residual of the last camera's frames at instants that another sees too."""
+    last = len(views) - 1
+    focal = float(views[last].camera.focal_px.mean())
+    squares: dict[int, float] = {}
+    for block in blocks(views, watch, poses.times_s, poses):
+        residuals = linearised(block, views, poses).residuals
+        instant = np.repeat(np.arange(len(block.starts) - 1), np.diff(block.starts))
+        others = np.unique(instant[block.camera_of != last])
+        mine = (block.camera_of == last) & np.isin(instant, others)
+        sums = (residuals[mine] ** 2).sum(axis=1) * focal**2
+        for frame in np.unique(block.frames[mine]).tolist():
+            own = block.frames[mine] == frame
+            squares[int(frame)] = float(sums[own].sum() / (2 * block.counts[mine][own]).sum())
+    return squares

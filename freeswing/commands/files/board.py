@@ -117,7 +117,7 @@ def _sheets(session: Session) -> Iterator[tuple[str, Sheet]]:
 
 
 def _board_label(table: Mapping[str, object]) -> str:
-    from freeswing.calib.board.boards import board_from
+    from freeswing.calib.board.boards import CIRCLES, board_from
 
     board = board_from(table)
     counts = f"{board.columns} x {board.rows}"
@@ -126,12 +126,20 @@ def _board_label(table: Mapping[str, object]) -> str:
         return f"charuco {board.dictionary}, {counts} squares of {side_mm:.6g} mm"
     if board.kind == "chessboard":
         return f"chessboard, {counts} inner corners, squares of {side_mm:.6g} mm"
+    if board.kind in CIRCLES:
+        across_mm = 1e3 * board.marker_m
+        return f"{board.kind}, {counts} of {across_mm:.6g} mm, {side_mm:.6g} mm apart"
     return f"aprilgrid {board.dictionary}, {counts} tags of {side_mm:.6g} mm"
 
 
 def _board_patch(table: Mapping[str, object]) -> Patch:
-    from freeswing.calib.board.boards import board_from
-    from freeswing.vision.render.patterns import aprilgrid_patch, charuco_patch, chessboard_patch
+    from freeswing.calib.board.boards import CIRCLES, board_from
+    from freeswing.vision.render.patterns import (
+        aprilgrid_patch,
+        charuco_patch,
+        chessboard_patch,
+        circles_patch,
+    )
 
     board = board_from(table)
     counts = (board.columns, board.rows)
@@ -139,5 +147,7 @@ def _board_patch(table: Mapping[str, object]) -> Patch:
         return charuco_patch(counts, board.square_m, board.marker_m, board.dictionary)
     if board.kind == "chessboard":
         return chessboard_patch(counts, board.square_m)
+    if board.kind in CIRCLES:
+        return circles_patch(board.points_m[:, :2], board.marker_m)
     spacing = board.marker_m / board.square_m
     return aprilgrid_patch(*counts, board.square_m, spacing, board.dictionary)

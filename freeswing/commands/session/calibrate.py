@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from freeswing.commands.arguments import add_session, open_session
@@ -10,6 +11,7 @@ from freeswing.console import Console
 
 if TYPE_CHECKING:
     from freeswing.calib.calibrate import CalibrationResult
+    from freeswing.calib.rig.swing_tie import SwingFilms
     from freeswing.session.made import Made
     from freeswing.session.session_file import Session
     from freeswing.workers.crew import Crew
@@ -39,7 +41,7 @@ def run(options: Namespace, console: Console) -> None:
 
 def make(session: Session, console: Console, settings: dict[str, Any], crew: Crew) -> Made:
     """calibration.json as a document, and cameras.toml where it may be used."""
-    from freeswing.calib.calibrate import KEPT_BOARDS, PlumbLine, calibrate_session
+    from freeswing.calib.calibrate import KEPT_BOARDS, Aids, PlumbLine, calibrate_session
     from freeswing.calib.camera.cameras_file import cameras_text
     from freeswing.cdpr.files.documents import InputError
     from freeswing.cdpr.files.robot_file import read_robot
@@ -59,7 +61,7 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
         frame_rate_hz=session.frame_rate_hz,
         kept_boards=session.results / KEPT_BOARDS,
         model=settings["model"],
-        plumb_line=plumb_line,
+        beside=Aids(plumb_line, partial(_swings, session)),
         progress=console.progress,
     )
     if found.refused is not None:
@@ -76,6 +78,23 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
         console.complain(warning)
     files = ((session.cameras, cameras_text(found.cameras).encode()),)
     return Made((("calibration.json", document),), files)
+
+
+def _swings(session: Session) -> SwingFilms | None:
+    """The runs' recordings, where the session has some and tags on the platform."""
+    from freeswing.calib.board.platform_tags import platform_tags
+    from freeswing.calib.calibrate import KEPT_BOARDS
+    from freeswing.calib.rig.swing_tie import SwingFilms
+    from freeswing.session.load_swings import load_target
+
+    runs = tuple(
+        (run.name, run.video)
+        for run in session.video_runs
+        if run.video is not None and run.video.is_dir()
+    )
+    target = load_target(session) if runs else None
+    tags = None if target is None else platform_tags(target)
+    return None if tags is None else SwingFilms(tags, runs, session.results / KEPT_BOARDS)
 
 
 def _beside_colmap(found: CalibrationResult, console: Console) -> dict[str, Any]:

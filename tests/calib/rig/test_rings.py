@@ -17,7 +17,8 @@ from freeswing.calib.rig.triangulation import triangulate
 from freeswing.calib.rig.views import FixedPoints, Views, make_views
 from freeswing.calib.verdict.truth_checks import volume_std_m
 from freeswing.cdpr.files.documents import DataError, dump_toml
-from freeswing.cdpr.rotation import transform
+from freeswing.cdpr.measured.target import Tag, Target, write_target
+from freeswing.cdpr.rotation import exp_rotation, invert, transform
 from freeswing.main import main
 from freeswing.vision.render.patterns import charuco_patch, tag_patch
 from freeswing.vision.render.record import record
@@ -108,11 +109,9 @@ def test_two_surveyed_tags_each_join_a_ring(count) -> None:
     assert error < 2.5 * claimed < 6e-3, f"{1e3 * error:.2f} mm, claimed {1e3 * claimed:.2f} mm"
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("count", [3, 4])
-def test_a_rendered_ring_through_the_command_line(tmp_path, count) -> None:
-    cameras = tuple(film_camera(camera) for camera in ring(count))
-    shown, each = 16, 16 * count
+def boards_before(cameras, shown: int):
+    """A board shown to one camera after the other, `shown` times each: its motion by frames."""
+    each = shown * len(cameras)
     poses = np.concatenate(
         [rigs.poses((camera,), shown, 40 + k, tilt=0.5) @ FLIP for k, camera in enumerate(cameras)]
     )
@@ -121,6 +120,14 @@ def test_a_rendered_ring_through_the_command_line(tmp_path, count) -> None:
         index = np.clip(np.round(times_s).astype(int), 0, each - 1)
         return poses[index, :3, 3], poses[index, :3, :3]
 
+    return motion, np.arange(float(each))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("count", [3, 4])
+def test_a_rendered_ring_through_the_command_line(tmp_path, count) -> None:
+    cameras = tuple(film_camera(camera) for camera in ring(count))
+    motion, stamps = boards_before(cameras, 16)
     patches, tables, rng = [], [], np.random.default_rng(5)
     for camera in cameras:
         for corners in tags_before(camera):
@@ -132,7 +139,6 @@ def test_a_rendered_ring_through_the_command_line(tmp_path, count) -> None:
         tuple(BOARD["squares"]), BOARD["square_m"], BOARD["marker_m"], BOARD["dictionary"]
     )
     scene = Scene((*patches, board), motion)
-    stamps = np.arange(float(each))
     folder = tmp_path / "calibration"
     record(folder, cameras, scene, stamps, Look(), 4, images=True, stamps_file=False)
     write_session(tmp_path, tables)
@@ -144,6 +150,74 @@ def test_a_rendered_ring_through_the_command_line(tmp_path, count) -> None:
     assert document["base_frame"]["reprojection_px"] < 0.1, document["base_frame"]
     claimed = document["checks"]["volume_std_m"]
     assert error < 2.5 * claimed, f"{1e3 * error:.2f} mm, claimed {1e3 * claimed:.2f} mm"
+
+
+def platform_tags() -> list[Tag]:
+    """Tags on the faces of a box: whoever looks from aside sees two or three of them."""
+    tags = []
+    for number in range(6):
+        angle = np.radians(60.0 * number)
+        out, up = np.array([np.cos(angle), np.sin(angle), 0.0]), np.array([0.0, 0.0, 1.0])
+        turn = np.stack([np.cross(up, out), up, out], axis=1)
+        height = 0.06 * (-1.0) ** number
+        tags.append(Tag("tag36h11", number, 0.16, transform(turn, 0.22 * out + height * up)))
+    return tags
+
+
+def swing(times_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A platform that swings by some centimetres and turns by some degrees."""
+    t = np.asarray(times_s)
+    rates, sizes = np.array([0.71, 0.53, 1.3]), np.array([0.08, 0.06, 0.01])
+    turns, angles = np.array([0.9, 1.1, 0.37]), np.array([0.08, 0.1, 0.3])
+    phase = 2.0 * np.pi * t[:, None]
+    return sizes * np.sin(rates * phase + [0.0, 1.0, 2.0]), exp_rotation(
+        angles * np.sin(turns * phase + [1.0, 0.0, 0.5])
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("count", [3, 4])
+def test_the_swings_tie_a_ring(tmp_path, count) -> None:
+    """No base tag and no shared view of the board: one rigid body swings before all cameras."""
+    clocks = (0.0, 0.0031, -0.0024, 0.0012)
+    cameras = tuple(
+        replace(film_camera(camera), clock_offset_s=clock)
+        for camera, clock in zip(ring(count), clocks, strict=False)
+    )
+    motion, stamps = boards_before(cameras, 12)
+    board = charuco_patch(
+        tuple(BOARD["squares"]), BOARD["square_m"], BOARD["marker_m"], BOARD["dictionary"]
+    )
+    still = tuple(replace(camera, clock_offset_s=0.0) for camera in cameras)
+    folder = tmp_path / "calibration"
+    record(
+        folder, still, Scene((board,), motion), stamps, Look(), 4, images=True, stamps_file=False
+    )
+    write_session(tmp_path, [])
+    tags = platform_tags()
+    write_target(tmp_path / "target.toml", Target(tuple(tags)))
+    patches = tuple(tag_patch(t.family, t.id, t.size_m, t.T_platform_tag) for t in tags)
+    record(
+        tmp_path / "runs" / "swing", cameras, Scene(patches, swing), np.arange(60) / 30.0, Look(), 5
+    )
+    assert main(["calibrate", str(tmp_path), "--quiet"]) == 0
+    found = read_cameras(tmp_path / "cameras.toml")
+    document = json.loads((tmp_path / "results" / "calibration.json").read_text())
+    warned = document["verdict"]["warnings"]
+    assert any("The platform's tags in the swings do" in text for text in warned), warned
+    reference = next(k for k, c in enumerate(found) if np.allclose(c.T_camera_base, np.eye(4)))
+    T = cameras[reference].T_camera_base
+    true = tuple(replace(c, T_camera_base=c.T_camera_base @ invert(T)) for c in cameras)
+    points = middle_points() @ T[:3, :3].T + T[:3, 3]
+    pixels = np.stack([camera.project(camera.to_camera(points)) for camera in true])
+    off = triangulate(found, pixels) - points
+    error = float(np.sqrt(np.mean(np.sum(off**2, axis=1))))
+    claimed = document["checks"]["volume_std_m"]
+    assert error < min(3e-4, 2.5 * claimed), f"{1e3 * error:.3f} mm, claimed {1e3 * claimed:.3f} mm"
+    for camera, one in zip(found, cameras, strict=True):
+        late = camera.clock_offset_s - found[0].clock_offset_s
+        wanted = one.clock_offset_s - cameras[0].clock_offset_s
+        assert abs(late - wanted) < 2e-4, (camera.name, late, wanted)
 
 
 def film_camera(camera: Camera) -> Camera:
@@ -166,6 +240,7 @@ def write_session(folder: Path, tables: list[dict]) -> None:
         "robot": "robot.toml",
         "target": "target.toml",
         "cameras": "cameras.toml",
+        "frame_rate_hz": 30.0,
         "calibration": {"recordings": "calibration", "board": BOARD, "base_tags": tables},
         "runs": [{"name": "swing", "role": "identify", "video": "runs/swing"}],
     }

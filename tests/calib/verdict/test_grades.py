@@ -12,6 +12,7 @@ from freeswing.calib.verdict.grades import (
     camera_findings,
     rig_findings,
 )
+from freeswing.calib.verdict.truth_checks import spread_of
 
 GOOD = CameraNumbers("a", "OPENCV", 20, 0, 40.0, 0.6, (), 5e-4, 0.1, 0.11, 0.1, 2)
 GOOD_RIG = RigNumbers(2, 40, 40, "", 2e-4, 300, 2e-4, 3e-4)
@@ -101,3 +102,9 @@ def test_what_is_said_names_the_camera_the_number_and_what_to_film() -> None:
         "camera a: 5 views of the board, want 12 (least 6): film the board all over this camera's "
         "image, tilted 20 to 40 degrees; nothing seen top left and bottom"
     )
+
+
+@pytest.mark.parametrize(("square", "spread"), [(26.0, 1.0), (26.2, 26.2 / 8.0)])
+def test_halves_that_differ_by_more_than_chance_widen(square, spread) -> None:
+    """One in a thousand of honest lenses of eight numbers is beyond 26.1."""
+    assert spread_of(square, 8) == pytest.approx(spread)

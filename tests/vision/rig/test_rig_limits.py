@@ -13,7 +13,7 @@ from freeswing.calib.camera.camera import Camera
 from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.rotation import exp_rotation, invert
 from freeswing.vision.fuse.fuse_cameras import Fit
-from freeswing.vision.rig.alignment import _chosen, _needed
+from freeswing.vision.rig.alignment import Missed, _chosen, _needed, deviations_apart
 from freeswing.vision.rig.correct_rig import is_real
 from freeswing.vision.rig.gross_faults import (
     Evidence,
@@ -25,6 +25,7 @@ from freeswing.vision.rig.gross_faults import (
 from freeswing.vision.rig.kept_clocks import with_kept_clocks
 from freeswing.vision.rig.pairs import OwnTrack, _candidates, _correlations, _fitted
 from freeswing.vision.rig.rig_effects import LEAST_CLOCK_S, LEAST_LINE_S, Finding, was_moved
+from freeswing.vision.rig.untied import is_sure, was_knocked
 from tests.vision.scenes import camera
 
 
@@ -46,6 +47,18 @@ def test_base_tags_that_lie_off(miss_px, moved) -> None:
 )
 def test_what_is_surely_not_zero(value, deviation, least, real) -> None:
     assert is_real(np.array([value]), np.array([deviation]), least).tolist() == [real]
+
+
+@pytest.mark.parametrize(("apart_px", "knocked"), [(1.9, False), (2.1, True)])
+def test_cameras_apart_by_more_than_calibrations_leave(apart_px, knocked) -> None:
+    assert was_knocked(apart_px) == knocked
+
+
+@pytest.mark.parametrize(("deviations", "sure"), [(5.8, False), (6.2, True)])
+def test_a_change_of_pose_that_stands_out(deviations, sure) -> None:
+    std = np.array([1e-3, 2e-3, 1e-3, 1e-4, 3e-4, 1e-4])
+    change = deviations * std / np.sqrt(6.0)
+    assert is_sure(change, np.diag(std**2)) == sure
 
 
 VIEW = camera()
@@ -144,6 +157,34 @@ def test_when_a_camera_was_started_apart(at_zero_m, decided_m, needed) -> None:
     assert _needed(SimpleNamespace(at_zero_m=at_zero_m, decided_m=decided_m)) == needed
 
 
+def test_starts_are_compared_frame_by_frame() -> None:
+    """What noise does to both cancels: a tenth more variance stands out of 100 frames."""
+    rng = np.random.default_rng(4)
+    noise = rng.chisquare(8, 100) / 8.0
+    more = 0.1 + 0.1 * rng.normal(size=100)
+    best = Missed(0.02, dict(enumerate(noise)))
+    rival = Missed(0.021, dict(enumerate(noise + more)))
+    told = deviations_apart(best, rival)
+    assert 7.0 < told < 13.0, told
+    apart = Missed(0.021, {k + 1000: v for k, v in rival.squares_px2.items()})
+    told = deviations_apart(best, apart)
+    assert 0.6 < told < 0.8, told
+    assert deviations_apart(best, Missed(float("inf"), {})) == float("inf")
+
+
+def test_a_start_that_ends_where_the_best_does_is_no_rival() -> None:
+    view = SimpleNamespace(camera=VIEW, believed=lambda camera: camera)
+    pair = SimpleNamespace(lag_s=1.0, decided_m=0.01, rivals=[(1.07, 0.011), (2.0, 0.012)])
+    ends = iter((1.02, 1.021, 2.0))
+
+    def misfit(known, new):
+        return Missed(0.1, dict.fromkeys(range(50), 0.01), next(ends))
+
+    lag, _, _, sure = _chosen(pair, view, view, misfit)
+    assert lag == 1.0
+    assert sure == 0.0  # the third fits as well and is another start
+
+
 @pytest.mark.parametrize(("miss_m", "tried"), [(0.029, 2), (0.031, 1)])
 def test_other_starts_that_are_tried_in_earnest(miss_m, tried) -> None:
     view = SimpleNamespace(camera=VIEW, believed=lambda camera: camera)
@@ -152,7 +193,7 @@ def test_other_starts_that_are_tried_in_earnest(miss_m, tried) -> None:
 
     def misfit(known, new):
         asked.append(new)
-        return 0.1 * len(asked), 50
+        return Missed(0.1 * len(asked), dict.fromkeys(range(50), 0.01 * len(asked)))
 
     _chosen(pair, view, view, misfit)
     assert len(asked) == tried
