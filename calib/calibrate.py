@@ -18,12 +18,10 @@ from freeswing.calib.camera.intrinsics import CameraStart
 from freeswing.calib.camera.lens_choice import lens_warnings, weigh_lenses
 from freeswing.calib.camera.lens_models import Array
 from freeswing.calib.remarks import (
-    clock_warnings,
-    group_warnings,
     marker_said,
     moved_warnings,
     no_base_warning,
-    spread_warnings,
+    rig_warnings,
 )
 from freeswing.calib.rig.coarse_clocks import board_moves, coarse_clocks
 from freeswing.calib.rig.rig_start import BaseTie, base_tie, board_groups
@@ -140,8 +138,7 @@ def calibrate_session(
     board = board if isinstance(board, Board) else board_from(board)
     told("finding the board", 0.0)
     found = find_recordings(recordings)
-    names = [recording.name for recording in found]
-    strings = () if plumb_line is None else read_plumb_line(plumb_line.path, names)
+    strings = _strings(plumb_line, [recording.name for recording in found])
     sightings = see_boards(
         found,
         board,
@@ -168,13 +165,9 @@ def calibrate_session(
     rig, truth = widened(rig, check_truth(rig, board.edges))
     verdict = judge(rig, truth, survey, alone_px)
     lenses = weigh_lenses(rig)
-    warnings += spread_warnings(truth.spread)
-    warnings += [*group_warnings(rig), *clock_warnings(rig), *lens_warnings(rig.cameras, lenses)]
+    warnings += [*rig_warnings(rig, truth.spread), *lens_warnings(rig.cameras, lenses)]
     verdict = replace(verdict, warnings=(*warnings, *verdict.warnings))
-    vertical: dict[str, Any] = {}
-    if plumb_line is not None and strings and verdict.usable:
-        gravity = np.asarray(plumb_line.gravity_m_s2, dtype=np.float64)
-        verdict, vertical = _with_vertical(verdict, rig, strings, gravity)
+    verdict, vertical = _with_vertical(verdict, rig, strings, plumb_line)
     document = {**_document(rig, board, sightings, verdict), **vertical}
     for entry, choice in zip(document["cameras"], lenses, strict=True):
         entry["lens_models_held_out_px"] = choice.held_out_px
@@ -200,10 +193,17 @@ def _tied(
     return rig, survey, moved_warnings(seen.moved)
 
 
+def _strings(plumb_line: PlumbLine | None, names: Sequence[str]) -> tuple[StringView, ...]:
+    return () if plumb_line is None else read_plumb_line(plumb_line.path, names)
+
+
 def _with_vertical(
-    verdict: Verdict, rig: Rig, strings: tuple[StringView, ...], gravity_m_s2: Array
+    verdict: Verdict, rig: Rig, strings: tuple[StringView, ...], plumb_line: PlumbLine | None
 ) -> tuple[Verdict, dict[str, Any]]:
-    """The verdict with what the strings say against the gravity, and `vertical` of the document."""
+    """The verdict with what strings say against the gravity, and `vertical` of the document."""
+    if plumb_line is None or not strings or not verdict.usable:
+        return verdict, {}
+    gravity_m_s2 = np.asarray(plumb_line.gravity_m_s2, dtype=np.float64)
     found = find_vertical(rig.cameras, strings, camera_covariance(rig))
     vertical = vertical_entry(found, strings, gravity_m_s2)
     if vertical["verdict"] != "agrees":

@@ -76,6 +76,11 @@ def no_base_warning(reference: str) -> str:
     )
 
 
+def rig_warnings(rig: Rig, spread: float) -> list[str]:
+    """What is to be said of the rig, and of how far its halves are apart."""
+    return [*spread_warnings(spread), *group_warnings(rig), *clock_warnings(rig)]
+
+
 def spread_warnings(spread: float) -> list[str]:
     """Says when the halves of the footage differ by more than corners' noise makes them."""
     if spread == 1.0:

@@ -1,4 +1,7 @@
-"""Normal equations of all views of a board: whitened, weighted rows, summed view by view."""
+"""Normal equations of all views of a board: whitened, weighted rows, summed view by view.
+
+What is compiled here holds `reprojection_kernels` in itself: change this file with that one.
+"""
 
 from __future__ import annotations
 
