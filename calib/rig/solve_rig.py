@@ -34,15 +34,15 @@ CORNER_SIGMAS = 6.0  # one in 1e8 by chance: none of a session's 1e5 corners
 CORNER_WITHIN = 1.0 - np.exp(-0.5 * CORNER_SIGMAS**2)
 _LEAST_CORNERS = 4
 LINE_TIME_SIGMAS = 5.0
-SAG_STD = 0.002
-"""Of the board's width. Aluminium and glass keep 0.0003, foam and card on wood 0.001 to 0.005."""
-GROWTH_STD = 0.02
-"""Of a marker's side: ink spreads by some hundredths, and public boards state theirs 4 % off."""
 LEAST_READOUT_S = 5e-4
 _MOST_SWEEPS = 3
 _SURVEY_ROUNDS = 3
 _SURVEY_PRIOR = 2.0
 LEAST_SURVEY_STD_M = 2e-5
+SAG_STD = 0.002
+"""Of the board's width. Aluminium and glass keep 0.0003, foam and card on wood 0.001 to 0.005."""
+GROWTH_STD = 0.02
+"""Of a marker's side: ink spreads by some hundredths, and public boards state theirs 4 % off."""
 
 
 @dataclass(frozen=True, slots=True)
