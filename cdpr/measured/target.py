@@ -18,9 +18,6 @@ SMALLEST_M = 1e-4
 LARGEST_TAG_M = 3.0  # a tag wider than a room's wall; 5 mm taken for metres is above it
 LARGEST_MARKER_M = 0.5
 QUATERNION_TOLERANCE = 1e-3
-SMALLEST_M = 1e-4
-LARGEST_TAG_M = 3.0  # no room has a wider one; 5 mm taken for metres is above it
-LARGEST_MARKER_M = 0.5
 UNIT_CORNERS = 0.5 * np.array([[-1.0, 1, 0, 0], [1, 1, 0, 0], [1, -1, 0, 0], [-1, -1, 0, 0]])
 
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from freeswing.cdpr.robot import Array, frozen_array
 
-LEAST_GAP = 2.0
-SMALLEST_RATIO = 1e-9
+LEAST_GAP = 2.0  # with less, noise decides which of two directions is the solution
+SMALLEST_RATIO = 1e-9  # of the largest: rounding alone leaves some 1e-15
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.cdpr.robot import INERTIA_NAMES, Array
-
-LEAST_RUNS = 3
+from freeswing.ident.likelihood.between_runs import LEAST_RUNS
 
 
 @dataclass(frozen=True, slots=True)

@@ -58,7 +58,20 @@ LIKELIHOOD = "tests/ident/likelihood/test_likelihood_limits.py"
 FILES = "tests/cdpr/files/test_file_limits.py"
 SERVO = "tests/servo/test_servo_limits.py"
 
+FIDIM = "tests/ident/fidim/test_fidim_limits.py"
+MARKERS = "tests/freeswing/doctor/test_marker_limits.py"
+
 HELD = (
+    Held("ident/fidim/fidim.py", ("WELL_IDENTIFIED_PERCENT", "NEAR_ZERO", "GOOD_COST"), FIDIM),
+    Held("ident/fidim/total_least_squares.py", ("LEAST_GAP", "SMALLEST_RATIO"), FIDIM),
+    Held("ident/judge/consistency.py", ("_SIGNIFICANT",), FIDIM),
+    Held(
+        "freeswing/doctor/markers.py",
+        ("TARGET_OFF_M", "LARGE_JUMP_M", "LESS_TRUST", "LAYOUT_CHANGE_M"),
+        MARKERS,
+    ),
+    Held("freeswing/session/repeated_runs.py", ("STRETCH", "SHARED"), MARKERS),
+    Held("freeswing/results/comparison.py", ("NOTABLE_Z",), MARKERS),
     Held(
         "ident/drive/checks.py",
         (

@@ -1,0 +1,62 @@
+"""What FIDIM and its judges decide, on both sides of every limit, on made numbers."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from freeswing.ident.fidim import fidim as module
+from freeswing.ident.fidim.fidim import near_zero
+from freeswing.ident.fidim.total_least_squares import TotalLeastSquares
+from freeswing.ident.judge.comparison import between_runs
+from freeswing.ident.judge.consistency import Consistency
+
+
+def solved(**changes):
+    """What the verdicts look at of a solution."""
+    return SimpleNamespace(**({"cost_C": 5.0, "std_percent": np.zeros(9)} | changes))
+
+
+@pytest.mark.parametrize(("cost", "said"), [(99.0, 0), (101.0, 1)])
+def test_excitation_is_poor_above_a_hundred(cost, said):
+    assert len(module._verdicts(solved(cost_C=cost), np.ones(9, dtype=bool))) == said
+
+
+@pytest.mark.parametrize(("percent", "said"), [(9.5, 0), (10.5, 1)])
+def test_a_parameter_is_well_identified_to_a_tenth(percent, said):
+    found = solved(std_percent=np.full(9, percent))
+    assert len(module._verdicts(found, np.ones(9, dtype=bool))) == said
+
+
+@pytest.mark.parametrize(("share", "small"), [(0.095, True), (0.105, False)])
+def test_a_value_is_near_zero_below_a_tenth_of_the_largest(share, small):
+    values = np.array([1.0, share, 1.0, 2.0, 2.0, 2.0, 2.0 * share, 2.0, 2.0])
+    assert near_zero(values).tolist() == [False, small, *[False] * 4, small, False, False]
+
+
+@pytest.mark.parametrize(
+    ("least", "second", "lost"), [(0.51, 1.0, True), (0.49, 1.0, False), (0.0, 0.9e-9, True)]
+)
+def test_rank_is_lost_where_the_least_values_are_alike(least, second, lost):
+    """By less than a factor of two, or where the last but one is nothing beside the first."""
+    values = np.r_[np.ones(8), second, least]
+    seen = SimpleNamespace(singular_values=values, gap=second / max(least, 1e-300))
+    assert TotalLeastSquares.loses_rank.fget(seen) == lost
+
+
+def test_a_small_but_clear_direction_is_no_lost_rank():
+    seen = SimpleNamespace(singular_values=np.r_[np.ones(8), 1.1e-9, 0.0], gap=np.inf)
+    assert not TotalLeastSquares.loses_rank.fget(seen)
+
+
+@pytest.mark.parametrize(("deviations", "refuted"), [(2.9, False), (3.1, True)])
+def test_a_body_is_ruled_out_beyond_three_deviations(deviations, refuted):
+    """Free, by the least moment; held, by what the holding costs."""
+    assert Consistency(-deviations, 1.0).is_refuted == refuted
+    assert Consistency(1.0, 1.0, cost=deviations**2).is_refuted == refuted
+
+
+def test_two_runs_tell_no_spread_and_three_do():
+    without = np.tile(np.arange(3.0)[:, None], (1, 9))
+    assert between_runs(without[:2]).tolist() == [0.0] * 9
+    assert (between_runs(without) > 0.5).all()
