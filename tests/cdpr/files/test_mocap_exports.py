@@ -99,9 +99,8 @@ def test_gaps_are_gaps_however_they_are_written(tmp_path: Path, fill: str) -> No
     assert bool(said) == fill.startswith(("0", "9"))
 
 
-def test_a_rigid_body_of_motive_is_a_pose_with_the_quaternion_as_motive_writes_it(
-    tmp_path: Path,
-) -> None:
+def body():
+    """A rigid body of Motive, two frames."""
     half = np.sqrt(0.5)
     head = motive().split("\n")[0]
     kinds = ["Rotation"] * 4 + ["Position"] * 3
@@ -113,8 +112,14 @@ def test_a_rigid_body_of_motive_is_a_pose_with_the_quaternion_as_motive_writes_i
         ["0", "0.0", "0", "0", "0", "1", "1.0", "2.0", "3.0"],
         ["1", "0.01", "0", "0", str(half), str(half), "1.1", "2.0", "3.0"],
     ]
+    return "\n".join([head, "", *(",".join(line) for line in lines)])
+
+
+def test_a_rigid_body_of_motive_is_a_pose_with_the_quaternion_as_motive_writes_it(
+    tmp_path: Path,
+) -> None:
     path = tmp_path / "body.csv"
-    path.write_text("\n".join([head, "", *(",".join(line) for line in lines)]), encoding="utf-8")
+    path.write_text(body(), encoding="utf-8")
     assert not holds_markers(path)
     found = read_trajectory(path)
     wanted = [[1.0, 2.0, 3.0, 0, 0, 0], [1.1, 2.0, 3.0, 0, 0, np.pi / 2]]

@@ -20,9 +20,10 @@ from freeswing.calib.exchange import colmap_binary
 from freeswing.calib.footage.condition import condition_of
 from freeswing.calib.footage.frame_times import frame_times
 from freeswing.calib.verdict.plumb_line_file import read_plumb_line
-from freeswing.cdpr.files.drive_csv import read_drive_run, run_columns
+from freeswing.cdpr.files.drive_csv import read_drive_run, read_static, run_columns, static_columns
 from freeswing.cdpr.files.robot_file import read_robot
 from freeswing.cdpr.files.signal_csv import read_signals
+from freeswing.cdpr.files.trajectory_csv import csv_pieces
 from freeswing.cdpr.files.trajectory_files import (
     read_recording,
     read_trajectory,
@@ -30,6 +31,7 @@ from freeswing.cdpr.files.trajectory_files import (
     write_tum,
 )
 from freeswing.cdpr.measured.target import Target, read_target
+from freeswing.cdpr.measured.trajectory import Trajectory
 from freeswing.cdpr.mesh.nominal_inertia import platform_from_mesh
 from freeswing.results.comparison import read_side
 from freeswing.servo.files.controller_file import read_controller
@@ -43,6 +45,7 @@ from freeswing.vision.look.pieces import Piece, is_whole, load_piece, restore, s
 from freeswing.vision.look.video import write_video
 from freeswing.vision.look.watched_target import Watch
 from tests.calib.films import BOARD
+from tests.cdpr.files.test_mocap_exports import EXPORTS, body
 from tests.freeswing.hostile.text_files import Case, cameras
 from tests.freeswing.report.report_material import whole_material
 from tests.ident.drive.made_sessions import TOML
@@ -170,7 +173,25 @@ def _motions(folder: Path) -> dict[str, Case]:
         ),
         "tum": Case("a.tum", (folder / "few.tum").read_bytes(), read_trajectory),
         "signals": Case("a.csv", head, read_signals),
+        "free coordinates": Case(
+            "a.csv", free_csv(motion), lambda path: read_trajectory(path, robot)
+        ),
+        **_exports(),
     }
+
+
+def free_csv(motion: Trajectory) -> bytes:
+    """The same motion, x and y alone."""
+    return b"".join(csv_pieces(motion.select(("x", "y"))))
+
+
+def _exports() -> dict[str, Case]:
+    """What motion-capture programs write as text; markers, and a rigid body as a pose."""
+    found = {
+        f"export {name}": Case(name, text.encode(), read_recording)
+        for name, text in EXPORTS.items()
+    }
+    return {**found, "export body": Case("body.csv", body().encode(), read_trajectory)}
 
 
 def _driven() -> dict[str, Case]:
@@ -180,6 +201,9 @@ def _driven() -> dict[str, Case]:
         values = {"t_s": 0.001 * k, "qw": 1.0}
         rows.append(",".join(f"{values.get(name, 0.1 * (name[0] != 'q')):.6g}" for name in columns))
     run = "\n".join([*rows, ""]).encode()
+    pose = ["0"] * 3 + ["1"] + ["0"] * 3
+    still = [",".join(["0.5"] * 16 + pose)] * 12
+    static = "\n".join([",".join(static_columns(8)), *still, ""]).encode()
     robot = SAMPLES / "inca-6d" / "robot.toml"
     toml = TOML.partition("[static]")[0] + '[[runs]]\nname = "a"\nrole = "identify"\nfile = '
     toml += '"a.csv"\n[[runs]]\nname = "b"\nrole = "validate"\nfile = "a.csv"\n'
@@ -198,6 +222,7 @@ def _driven() -> dict[str, Case]:
     }
     return {
         "drive run": Case("a.csv", run, lambda path: read_drive_run(path, 8)),
+        "drive static": Case("a.csv", static, lambda path: read_static(path, 8)),
         "drive.toml": Case("drive.toml", toml.encode(), session, (robot,)),
         "driven robot": Case("robot.toml", robot.read_bytes(), read_robot),
         "task": Case("task.toml", (SAMPLES / "inca-6d/task.toml").read_bytes(), read_task),
