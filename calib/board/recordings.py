@@ -177,19 +177,24 @@ def stamp_file(recording: Recording) -> Path:
 def stamp_rows(path: Path) -> Iterator[tuple[int, int, float]]:
     """Line, frame number and stamp in seconds of each row of a `frame,t_s` file.
 
+    Columns are found by their names; others are left alone.
+
     Raises:
         InputError: when the file does not hold such rows.
     """
     lines = comma_separated(read_text(path, _MOST_STAMP_BYTES)).splitlines()
-    if not lines or [part.strip() for part in lines[0].split(",")][:2] != ["frame", "t_s"]:
-        raise InputError(f"{path}: the first line must be frame,t_s")
+    names = [part.strip() for part in lines[0].split(",")] if lines else []
+    if any(names.count(name) != 1 for name in ("frame", "t_s")):
+        raise InputError(f"{path}: the first line must name the columns frame and t_s, once each")
+    places = names.index("frame"), names.index("t_s")
     for row, line in enumerate(lines[1:], start=2):
         if not line.strip():
             continue
         try:
-            frame, stamp = line.split(",")[:2]
+            cells = line.split(",")
+            frame, stamp = (cells[place] for place in places)
             number, time = int(frame), float(stamp)
-        except ValueError as error:
+        except (ValueError, IndexError) as error:
             raise InputError(f"{path}: line {row}: {line[:60]!r} is not frame,t_s") from error
         if not np.isfinite(time):
             raise InputError(f"{path}: line {row}: the stamp {stamp!r} is not a number of seconds")
