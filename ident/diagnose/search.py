@@ -47,6 +47,7 @@ from freeswing.ident.likelihood.fit_swings import LikelihoodFit
 
 Progress = Callable[[str, float], None]
 
+# A day in the laboratory had five effects at once: four rounds never looked for the fifth.
 MOST_ROUNDS = 8
 
 

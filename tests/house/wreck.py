@@ -157,6 +157,7 @@ HELD = (
         ("LENGTH_DIFFERENCE_M", "LEFT_OVER"),
         "tests/freeswing/session/test_exchanged_lengths.py",
     ),
+    Held("ident/diagnose/search.py", ("MOST_ROUNDS",), "tests/ident/diagnose/test_search.py"),
     Held("ident/judge/lawful_runs.py", ("AS_BAD",), "tests/ident/judge/test_lawful_runs.py"),
     Held(
         "ident/judge/far_samples.py", ("FAR", "MOST_FAR"), "tests/ident/judge/test_far_samples.py"
