@@ -109,6 +109,7 @@ def test_from_images_to_the_base_frame(tmp_path):
         tmp_path / "calibration",
         table,
         tags,
+        kept_boards=tmp_path / "kept",
         progress=lambda label, share: told.append((label, share)),
     )
     assert told[-1][1] == 1.0
@@ -126,7 +127,8 @@ def test_from_images_to_the_base_frame(tmp_path):
     np.testing.assert_allclose(std[:3], result.document["cameras"][1]["position_std_m"])
     assert result.document["verdict"]["usable"]
     mirrored = [Tag(t.family, t.id, t.corners_base_m * [1, -1, 1]) for t in tags]
-    refused = calibrate_session(tmp_path / "calibration", table, mirrored)
+    kept = tmp_path / "kept"  # the same images: their boards are not looked for again
+    refused = calibrate_session(tmp_path / "calibration", table, mirrored, kept_boards=kept)
     assert "mirror image" in (refused.refused or ""), refused.refused
 
 
