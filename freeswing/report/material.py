@@ -9,6 +9,7 @@ from pathlib import Path
 from freeswing.cdpr.files.documents import InputError
 from freeswing.cdpr.robot import Robot
 from freeswing.report.control_results import ControlResults, read_control
+from freeswing.report.drive_results import DriveResults, read_drive_results
 from freeswing.results.calibration import Calibration
 from freeswing.results.check import Check
 from freeswing.results.codec import Document
@@ -51,6 +52,7 @@ class Material:
         warnings: what to know of the results as a whole.
         refresh_s: how often the page reads itself anew, while a session is watched.
         control: what `design` and `servo` wrote.
+        drive: what `drive` wrote.
     """
 
     title: str
@@ -67,6 +69,7 @@ class Material:
     warnings: tuple[str, ...] = ()
     refresh_s: float | None = None
     control: ControlResults | None = None
+    drive: DriveResults | None = None
 
     @property
     def estimates(self) -> dict[str, Estimate]:
@@ -130,5 +133,10 @@ def read_material(
         control = read_control(results)
     except InputError as failure:
         control, why["control"] = None, str(failure)
+    try:
+        drive = read_drive_results(results)
+    except InputError as failure:
+        drive, why["drive"] = None, str(failure)
     shown = {"robot": robot, "folder": folder, "absent": why, "warnings": warnings}
-    return Material(title, **found, **shown, control=control)  # pyright: ignore[reportArgumentType]
+    shown |= {"control": control, "drive": drive}
+    return Material(title, **found, **shown)  # pyright: ignore[reportArgumentType]

@@ -18,6 +18,8 @@ from freeswing.report.panels.cameras import Cameras
 from freeswing.report.panels.change import Change
 from freeswing.report.panels.control import ControlPanel
 from freeswing.report.panels.decay import SwingDecay
+from freeswing.report.panels.driven import DrivenEstimates
+from freeswing.report.panels.driven_motion import DrivenMotion
 from freeswing.report.panels.dropped import Dropped
 from freeswing.report.panels.geometry import Geometry
 from freeswing.report.panels.ladder import EffectLadder
@@ -69,7 +71,7 @@ PANELS: tuple[Panel, ...] = (
     Provenance(),
 )
 # A driven robot without a session of free swings.
-DRIVEN: tuple[Panel, ...] = (ControlPanel(),)
+DRIVEN: tuple[Panel, ...] = (DrivenEstimates(), EffectLadder(), DrivenMotion(), ControlPanel())
 
 
 def render_page(material: Material, panels: tuple[Panel, ...] = PANELS) -> str:

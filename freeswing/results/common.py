@@ -37,6 +37,23 @@ class SeenDirection(Entry):
 
 
 @entry
+class Evidence(Entry):
+    """A piece of a held-out run that an effect explains.
+
+    Attributes:
+        run: its name.
+        from_s: where the piece begins.
+        to_s: where it ends.
+        share: of everything that the effect explains.
+    """
+
+    run: str = ""
+    from_s: float | None = None
+    to_s: float | None = None
+    share: float | None = None
+
+
+@entry
 class FoundEffect(Entry):
     """An effect that the data show.
 
@@ -49,6 +66,7 @@ class FoundEffect(Entry):
         parameters: its numbers.
         confounded_with: what the data cannot tell it from.
         directions: along which data see a displaced point, best first.
+        evidence: of a driven robot's: where it is seen, most telling first.
         before: agreement without it, for effects of cameras.
         after: agreement with it.
     """
@@ -61,6 +79,7 @@ class FoundEffect(Entry):
     parameters: tuple[Parameter, ...] = ()
     confounded_with: tuple[str, ...] | None = absent(default=None)
     directions: tuple[SeenDirection, ...] = absent(default=())
+    evidence: tuple[Evidence, ...] = absent(default=())
     before: Agreement | None = absent(default=None)
     after: Agreement | None = absent(default=None)
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import welch
 
 from freeswing.cdpr.effects import driven_catalogue
 from freeswing.cdpr.files.documents import InputError
@@ -18,9 +19,15 @@ from freeswing.ident.drive.diagnose.refit import Fitted
 from freeswing.ident.drive.identify import DriveIdentification, DriveSession, RunFit
 from freeswing.ident.drive.joint import Estimate
 from freeswing.ident.drive.kinematics import Kinematics
+from freeswing.ident.drive.ramps import Ramp
+from freeswing.ident.drive.run_problem import DriveRun
 
 Array = NDArray[np.float64]
 
+SHOWN_ROWS = 250  # of a run, beside each other: what a page shows
+SHOWN_RATES = 60  # of a spectrum
+SPECTRUM_S = 1.0  # of a piece, so that the lowest rate is 1 Hz
+DIGITS = 6  # of what is only shown
 EVIDENCE_S = 0.5  # of a run: what an effect explains is told in pieces of this length
 MOST_EVIDENCE = 5
 
@@ -56,12 +63,83 @@ def drive_document(name: str, session: DriveSession, found: DriveIdentification)
         "estimates": estimates,
         "fit_percent": [_fit(fit) for fit in found.fits],
         "initial_fit_percent": [_fit(fit) for fit in found.initial if fit is not None],
-        "slack": [_slack(session, fit) for fit in found.fits if fit.slack.any()],
+        "used": [_used(session, run) for run in found.used],
+        "ramps": [_ramp(session, ramp) for ramp in found.ramps],
+        "slack": [_slack(session, fit) for fit in found.fits if _is_slack(fit)],
         "saturated": [_saturated(session, fit) for fit in found.fits if fit.saturated.any()],
         "residual": {
             "autocorrelation_10_ms": found.joint.autocorrelation,
             "times_noise": {fit.run.name: times_noise(session, fit) for fit in found.fits},
         },
+    }
+
+
+def drive_motion_document(
+    name: str, session: DriveSession, found: DriveIdentification
+) -> dict[str, Any]:
+    """What the page shows of every run: angles, residuals and their spectrum, tensions."""
+    return {
+        "format": "freeswing-drive-motion/1",
+        "session": name,
+        "cables": [cable.name for cable in session.model.robot.cables],
+        "tension_limits_N": session.model.drive.tension_limits_N,
+        "angle_noise_rad": session.noise.angle_std_rad,
+        "runs": [_shown(fit) for fit in found.fits],
+    }
+
+
+def _shown(fit: RunFit) -> dict[str, Any]:
+    rows = np.linspace(0, len(fit.gaps_rad) - 1, min(SHOWN_ROWS, len(fit.gaps_rad))).astype(int)
+    rates, power = _spectrum(fit)
+    pushing = np.mean(fit.motion.tensions_N < 0.0, axis=0)
+    return {
+        "run": fit.run.name,
+        "role": fit.run.role,
+        "times_s": fit.motion.times_s[rows],
+        "angles_rad": _short(fit.run.record.angles_rad[rows]),
+        "residuals_rad": _short(fit.gaps_rad[rows]),
+        "tensions_N": _short(fit.motion.tensions_N[rows]),
+        "slack_share": pushing,
+        "spectrum_hz": _short(rates),
+        "spectrum_rad2_hz": _short(power),
+    }
+
+
+def _short(values: Array) -> Array:
+    """The numbers to `DIGITS` digits of the largest: a page shows no more."""
+    size = float(np.abs(values).max(initial=0.0))
+    return np.round(values, DIGITS - 1 - int(np.floor(np.log10(size)))) if size > 0.0 else values
+
+
+def _spectrum(fit: RunFit) -> tuple[Array, Array]:
+    """Power of the angles' residuals, motors together: rates (k,) and rad2/Hz (k,)."""
+    gaps, rate = fit.gaps_rad, fit.run.rate_hz
+    piece = min(len(gaps), round(SPECTRUM_S * rate))
+    rates, power = welch(gaps, rate, nperseg=piece, axis=0)
+    rates, power = rates[1:], power[1:].mean(axis=1)
+    places = np.unique(np.geomspace(1, len(rates), SHOWN_RATES).astype(int)) - 1
+    sums = np.add.reduceat(power, places) / np.diff(np.append(places, len(rates)))
+    return rates[places], sums
+
+
+def _used(session: DriveSession, run: DriveRun) -> dict[str, Any]:
+    """Of a run that was fitted, how much: after its first slack cable rigid ones say nothing."""
+    whole = next(one for one in session.runs if one.name == run.name)
+    seconds = (len(run.record.times_s) - 1) / run.rate_hz
+    return {"run": run.name, "seconds": seconds, "whole": run is whole}
+
+
+def _ramp(session: DriveSession, ramp: Ramp) -> dict[str, Any]:
+    return {
+        "run": ramp.run,
+        "motor": session.model.robot.cables[ramp.motor].name,
+        "slope_A_s": ramp.slope_A_s,
+        "moved_s": ramp.moved_s,
+        "ramp_N_m": ramp.read_N_m,
+        "estimate_N_m": ramp.estimate_N_m,
+        "estimate_on_this_ramp_N_m": ramp.of_estimate_N_m,
+        "slope_costs_N_m": ramp.slope_costs_N_m,
+        "breakaway_s": ramp.breakaway_s,
     }
 
 
@@ -151,9 +229,16 @@ def _slack(session: DriveSession, fit: RunFit) -> dict[str, Any]:
         "run": fit.run.name,
         "samples": int(fit.motion.slack.any(axis=1).sum()),
         "cables": [cables[k].name for k in np.flatnonzero(fit.slack)],
+        "from_s": float(fit.motion.times_s[min(fit.until, len(fit.motion.times_s) - 1)]),
         "least_tension_N": float(fit.motion.tensions_N.min()),
         "in_model": fit.motion.lengths_out_m is not None,
     }
+
+
+def _is_slack(fit: RunFit) -> bool:
+    """Whether a rigid cable would have had to push for more than a moment, or an elastic hangs."""
+    elastic = fit.motion.lengths_out_m is not None
+    return bool(fit.slack.any()) and (elastic or fit.until < len(fit.gaps_rad))
 
 
 def _saturated(session: DriveSession, fit: RunFit) -> dict[str, Any]:

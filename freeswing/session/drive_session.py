@@ -169,9 +169,11 @@ def _model(
     if robot.drive is None:
         raise InputError(f"{robot_path}: has no [drive]: this session is of a driven robot")
     model = build_driven(robot, tuple(POINTS[name] for name in kinematic if name in POINTS))
-    groups = [group for name in kinematic for group in _groups(path, model, "kinematic", name)]
+    groups = [
+        group for name in kinematic for group in unknown_groups(path, model, "kinematic", name)
+    ]
     n_kinematic = len(groups)
-    groups += [group for name in dynamic for group in _groups(path, model, "dynamic", name)]
+    groups += [group for name in dynamic for group in unknown_groups(path, model, "dynamic", name)]
     members = [name for group in groups for name in group.members]
     twice = sorted({name for name in members if members.count(name) > 1})
     if twice:
@@ -181,8 +183,18 @@ def _model(
     return model, Asked(tuple(groups), n_kinematic)
 
 
-def _groups(path: Path, model: DrivenModel, key: str, text: str) -> list[Group]:
-    """The unknowns of one entry: a name, names tied by =, or all points."""
+def unknown_groups(path: Path, model: DrivenModel, key: str, text: str) -> list[Group]:
+    """The unknowns of one entry: a name, names tied by =, or all points.
+
+    Args:
+        path: of the file that has the entry.
+        model: the robot.
+        key: kinematic or dynamic.
+        text: the entry.
+
+    Raises:
+        InputError: for a name that there is not, or that belongs to the other list.
+    """
     if key == "kinematic" and text in POINTS:
         prefix = f"{POINTS[text]}."
         return [Group(name, (name,)) for name in model.names if name.startswith(prefix)]

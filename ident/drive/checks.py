@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from freeswing.cdpr.driven.slopes import length_slope
+from freeswing.cdpr.driven.slopes import length_slope, pose_map
 from freeswing.cdpr.model.batch import evaluate
 from freeswing.ident.drive.identify import DriveSession
 from freeswing.ident.drive.inverse_dynamics import flowing
@@ -25,6 +25,7 @@ DEGREES = (30.0, 110.0)  # slope of angles against those of the poses; 57.3 with
 COUNTS = 150.0  # 4096 counts a turn are 652 a radian; 1024 are 163
 ALIKE = 0.9  # correlation of a motor's angle with its own cable's: 0.99 with geometry 30 % off
 STRANGER = 0.97  # with another's cable, where columns are swapped
+CLEAR = 5.0  # times what the poses' noise makes: correlation of a right cable is above 0.98 then
 LATENCY_S = 0.003  # 1 mm and 5 mrad of noise over one second tell it to 0.3 ms
 START_S = 0.004  # long enough for counts to tell a motion, short enough for currents to cause none
 START_COUNTS = 3.0  # an encoder at rest between two counts shows one, noise of its edge another
@@ -86,8 +87,24 @@ def _currents(session: DriveSession, run: DriveRun) -> list[str]:
     return found
 
 
-def _told(session: DriveSession, run: DriveRun) -> tuple[Array, Array, Array]:
-    """Angles read and angles of the poses at the poses' times, and rates of the read ones."""
+@dataclass(frozen=True, slots=True)
+class _Told:
+    """What encoders and poses tell of the angles at the poses' times.
+
+    Attributes:
+        read: by the encoders, (n_p, n).
+        told: by the poses and the declared geometry, up to a constant, (n_p, n).
+        speed: rates of the read ones, (n_p, n).
+        noise: what the poses' own noise makes of the told ones, (n,).
+    """
+
+    read: Array
+    told: Array
+    speed: Array
+    noise: Array
+
+
+def _told(session: DriveSession, run: DriveRun) -> _Told:
     record, rows = run.record, run.record.seen
     when = record.times_s[rows] - session.noise.latency_s
     inside = when >= record.times_s[0]
@@ -98,23 +115,28 @@ def _told(session: DriveSession, run: DriveRun) -> tuple[Array, Array, Array]:
     kernel = np.ones(wide) / wide
     rates = np.array([np.convolve(column, kernel, "same") for column in rates.T]).T
     speed = np.array([np.interp(when, record.times_s, column) for column in rates.T]).T
-    model = session.model
-    turns = evaluate(length_slope(model), record.poses[rows], model.declared)[0]
-    return read, -turns, speed
+    model, poses = session.model, record.poses[rows]
+    turns, slope = evaluate(length_slope(model), poses, model.declared)[:2]
+    by_pose = slope[0] @ pose_map(poses[0])
+    noise = np.sqrt((by_pose * session.noise.pose_std) ** 2 @ np.ones(6))
+    return _Told(read, -turns, speed, noise)
 
 
 def _angles(session: DriveSession, run: DriveRun) -> list[str]:
     """Units, signs and columns of the angles, by what the poses say of every cable."""
     if len(run.record.seen) < 10:
         return []
-    read, told, _ = _told(session, run)
-    read, told = read - read.mean(axis=0), told - told.mean(axis=0)
-    if told.std(axis=0).min() < LEAST_MOTION * session.noise.angle_std_rad:
+    seen = _told(session, run)
+    read, told = seen.read - seen.read.mean(axis=0), seen.told - seen.told.mean(axis=0)
+    least = np.maximum(LEAST_MOTION * session.noise.angle_std_rad, CLEAR * seen.noise)
+    moving = told.std(axis=0) >= least
+    if not moving.any():
         return []
-    alike = (read.T @ told) / np.outer(np.linalg.norm(read, axis=0), np.linalg.norm(told, axis=0))
+    norms = np.outer(np.linalg.norm(read, axis=0), np.linalg.norm(told, axis=0))
+    alike = (read.T @ told) / np.maximum(norms, 1e-300)
     slopes = np.sum(read * told, axis=0) / np.sum(told**2, axis=0)
     names, found = [cable.name for cable in session.model.robot.cables], []
-    size = float(np.median(np.abs(slopes)))
+    size = float(np.median(np.abs(slopes[moving])))
     if size > COUNTS:
         return [
             f"run {run.name}: angles are {size:.0f} times those of the poses: counts? write rad"
@@ -123,7 +145,8 @@ def _angles(session: DriveSession, run: DriveRun) -> list[str]:
         return [
             f"run {run.name}: angles are {size:.1f} times those of the poses: degrees? write rad"
         ]
-    for k, name in enumerate(names):
+    for k in np.flatnonzero(moving):
+        name = names[k]
         if alike[k, k] < -ALIKE:
             found.append(
                 f"run {run.name}: the angle of motor {name} falls where its cable is wound: angles "
@@ -184,11 +207,15 @@ def _latency(session: DriveSession, run: DriveRun) -> list[str]:
     """Poses earlier or later than the session says, by the angles' own motion."""
     if len(run.record.seen) < 50:
         return []
-    read, told, speed = _told(session, run)
+    seen = _told(session, run)
+    scatter = seen.noise / np.maximum(seen.speed.std(axis=0), 1e-300) / np.sqrt(len(seen.told))
+    moving = np.flatnonzero(CLEAR * scatter < LATENCY_S)
+    if len(moving) == 0:
+        return []
     delays = []
-    for k in range(read.shape[1]):
-        columns = np.column_stack([told[:, k], np.ones(len(told)), speed[:, k]])
-        delays.append(np.linalg.lstsq(columns, read[:, k], rcond=None)[0][2])
+    for k in moving:
+        columns = np.column_stack([seen.told[:, k], np.ones(len(seen.told)), seen.speed[:, k]])
+        delays.append(np.linalg.lstsq(columns, seen.read[:, k], rcond=None)[0][2])
     delay = float(np.median(delays))
     if abs(delay) < LATENCY_S:
         return []

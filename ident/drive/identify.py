@@ -22,14 +22,17 @@ from freeswing.ident.drive.kinematics import (
     most_likely,
     zero_turns,
 )
+from freeswing.ident.drive.ramps import Ramp, ramps
 from freeswing.ident.drive.run_problem import (
     DriveRun,
     Noise,
     compared,
+    given_A,
     head_of,
     simulated,
     start_pose,
 )
+from freeswing.ident.drive.slack import before_slack, first_slack
 from freeswing.ident.drive.unknowns import Asked
 
 Array = NDArray[np.float64]
@@ -72,9 +75,10 @@ class RunFit:
 
     Attributes:
         run: which.
-        equation_22: by motor, per cent (22).
-        matlab: by motor, 1 - |e| / |y - mean| in per cent.
-        rms_rad: of all angles.
+        equation_22: by motor, per cent (22), of the whole run.
+        matlab: by motor, 1 - |e| / |y - mean| in per cent, likewise.
+        rms_rad: of all angles up to where a cable would first have had to push.
+        until: samples up to there; all of them where none would.
         slack: samples at which each cable would have had to push, (n,).
         saturated: samples at which each motor was asked for more than its limits, (n,).
         motion: the prediction.
@@ -86,6 +90,7 @@ class RunFit:
     equation_22: Array
     matlab: Array
     rms_rad: float
+    until: int
     slack: NDArray[np.intp]
     saturated: NDArray[np.intp]
     motion: DrivenMotion
@@ -106,8 +111,10 @@ class DriveIdentification:
         second_start: largest difference of its end from another start, in deviations; of the
             joint estimate's where there is no output error.
         joint: the joint estimate.
+        used: the runs that the joint estimate was fitted to, each up to its first slack cable.
         fits: every run by the joint estimate.
         initial: every run by the declared numbers.
+        ramps: what each slow ramp says of its motor's friction beside the joint estimate.
     """
 
     published: Kinematics | None
@@ -116,8 +123,10 @@ class DriveIdentification:
     output_error: Estimate | None
     second_start: float
     joint: Estimate
+    used: tuple[DriveRun, ...]
     fits: tuple[RunFit, ...]
     initial: tuple[RunFit | None, ...]
+    ramps: tuple[Ramp, ...]
 
 
 def identify_drive(session: DriveSession, progress: Progress) -> DriveIdentification:
@@ -133,33 +142,96 @@ def identify_drive(session: DriveSession, progress: Progress) -> DriveIdentifica
     progress("inverse dynamics", 0.05)
     regression = inverse_dynamics(model, theta, asked.dynamic, list(runs), offsets)
     start = asked.dynamic.put(model, theta, possible(session, regression))
-    given = Premise(model, start, runs, session.noise, session.zero_pose, offsets)
+    given = Premise(
+        model,
+        start,
+        before_slack(model, start, runs, offsets, at_least=True),
+        session.noise,
+        session.zero_pose,
+        offsets,
+    )
     progress("output error", 0.1)
     second = estimate(given, asked.dynamic)
     progress("a second start", 0.35)
-    apart = _second_start(given, asked, second)
+    elsewhere = _second_start(given, asked, second)
     if kinematics is not None:
         kept = np.where(np.isfinite(kinematics.covariance), kinematics.covariance, 0.0)
         more = carried_over(given, asked, second, kept)
         second = replace(second, covariance=second.covariance + more)
     progress("joint estimate", 0.55)
-    free = session.zero_pose is None
-    whole = Premise(
-        model, second.theta, runs, session.noise, session.zero_pose, offsets, session.static, free
-    )
-    joint = estimate(whole, asked)
+    whole = premise_of(session, second.theta, offsets)
+    joint, used = clear_of_slack(session, whole, estimate(whole, asked), estimate)
     progress("predictions", 0.9)
-    zero = offsets_of(session, model.declared, offsets)
     return DriveIdentification(
         published,
         kinematics,
         regression,
         second,
-        apart,
+        elsewhere,
         joint,
-        tuple(predict(session, run, joint.theta, joint.offsets) for run in session.runs),
-        tuple(predicted_as_declared(session, run, zero) for run in session.runs),
+        used,
+        predictions(session, joint),
+        as_declared(session, offsets),
+        ramps_of(session, joint),
     )
+
+
+def premise_of(session: DriveSession, theta: Array, offsets: Array) -> Premise:
+    """What a joint estimate from these numbers takes as given: static poses too, and the runs.
+
+    Those end where a cable would first have to push by the numbers, but for their first half
+    second.
+
+    Raises:
+        ValueError: when a run cannot be simulated.
+    """
+    model, free = session.model, session.zero_pose is None
+    runs = before_slack(model, theta, session.of("identify"), offsets, at_least=True)
+    return Premise(
+        model, theta, runs, session.noise, session.zero_pose, offsets, session.static, free
+    )
+
+
+def clear_of_slack(
+    session: DriveSession,
+    given: Premise,
+    found: Estimate,
+    search: Callable[[Premise, Asked], Estimate],
+) -> tuple[Estimate, tuple[DriveRun, ...]]:
+    """The estimate, and the runs that it was fitted to: again where those held slack samples.
+
+    Raises:
+        ValueError: when a cable is slack almost from the start of a run on.
+    """
+    whole = session.of("identify")
+    runs = before_slack(session.model, found.theta, whole, found.offsets)
+    pairs = zip(runs, given.runs, strict=True)
+    if all(len(now.record.times_s) >= len(then.record.times_s) for now, then in pairs):
+        return found, given.runs
+    given = replace(given, theta=found.theta, offsets=found.offsets, runs=runs)
+    return search(given, found.asked), runs
+
+
+def predictions(session: DriveSession, found: Estimate) -> tuple[RunFit, ...]:
+    """Every run by an estimate."""
+    return tuple(predict(session, run, found.theta, found.offsets) for run in session.runs)
+
+
+def ramps_of(session: DriveSession, found: Estimate) -> tuple[Ramp, ...]:
+    """The ramps among the recordings beside an estimate."""
+    return ramps(session.model, found.theta, found.offsets, session.noise, session.runs)
+
+
+def as_declared(session: DriveSession, offsets: Array) -> tuple[RunFit | None, ...]:
+    """Every run by the declared numbers; None where they cannot follow it at all."""
+    zero = offsets_of(session, session.model.declared, offsets)
+    return tuple(_declared_fit(session, run, zero) for run in session.runs)
+
+
+def apart(first: Estimate, other: Estimate) -> float:
+    """Largest difference of two ends of a search, in the first one's deviations."""
+    gaps = np.abs(other.values - first.values)[first.determined]
+    return float((gaps / first.std[first.determined]).max(initial=0.0))
 
 
 def step_1(session: DriveSession) -> tuple[Kinematics | None, Kinematics | None]:
@@ -207,9 +279,7 @@ def _second_start(given: Premise, asked: Asked, first: Estimate) -> float:
     """Largest difference of the minimum that is reached from numbers 5 % off."""
     signs = np.where(np.arange(len(first.values)) % 2 == 0, SECOND_START, 1.0 / SECOND_START)
     away = asked.dynamic.put(given.model, first.theta, first.values * signs)
-    other = estimate(replace(given, theta=away), asked.dynamic)
-    gaps = np.abs(other.values - first.values)[first.determined]
-    return float((gaps / first.std[first.determined]).max(initial=0.0))
+    return apart(first, estimate(replace(given, theta=away), asked.dynamic))
 
 
 def predict(session: DriveSession, run: DriveRun, theta: Array, zero: Array) -> RunFit:
@@ -220,15 +290,15 @@ def predict(session: DriveSession, run: DriveRun, theta: Array, zero: Array) -> 
     gaps, angles = seen.angles * session.noise.angle_std_rad, run.record.angles_rad
     spread = np.sum((angles - angles.mean(axis=0)) ** 2, axis=0)
     share = np.sum(gaps**2, axis=0) / np.where(spread > 0.0, spread, np.nan)
-    limits = model.drive.current_limits_A
-    asked = run.record.references_A
+    until = max(first_slack(motion), len(head_of(run, HEAD_S).record.times_s))
     return RunFit(
         run,
         100.0 * (1.0 - share),
         100.0 * (1.0 - np.sqrt(share)),
-        float(np.sqrt(np.mean(gaps**2))),
+        float(np.sqrt(np.mean(gaps[:until] ** 2))),
+        until,
         motion.slack.sum(axis=0),
-        ((asked < limits[:, 0]) | (asked > limits[:, 1])).sum(axis=0),
+        (run.record.references_A != given_A(model, run)).sum(axis=0),
         motion,
         gaps,
         seen.poses * session.noise.pose_std,
@@ -257,8 +327,7 @@ def _start(session: DriveSession, run: DriveRun, theta: Array, zero: Array) -> t
     return pose, flowing + more
 
 
-def predicted_as_declared(session: DriveSession, run: DriveRun, zero: Array) -> RunFit | None:
-    """The run by the declared numbers; None where they cannot follow it at all."""
+def _declared_fit(session: DriveSession, run: DriveRun, zero: Array) -> RunFit | None:
     try:
         return predict(session, run, session.model.declared, zero)
     except ValueError:

@@ -17,11 +17,15 @@ from freeswing.ident.drive.identify import (
     DriveIdentification,
     DriveSession,
     Progress,
+    apart,
+    as_declared,
+    clear_of_slack,
     geometry,
     offsets_of,
     possible,
-    predict,
-    predicted_as_declared,
+    predictions,
+    premise_of,
+    ramps_of,
     step_1,
 )
 from freeswing.ident.drive.inverse_dynamics import Regression, inverse_dynamics
@@ -43,7 +47,7 @@ def identify_with_effects(session: DriveSession, progress: Progress) -> DriveIde
     Raises:
         ValueError: when the runs cannot be simulated from where a search begins.
     """
-    model, asked = session.model, session.asked
+    asked = session.asked
     published, kinematics = step_1(session)
     elastic = _swings(session)
     regression, given = (_elastic_start if elastic else _rigid_start)(session, kinematics)
@@ -53,29 +57,23 @@ def identify_with_effects(session: DriveSession, progress: Progress) -> DriveIde
         started = _started(session, given, estimate(given, asked.without_effects, MOST_STEPS))
     search = followed if elastic else estimate
     progress("joint estimate", 0.4)
-    joint = search(started, asked)
+    joint, used = clear_of_slack(session, started, search(started, asked), search)
+    started = replace(started, runs=used)
     progress("a second start", 0.65)
-    other = search(_away(started, joint), asked)
-    gaps = np.abs(other.values - joint.values)[joint.determined]
-    apart = float((gaps / joint.std[joint.determined]).max(initial=0.0))
+    elsewhere = apart(joint, search(_away(started, joint), asked))
     progress("predictions", 0.9)
-    zero = offsets_of(session, model.declared, given.offsets)
     return DriveIdentification(
         None if elastic else published,  # static poses of rigid cables say nothing of elastic ones
         None if elastic else kinematics,
         regression,
         None,
-        apart,
+        elsewhere,
         joint,
-        tuple(predict(session, run, joint.theta, joint.offsets) for run in session.runs),
-        tuple(predicted_as_declared(session, run, zero) for run in session.runs),
+        used,
+        predictions(session, joint),
+        as_declared(session, given.offsets),
+        ramps_of(session, joint),
     )
-
-
-def _premise(session: DriveSession, theta: Array, offsets: Array) -> Premise:
-    free, runs = session.zero_pose is None, session.of("identify")
-    static, zero = session.static, session.zero_pose
-    return Premise(session.model, theta, runs, session.noise, zero, offsets, static, free)
 
 
 def _rigid_start(
@@ -84,7 +82,7 @@ def _rigid_start(
     """Geometry by static poses, the file's other numbers by inverse dynamics where it succeeds."""
     theta, offsets = geometry(session, kinematics)
     regression = _regressed(session, theta, offsets)
-    return regression, _premise(session, _put(session, theta, regression), offsets)
+    return regression, premise_of(session, _put(session, theta, regression), offsets)
 
 
 def _elastic_start(
@@ -96,7 +94,8 @@ def _elastic_start(
     """
     fallback = None if kinematics is None else kinematics.offsets_rad
     offsets = offsets_of(session, session.model.declared, fallback)
-    given = known_at_rest(_premise(session, session.model.declared, offsets), session.asked)
+    given = premise_of(session, session.model.declared, offsets)
+    given = known_at_rest(replace(given, runs=session.of("identify")), session.asked)
     regression = _regressed(session, given.theta, given.offsets)
     starts = (given.theta, _put(session, given.theta, regression))
     return None, best_start(given, session.asked, starts)

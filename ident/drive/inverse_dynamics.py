@@ -16,7 +16,7 @@ from freeswing.cdpr.driven.scene import scene
 from freeswing.cdpr.driven.slopes import turn_map
 from freeswing.cdpr.model.batch import evaluate
 from freeswing.ident.drive.direct_kinematics import poses_from_turns
-from freeswing.ident.drive.run_problem import DriveRun
+from freeswing.ident.drive.run_problem import DriveRun, given_A
 from freeswing.ident.drive.unknowns import Asked
 
 Array = NDArray[np.float64]
@@ -114,10 +114,10 @@ def flowing(model: DrivenModel, theta: Array, run: DriveRun) -> Array:
             if cable.name == own:
                 taus[k] = theta[model.index(name)]
     left = np.exp(-1.0 / (run.rate_hz * taus))
-    result = np.empty_like(run.record.references_A)
+    references = given_A(model, run)
+    result = np.empty_like(references)
     result[0] = run.record.currents_A[0]
-    for k in range(len(result) - 1):
-        reference = run.record.references_A[k]
+    for k, reference in enumerate(references[:-1]):
         result[k + 1] = reference + (result[k] - reference) * left
     return result
 

@@ -120,7 +120,13 @@ def simulated(
     state = np.concatenate([start_pose, np.zeros(6)])
     record = run.record
     first = record.currents_A[0] if start_A is None else start_A
-    return simulate(model, state, record.references_A, run.rate_hz, theta, currents_A=first)
+    return simulate(model, state, given_A(model, run), run.rate_hz, theta, currents_A=first)
+
+
+def given_A(model: DrivenModel, run: DriveRun) -> Array:
+    """References as the drives can follow them: within each motor's limits, (n_t, n)."""
+    limits = model.drive.current_limits_A
+    return np.clip(run.record.references_A, limits[:, 0], limits[:, 1])
 
 
 def compared(

@@ -12,6 +12,13 @@ from freeswing.commands.arguments import (
     positive_whole,
     whole,
 )
+from freeswing.commands.robot.excite_drive import (
+    RANDOM,
+    SCORED,
+    SECONDS,
+    add_drive_arguments,
+    run_drive,
+)
 from freeswing.console import Console
 
 
@@ -23,7 +30,9 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--samples", type=positive_whole, default=100, metavar="N", help="a swing (100)"
     )
-    parser.add_argument("--duration-s", type=positive, default=10.0, help="of a swing, default 10")
+    parser.add_argument(
+        "--duration-s", type=positive, help="of a swing, default 10; of a driven record 5"
+    )
     parser.add_argument(
         "--tension-n",
         type=finite,
@@ -34,10 +43,15 @@ def add_arguments(parser: ArgumentParser) -> None:
     )
     parser.add_argument("--reach-m", type=positive, default=0.1, help="displacement, default 0.1")
     parser.add_argument("--mass-kg", type=positive, help="instead of the robot file's")
-    parser.add_argument("--starts", type=positive_whole, default=30, metavar="N", help="default 30")
+    parser.add_argument(
+        "--starts", type=positive_whole, metavar="N", help="default 30; with --drive 60 plans"
+    )
     parser.add_argument("--seed", type=whole, default=0)
     parser.add_argument(
-        "--random", type=whole, default=0, metavar="N", help="score N random plans beside the best"
+        "--random",
+        type=whole,
+        metavar="N",
+        help="score N random plans beside the best (with --drive 5)",
     )
     parser.add_argument(
         "--winch",
@@ -50,10 +64,22 @@ def add_arguments(parser: ArgumentParser) -> None:
         default="cost",
         help="conditioning of FIDIM, or information of the maximum-likelihood fit",
     )
+    add_drive_arguments(parser)
 
 
 def run(options: Namespace, console: Console) -> None:
     """Plan, and say what the plan is worth."""
+    if options.drive:
+        asked = {"duration_s": SECONDS, "starts": SCORED, "random": RANDOM}
+    else:
+        asked = {"duration_s": 10.0, "starts": 30, "random": 0}
+    for name, value in asked.items():
+        if getattr(options, name) is None:
+            setattr(options, name, value)
+    (run_drive if options.drive else _plan_swings)(options, console)
+
+
+def _plan_swings(options: Namespace, console: Console) -> None:
     from freeswing.cdpr.system.confine import results_folder
     from freeswing.excite.excite import ExcitationOptions, SwingLimits, excite
     from freeswing.results.planning import Excitation

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 from dataclasses import replace
+from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -73,7 +74,7 @@ def identify(
     from freeswing.ident.drive.added_effects import with_effects
     from freeswing.ident.drive.identify import identify_drive
     from freeswing.ident.drive.identify_effects import identify_with_effects
-    from freeswing.results.drive import drive_document
+    from freeswing.results.drive import drive_document, drive_motion_document
 
     session, held = file.session, ()
     if effects or starts:
@@ -97,6 +98,7 @@ def identify(
         document |= {"effects": list(effects), "held": list(held)}
     result = file.results / "drive.json"
     write_json(result, document)
+    write_json(file.results / "drive_motion.json", drive_motion_document(file.name, session, found))
     _say(document, console)
     console.say(str(result))
     console.show_file(result)
@@ -219,6 +221,13 @@ def _say(document: dict[str, Any], console: Console) -> None:
             f"  {fit['run']} ({fit['role']}): FIT {mean:.2f} %, "
             f"angles {times:.2f} times their noise"
         )
+    for one in document["ramps"]:
+        moved = "never moved" if isnan(one["ramp_N_m"]) else f"{one['ramp_N_m']:.2e} N m"
+        console.say(
+            f"  ramp {one['run']} (motor {one['motor']}, {one['slope_A_s']:.3g} A/s): {moved}; "
+            f"read of the estimate {one['estimate_on_this_ramp_N_m']:.2e}, off by "
+            f"{one['slope_costs_N_m']:.1e} from its friction {one['estimate_N_m']:.2e}"
+        )
     _warn(document, console)
 
 
@@ -229,7 +238,13 @@ def _warn(document: dict[str, Any], console: Console) -> None:
             continue
         console.complain(
             f"run {entry['run']}: cables {', '.join(entry['cables'])} would have had to push at "
-            f"{entry['samples']} samples; slack is not in the model, and what follows may be wrong"
+            f"{entry['samples']} samples, first at {entry['from_s']:.3f} s: nothing is fitted to, "
+            "or judged by, what follows in this run"
+        )
+    for entry in document["saturated"]:
+        console.complain(
+            f"run {entry['run']}: motors {', '.join(entry['motors'])} were asked for more than "
+            f"current_limits_A at {entry['samples']} samples: they are taken to give the limit"
         )
     times = document["residual"]["times_noise"]
     wrong = [f"{run} {value:.1f}" for run, value in times.items() if value > MISFIT]

@@ -44,28 +44,35 @@ def run(options: Namespace, console: Console) -> None:
 
 
 def _driven(options: Namespace) -> tuple[Path, Material] | None:
-    """The page of a driven robot's control results; None for a session of free swings.
+    """The page of a driven robot; None for a session of free swings."""
+    from freeswing.session.drive_session import drive_path
+
+    given = Path(options.session)
+    named = drive_path(given) or _driven_robot(given)
+    return None if named is None else driven_page(named, options.results)
+
+
+def driven_page(named: Path, folder: str | None) -> tuple[Path, Material]:
+    """The page of a driven robot, and what it was made of.
+
+    Args:
+        named: its drive.toml or robot.toml.
+        folder: of the results, None for `results` beside it.
 
     Raises:
-        InputError: where neither a controller nor a run of one is there.
+        InputError: where neither an estimate nor a controller nor a run of one is there.
     """
     from freeswing.cdpr.files.documents import InputError
     from freeswing.cdpr.system.confine import results_folder
     from freeswing.report.material import read_material
     from freeswing.report.page import DRIVEN, write_page
-    from freeswing.session.drive_session import drive_path
 
-    given = Path(options.session)
-    named = drive_path(given) or _driven_robot(given)
-    if named is None:
-        return None
-    results = results_folder(named.parent, options.results)
+    results = results_folder(named.parent, folder)
     material = read_material(named.resolve().parent.name, results, folder=str(named.parent))
-    if material.control is None:
-        why = material.why_absent("control")
-        raise InputError(
-            why or f"{results}: nothing to show of a driven robot yet: freeswing design {named}"
-        )
+    if material.control is None and material.drive is None:
+        why = material.why_absent("control", "drive")
+        todo = f"freeswing {'design' if named.name == 'robot.toml' else 'drive'} {named}"
+        raise InputError(why or f"{results}: nothing to show of a driven robot yet: {todo}")
     page = results / "report.html"
     write_page(page, material, DRIVEN)
     return page, material

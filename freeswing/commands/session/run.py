@@ -10,6 +10,8 @@ from freeswing.commands.arguments import add_session, add_workers, crew_of, open
 from freeswing.console import Console
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from freeswing.session.session_file import Session
     from freeswing.session.stages import Stage
     from freeswing.workers.crew import Crew
@@ -26,17 +28,30 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(options: Namespace, console: Console) -> None:
     """Take each step that is due; the page is always written anew."""
-    from freeswing.commands.session.drive import identify as identify_drive
-    from freeswing.session.drive_session import drive_path, read_drive_session
+    from freeswing.session.drive_session import drive_path
 
     driven = drive_path(options.session)
     if driven is not None:
-        identify_drive(read_drive_session(driven, options.results), console)
+        _run_driven(driven, options.results, console)
         return
     session = open_session(options)
     with crew_of(options, session) as crew:
         run_session(session, console, crew)
     console.show_file(session.results / "identification.json")
+
+
+def _run_driven(path: Path, results: str | None, console: Console) -> None:
+    """Estimate, look for what is missing, and the page of both."""
+    from freeswing.commands.session import drive
+    from freeswing.commands.session.report import driven_page
+    from freeswing.session.drive_session import read_drive_session
+
+    drive.identify(read_drive_session(path, results), console)
+    drive.diagnose(path, results, None, console)
+    page, material = driven_page(path, results)
+    for warning in material.warnings:
+        console.complain(warning)
+    console.say(str(page))
 
 
 def run_session(

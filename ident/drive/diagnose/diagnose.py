@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from freeswing.ident.drive.diagnose.candidates import Candidate, candidates
-from freeswing.ident.drive.diagnose.refit import Fitted, fitted, settled, with_candidate
+from freeswing.ident.drive.diagnose.refit import Fitted, fitted, refitted, settled, with_candidate
 from freeswing.ident.drive.diagnose.screen import Screened, jump_start, screen
-from freeswing.ident.drive.elastic_search import stretches
 from freeswing.ident.drive.identify import (
     DriveSession,
     Progress,
     geometry,
     possible,
+    premise_of,
     step_1,
 )
 from freeswing.ident.drive.inverse_dynamics import inverse_dynamics
-from freeswing.ident.drive.joint import Premise, Problem
+from freeswing.ident.drive.joint import Problem
+from freeswing.ident.drive.slack import before_slack
 
 REFITTED = 4
 # A candidate must be worth this much BIC, as must a lead over its rivals.
@@ -108,7 +109,9 @@ def diagnose_drive(
         ValueError: when the runs cannot be simulated from where the search begins.
     """
     progress("the model as it is declared", 0.05)
-    search = _Search(session, [_base(session)])
+    base = _base(session)
+    session = _clear_of_slack(session, base)
+    search = _Search(session, [refitted(session, base)])
     for round_ in range(MOST_EFFECTS):
         progress(f"candidates, round {round_ + 1}", 0.2 + 0.2 * round_)
         if not _climb(search, only):
@@ -125,11 +128,14 @@ def _base(session: DriveSession) -> Fitted:
         theta = asked.dynamic.put(model, theta, possible(session, regression))
     except ValueError:  # angles that fit no pose: something is missing, which is the question
         pass
-    free = session.zero_pose is None
-    given = Premise(
-        model, theta, runs, session.noise, session.zero_pose, offsets, session.static, free
-    )
-    return fitted(session, given, asked)
+    return fitted(session, premise_of(session, theta, offsets), asked)
+
+
+def _clear_of_slack(session: DriveSession, base: Fitted) -> DriveSession:
+    """The session with every run up to its first slack cable, so that all models see the same."""
+    found = base.found
+    runs = before_slack(base.given.model, found.theta, session.runs, found.offsets, at_least=True)
+    return replace(session, runs=runs)
 
 
 def _climb(search: _Search, only: Collection[str] | None) -> bool:
@@ -139,7 +145,7 @@ def _climb(search: _Search, only: Collection[str] | None) -> bool:
     problem.normal(_point(problem, base))
     starts = jump_start(problem.seen, ("encoder_jump.after_s",))
     chosen = candidates(base.given.model, base.found.asked, only)
-    told = _screened(search, base, chosen, starts)
+    told = screen(base.given, base.found, chosen, starts)
     worth = _worth(search, base, told)
     tried = []
     for one in worth[:REFITTED]:
@@ -173,22 +179,6 @@ def _climb(search: _Search, only: Collection[str] | None) -> bool:
     return True
 
 
-def _screened(
-    search: _Search, base: Fitted, chosen: tuple[Candidate, ...], starts: dict[str, float]
-) -> tuple[Screened, ...]:
-    """All candidates about the base; elastic cables are left out where they are too stiff."""
-    try:
-        return screen(base.given, base.found, chosen, starts)
-    except ValueError as error:
-        stiff = [one for one in chosen if stretches(one.effect)]
-        if not stiff:
-            raise
-        for one in stiff:
-            search.say(one, "rejected", f"cannot be followed: {error}")
-        rest = tuple(one for one in chosen if one not in stiff)
-        return screen(base.given, base.found, rest, starts)
-
-
 def _point(problem: Problem, base: Fitted) -> np.ndarray:
     x = base.found.found.values.copy()
     x[: problem.k] = base.found.values
@@ -200,6 +190,9 @@ def _worth(search: _Search, base: Fitted, told: tuple[Screened, ...]) -> list[Sc
     scale = max(1.0, base.chi_square / base.n)
     found = []
     for one in told:
+        if one.why:
+            search.say(one.candidate, "rejected", f"cannot be followed: {one.why}")
+            continue
         bic = -one.gain / scale + len(one.candidate.groups) * np.log(base.n)
         if not one.seen:
             reason = "these recordings do not tell it from the numbers that are asked for"

@@ -86,6 +86,17 @@ def fitted(session: DriveSession, given: Premise, asked: Asked, candidate=None) 
     return Fitted(candidate, given, found, _held_out(session, given.model, found))
 
 
+def refitted(session: DriveSession, fit: Fitted) -> Fitted:
+    """The same with the runs that the session has now: all again where one has become shorter."""
+    runs = session.of("identify")
+    if all(a is b for a, b in zip(runs, fit.given.runs, strict=True)):
+        held_out = _held_out(session, fit.given.model, fit.found)
+        return replace(fit, held_out=held_out)
+    found = fit.found
+    given = replace(fit.given, runs=runs, theta=found.theta, offsets=found.offsets)
+    return fitted(session, given, found.asked, fit.candidate)
+
+
 def _held_out(session: DriveSession, model: DrivenModel, found: Estimate) -> HeldOut | None:
     session, noise = replace(session, model=model), session.noise
     try:
@@ -94,7 +105,7 @@ def _held_out(session: DriveSession, model: DrivenModel, found: Estimate) -> Hel
         )
     except ValueError:
         return None
-    rms = float(np.sqrt(np.mean([fit.rms_rad**2 for fit in fits])))
+    rms = float(np.sqrt(np.mean([np.mean(fit.gaps_rad**2) for fit in fits])))
     gaps = np.concatenate([fit.pose_gaps for fit in fits])
     return HeldOut(
         fits,

@@ -10,7 +10,14 @@ from numpy.typing import NDArray
 from freeswing.cdpr.driven.model import DrivenModel, build_driven
 from freeswing.ident.drive.diagnose.candidates import Candidate
 from freeswing.ident.drive.joint import Estimate, Premise, Problem
-from freeswing.ident.drive.run_problem import Seen
+from freeswing.ident.drive.run_problem import (
+    Seen,
+    gives_way,
+    head_of,
+    simulated,
+    start_pose,
+    step_of,
+)
 from freeswing.ident.drive.unknowns import Asked, Group
 
 Array = NDArray[np.float64]
@@ -29,12 +36,14 @@ class Screened:
         gain: by how much the sum of squared residuals over their variances falls.
         values: of its screened numbers, (k,).
         seen: whether the recordings tell it from the other unknowns at all.
+        why: the runs cannot be simulated with it; empty where they can.
     """
 
     candidate: Candidate
     gain: float
     values: Array
     seen: bool
+    why: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +84,9 @@ def screen(
     for name, value in starts.items():
         if name in larger.model.names:
             larger.theta[larger.model.index(name)] = value
-    columns = tuple(dict.fromkeys(name for one in chosen for name in one.screened))
+    refused = {one.label: _refusal(given, larger, one) for one in chosen}
+    followed = [one for one in chosen if not refused[one.label]]
+    columns = tuple(dict.fromkeys(name for one in followed for name in one.screened))
     n_base = len(found.asked.groups)
     more = tuple(Group(name, (name,)) for name in columns)
     asked = Asked((*found.asked.groups, *more), found.asked.n_kinematic)
@@ -90,7 +101,33 @@ def screen(
     left, slope = _beside(normal.matrix, normal.gradient, base, own)
     places = {name: k for k, name in enumerate(columns)}
     squares = np.diag(normal.matrix)[own]
-    return tuple(_judged(one, places, left, slope, squares) for one in chosen)
+    return tuple(
+        Screened(one, 0.0, np.zeros(len(one.screened)), False, refused[one.label])
+        if refused[one.label]
+        else _judged(one, places, left, slope, squares)
+        for one in chosen
+    )
+
+
+def _refusal(given: Premise, larger: Grown, candidate: Candidate) -> str:
+    """Why not even the first samples can be simulated with a candidate's numbers, or nothing.
+
+    Cables of the stiffness at which its slopes are differences may swing too fast for any step.
+    """
+    model = larger.model
+    for name in candidate.screened:
+        if not gives_way(model, name):
+            continue
+        theta = larger.theta.copy()
+        theta[model.index(name)] += step_of(model, larger.theta, name)
+        for run in given.runs:
+            first = head_of(run, 0.0)
+            start = start_pose(model, larger.theta, first, given.offsets)
+            try:
+                simulated(model, theta, first, start)
+            except ValueError as error:
+                return str(error)
+    return ""
 
 
 def _beside(

@@ -1,0 +1,218 @@
+"""Panel: a driven robot's estimates: by every method, before and after, correlations, Table 2."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from markupsafe import Markup
+from matplotlib.figure import Figure
+
+from freeswing.report.figures import INK, MARKS, SERIES, Draw, figure, figures, interval_axes, key
+from freeswing.report.material import Material
+from freeswing.report.words import HALF_WIDTH_95, number, parameter_row, plain, unit_of
+from freeswing.results.common import Parameter
+from freeswing.results.diagnosis import Diagnosis
+
+Table = Mapping[str, Any]
+
+# Methods in the order in which they are taken, and where each stands in the document.
+METHODS = (
+    ("the paper's (18)", ("kinematic", "equation_18")),
+    ("static poses", ("kinematic",)),
+    ("inverse dynamics", ("inverse_dynamics",)),
+    ("output error", ("output_error",)),
+    ("joint estimate", ("joint",)),
+)
+MEANT = "Noise alone leaves 1; above 1.5 something is missing in the model."
+
+
+class DrivenEstimates:
+    """Geometry, inertia, friction and springs, and how well every run is predicted with them."""
+
+    name = "driven"
+    title = "The driven robot"
+
+    def values(self, material: Material) -> dict[str, Any] | None:
+        """Tables and charts; None where no driven robot was identified."""
+        if material.drive is None:
+            return None
+        found = material.drive.estimates
+        joint = found["estimates"]["joint"]
+        diagnosis = material.diagnosis
+        lost = [one["name"] for one in joint["parameters"] if not one["identifiable"]]
+        return {
+            "rows": [_row(one) for one in joint["parameters"]],
+            "lost": lost,
+            "bounds": [one["name"] for one in joint["parameters"] if one["on_bound"]],
+            "intervals": _intervals(found["estimates"]),
+            "changed": _changed(diagnosis),
+            "correlation": _correlation(joint),
+            "fits": _fits(found),
+            "meant": MEANT,
+            "slack": [_slack(one) for one in found["slack"] if not one["in_model"]],
+            "saturated": [_saturated(one) for one in found["saturated"]],
+            "ramps": [_ramp(one) for one in found["ramps"]],
+        }
+
+
+def _row(one: Table) -> dict[str, str]:
+    row = parameter_row(_parameter(one))
+    tied = f" = {', '.join(one['tied'])}" if one.get("tied") else ""
+    return {
+        "parameter": plain(row["name"]) + tied,
+        "value": row["value"],
+        "± 95 %": row["half_width"],
+        "unit": row["unit"],
+        "± 95 % of the value (%)": row["percent"],
+        "remark": _remark(one),
+    }
+
+
+def _remark(one: Table) -> str:
+    if not one["identifiable"]:
+        return "these recordings do not determine it"
+    return "on a bound of the search: no estimate" if one["on_bound"] else ""
+
+
+def _parameter(one: Table) -> Parameter:
+    return Parameter(name=str(one["name"]), value=one["value"], std=one["std"])
+
+
+def _intervals(estimates: Table) -> Markup:
+    """Each parameter by every method, less the joint estimate, in per cent of it."""
+    joint = {one["name"]: one["value"] for one in estimates["joint"]["parameters"]}
+    points: dict[str, list[tuple[int, Table]]] = {name: [] for name, at in joint.items() if at}
+    for place, (_, keys) in enumerate(METHODS):
+        table: Any = estimates
+        for one in keys:
+            table = table.get(one, {})
+        for entry in table.get("parameters", ()):
+            if entry["name"] in points and entry["value"] is not None:
+                points[entry["name"]].append((place, entry))
+    names = [(label, SERIES[k], MARKS[k]) for k, (label, _) in enumerate(METHODS)]
+    draws = [_interval(name, entries, joint[name]) for name, entries in points.items()]
+    caption = (
+        "Each parameter by each method with its 95 % interval, in per cent off the joint estimate."
+    )
+    return figures([*draws, key(names)], 1.45, caption) if draws else Markup()
+
+
+def _interval(name: str, entries: Sequence[tuple[int, Table]], middle: float) -> Draw:
+    def draw(sheet: Figure) -> None:
+        axes = sheet.subplots()
+        for place, entry in entries:
+            off = 100.0 * (entry["value"] / middle - 1.0)
+            half = 100.0 * HALF_WIDTH_95 * (entry["std"] or 0.0) / abs(middle)
+            axes.errorbar(off, -place, xerr=half, color=SERIES[place], marker=MARKS[place], ms=4)
+        axes.axvline(0.0, color=INK, lw=0.6)
+        interval_axes(axes, f"{plain(unit_of(name)[0])} (%)")
+
+    return draw
+
+
+def _changed(diagnosis: Diagnosis | None) -> list[dict[str, str]]:
+    """The asked numbers before and after what was missing, with their intervals."""
+    if diagnosis is None or not diagnosis.accepted:
+        return []
+    after = {one.name: parameter_row(one) for one in diagnosis.parameters_after}
+    rows = []
+    for one in diagnosis.parameters_before:
+        before, then = parameter_row(one), after.get(one.name)
+        if then is None:
+            continue
+        rows.append(
+            {
+                "parameter": plain(before["name"]),
+                "unit": before["unit"],
+                "before ± 95 %": f"{before['value']} ± {before['half_width']}",
+                "with what was missing ± 95 %": f"{then['value']} ± {then['half_width']}",
+            }
+        )
+    return rows
+
+
+def _correlation(joint: Table) -> Markup:
+    names = [plain(unit_of(one["name"])[0]) for one in joint["parameters"]]
+    matrix = np.array(joint["correlation"], dtype=float)
+
+    def draw(sheet: Figure) -> None:
+        axes = sheet.subplots()
+        axes.imshow(matrix, vmin=-1.0, vmax=1.0, cmap="RdBu_r")
+        axes.set_xticks(range(len(names)), names, rotation=90, fontsize=6.5)
+        axes.set_yticks(range(len(names)), names, fontsize=6.5)
+        axes.grid(visible=False)
+        for (i, k), value in np.ndenumerate(matrix):
+            if i != k and abs(value) >= 0.5:
+                axes.text(k, i, f"{value:.1f}", ha="center", va="center", fontsize=5.5)
+
+    caption = "Correlations of the joint estimate, red together, blue against each other."
+    return figure(draw, 5.2, 4.8, caption)
+
+
+def _fits(found: Table) -> list[dict[str, str]]:
+    """Table 2: FIT of every run by both definitions, of the declared numbers too."""
+    initial = {one["run"]: one for one in found["initial_fit_percent"]}
+    used = {one["run"]: one for one in found["used"]}
+    rows = []
+    for one in found["fit_percent"]:
+        name, start = one["run"], initial.get(one["run"])
+        part = used.get(name)
+        rows.append(
+            {
+                "run": name,
+                "role": str(one["role"])
+                + ("" if part is None or part["whole"] else f", its first {part['seconds']:.2f} s"),
+                "FIT by motor (%)": ", ".join(_percent(value) for value in one["matlab"]),
+                "FIT (%)": _mean(one["matlab"]),
+                "FIT by (22) (%)": _mean(one["equation_22"]),
+                "FIT as declared (%)": "cannot follow" if start is None else _mean(start["matlab"]),
+                "angles off (mrad)": _milli(one["rms_rad"]),
+                "over their noise": number(found["residual"]["times_noise"][name]),
+            }
+        )
+    return rows
+
+
+def _percent(value: float | None) -> str:
+    return "–" if value is None else f"{value:.2f}"
+
+
+def _mean(values: Sequence[float | None]) -> str:
+    known = [value for value in values if value is not None]
+    return f"{sum(known) / len(known):.2f}" if known else "–"
+
+
+def _slack(one: Table) -> str:
+    cables = ", ".join(str(name) for name in one["cables"])
+    return (
+        f"Run {one['run']}: cables {cables} would have had to push from {one['from_s']:.2f} s on "
+        f"({one['samples']} samples, down to {one['least_tension_N']:.2f} N). Rigid cables are "
+        "wrong after that: nothing is fitted to, or judged by, what follows."
+    )
+
+
+def _saturated(one: Table) -> str:
+    motors = ", ".join(str(name) for name in one["motors"])
+    return (
+        f"Run {one['run']}: motors {motors} were asked for more than their limits at "
+        f"{one['samples']} samples; they are taken to give the limit."
+    )
+
+
+def _ramp(one: Table) -> dict[str, str]:
+    return {
+        "run": str(one["run"]),
+        "motor": str(one["motor"]),
+        "slope (A/s)": number(one["slope_A_s"]),
+        "moved after (ms)": number(None if one["moved_s"] is None else 1e3 * one["moved_s"]),
+        "read off (mN m)": _milli(one["ramp_N_m"]),
+        "the same of the estimate (mN m)": _milli(one["estimate_on_this_ramp_N_m"]),
+        "off by the slope (mN m)": _milli(one["slope_costs_N_m"]),
+        "the motor's own friction (mN m)": _milli(one["estimate_N_m"]),
+    }
+
+
+def _milli(value: float | None) -> str:
+    return number(None if value is None else 1e3 * value)
