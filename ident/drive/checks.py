@@ -38,6 +38,7 @@ def findings(session: DriveSession) -> list[str]:
     found = [text for run in session.runs for text in _times(run)]
     if found:
         return found
+    found = _static_units(session)
     for run in session.runs:
         found += _currents(session, run) + _angles(session, run)
     if found:
@@ -76,15 +77,27 @@ def _currents(session: DriveSession, run: DriveRun) -> list[str]:
                 f"run {run.name}: {what} columns reach {np.abs(values).max():.4g} A with limits of "
                 f"{limit:g} A: these look like mA; write A"
             ]
-    found = []
-    for k, cable in enumerate(session.model.robot.cables):
-        gap, spread = run.record.currents_A[:, k] - flows[:, k], flows[:, k].std()
-        if gap.std() > UNLIKE_CURRENT * spread and spread > 0.05 * limit:
+    names = [cable.name for cable in session.model.robot.cables]
+    between = run.record.currents_A[:, :, None] - flows[:, None, :]
+    gaps = np.sqrt(np.mean(between**2, axis=0))  # measured by asked
+    spread, found = flows.std(axis=0), []
+    for k, name in enumerate(names):
+        if gaps[k, k] <= UNLIKE_CURRENT * spread[k] or spread[k] <= 0.05 * limit:
+            continue
+        other = int(np.argmin(gaps[k]))
+        swapped = other != k and np.argmin(gaps[other]) == k
+        if swapped and max(gaps[k, other], gaps[other, k]) < UNLIKE_CURRENT * spread[k]:
+            pair = " and ".join(sorted((name, names[other])))
             found.append(
-                f"run {run.name}: the current of motor {cable.name} does not follow its reference "
-                f"(rms {gap.std():.3g} A apart): columns swapped, or a drive that was off"
+                f"run {run.name}: the currents of motors {pair} follow each other's references: "
+                "their columns are swapped"
             )
-    return found
+            continue
+        found.append(
+            f"run {run.name}: the current of motor {name} does not follow its reference "
+            f"(rms {gaps[k, k]:.3g} A apart): columns swapped, or a drive that was off"
+        )
+    return list(dict.fromkeys(found))
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,15 +149,9 @@ def _angles(session: DriveSession, run: DriveRun) -> list[str]:
     alike = (read.T @ told) / np.maximum(norms, 1e-300)
     slopes = np.sum(read * told, axis=0) / np.sum(told**2, axis=0)
     names, found = [cable.name for cable in session.model.robot.cables], []
-    size = float(np.median(np.abs(slopes[moving])))
-    if size > COUNTS:
-        return [
-            f"run {run.name}: angles are {size:.0f} times those of the poses: counts? write rad"
-        ]
-    if DEGREES[0] < size < DEGREES[1]:
-        return [
-            f"run {run.name}: angles are {size:.1f} times those of the poses: degrees? write rad"
-        ]
+    unit = _unit(f"run {run.name}", float(np.median(np.abs(slopes[moving]))))
+    if unit:
+        return unit
     for k in np.flatnonzero(moving):
         name = names[k]
         if alike[k, k] < -ALIKE:
@@ -167,6 +174,37 @@ def _angles(session: DriveSession, run: DriveRun) -> list[str]:
                     "another column"
                 )
     return found
+
+
+def _unit(where: str, size: float) -> list[str]:
+    """What angles are in that move so many times as far as the poses' own."""
+    if size > COUNTS:
+        return [f"{where}: angles are {size:.0f} times those of the poses: counts? write rad"]
+    if DEGREES[0] < size < DEGREES[1]:
+        return [f"{where}: angles are {size:.1f} times those of the poses: degrees? write rad"]
+    return []
+
+
+def _static_units(session: DriveSession) -> list[str]:
+    """Units of the static poses: currents in mA, angles in degrees or counts."""
+    static = session.static
+    if static is None or len(static.poses) < 2:
+        return []
+    limit, most = session.model.drive.current_limits_A[:, 1].max(), np.abs(static.currents_A).max()
+    if most > MILLI * limit:
+        return [
+            f"static poses: currents reach {most:.4g} A with limits of {limit:g} A: these look "
+            "like mA; write A"
+        ]
+    model = session.model
+    told = -evaluate(length_slope(model), static.poses, model.declared)[0]
+    told, read = told - told.mean(axis=0), static.angles_rad - static.angles_rad.mean(axis=0)
+    spread = np.sqrt(np.sum(told**2, axis=0))
+    moving = spread > 0.0
+    if not moving.any():
+        return []
+    slopes = np.sum(read * told, axis=0)[moving] / spread[moving] ** 2
+    return _unit("static poses", float(np.median(np.abs(slopes))))
 
 
 def _start(session: DriveSession, run: DriveRun) -> list[str]:

@@ -23,6 +23,7 @@ from freeswing.ident.drive.run_problem import (
 )
 from freeswing.ident.drive.solver import (
     MOST_ITERATIONS,
+    SMALL_GAIN,
     Found,
     Normal,
     covariance_of,
@@ -225,15 +226,24 @@ class Problem:
         return part, np.concatenate([np.arange(self.n_shared), own])
 
 
-def estimate(given: Premise, asked: Asked, most: int = MOST_ITERATIONS) -> Estimate:
+def estimate(
+    given: Premise, asked: Asked, most: int = MOST_ITERATIONS, misfit_gain: float = SMALL_GAIN
+) -> Estimate:
     """The most likely values of what is asked for, after `most` steps of the search at most.
+
+    Args:
+        given: what the fit takes as given.
+        asked: the unknowns.
+        most: steps tried.
+        misfit_gain: the search ends at a step that gains less of its cost, where that is well
+            above the noise's.
 
     Raises:
         ValueError: when the runs cannot be simulated from where the search begins.
     """
     problem = Problem(given, asked)
     low, high = problem.bounds()
-    found = minimise(problem.normal, problem.start(), low, high, most)
+    found = minimise(problem.normal, problem.start(), low, high, most, misfit_gain)
     at = problem.normal(found.values)
     k = problem.k
     inverse, known = covariance_of(at.matrix)

@@ -15,6 +15,9 @@ Array = NDArray[np.float64]
 MOST_ITERATIONS = 60
 DAMPING = Damping(largest=1e8)
 SMALL_GAIN = 1e-8  # of the cost: at 4e4 residuals a fiftieth of a standard deviation
+# Above twice their noise residuals have a cause that no number explains: there a search may end
+# sooner, for it creeps along a valley whose floor says nothing.
+MISFIT = 2.0
 # Columns scaled to 1: below this a direction is not determined by the data in double precision.
 RANK_LIMIT = 1e-13
 
@@ -90,6 +93,7 @@ def minimise(
     low: Array | None = None,
     high: Array | None = None,
     most: int = MOST_ITERATIONS,
+    misfit_gain: float = SMALL_GAIN,
 ) -> Found:
     """The least sum of squares from a start, within bounds.
 
@@ -99,6 +103,7 @@ def minimise(
         low: least values, (k,).
         high: greatest values, (k,).
         most: steps tried at most.
+        misfit_gain: instead of `SMALL_GAIN` where the mean square is above `MISFIT`.
 
     Raises:
         ValueError: when the start itself cannot be evaluated.
@@ -107,7 +112,9 @@ def minimise(
     low = np.full_like(at, -np.inf) if low is None else low
     high = np.full_like(at, np.inf) if high is None else high
     solver = LevenbergMarquardt(most, DAMPING)
-    ended, count, stop = solver.descend(_Search(evaluate, low, high), _At(at, evaluate(at)))
+    ended, count, stop = solver.descend(
+        _Search(evaluate, low, high, misfit_gain), _At(at, evaluate(at))
+    )
     return Found(ended.values, ended.normal, count, stop.sentence)
 
 
@@ -138,6 +145,7 @@ class _Search:
     evaluate: Callable[[Array], Normal]
     low: Array
     high: Array
+    misfit_gain: float
 
     def step(self, place: _At, damping: float) -> _Step:
         """Damped by Marquardt's scaling."""
@@ -163,4 +171,6 @@ class _Search:
             return None
         here = trial.cost if lower else place.cost
         gain = place.cost - trial.cost if lower else step.promised
-        return CONVERGED if gain < SMALL_GAIN * max(here, 1.0) else None
+        misfit = 2.0 * here > MISFIT * place.normal.n
+        share = self.misfit_gain if misfit else SMALL_GAIN
+        return CONVERGED if gain < share * max(here, 1.0) else None

@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 
 # What is missing leaves a sum of squares that no search brings down: more steps do not help.
 MOST_STEPS = 14
+ROUGH = 1e-3  # of its cost: a step that gains less ends a search far above the noise
 MORE_STEPS = 40  # for the one that is best: a cause that was found ends at the noise
 WEIGHTS_KG = (0.02, 0.05, 0.1, 0.2)  # tried for an undeclared weight whose moment is known
 
@@ -82,7 +83,7 @@ class Fitted:
 
 def fitted(session: DriveSession, given: Premise, asked: Asked, candidate=None) -> Fitted:
     """Fit, then predict the runs kept apart."""
-    found = estimate(given, asked, MOST_STEPS)
+    found = estimate(given, asked, MOST_STEPS, ROUGH)
     return Fitted(candidate, given, found, _held_out(session, given.model, found))
 
 
@@ -117,11 +118,9 @@ def _held_out(session: DriveSession, model: DrivenModel, found: Estimate) -> Hel
 
 
 def settled(session: DriveSession, fit: Fitted) -> Fitted:
-    """The same fit, gone on with where it was stopped before it had converged."""
+    """The same fit, gone on with to its end."""
     if fit.candidate is not None and stretches(fit.candidate.effect):
         return _followed(session, fit)
-    if fit.found.found.iterations < MOST_STEPS:
-        return fit
     found = fit.found
     given = replace(fit.given, theta=found.theta, offsets=found.offsets)
     again = estimate(given, found.asked, MORE_STEPS)
@@ -194,7 +193,7 @@ def weighted(given: Premise, found: Estimate, groups: tuple[Group, ...]) -> Prem
     asked = Asked(
         (*found.asked.groups, *(Group(name, (name,)) for name in names)), found.asked.n_kinematic
     )
-    centred = estimate(given, asked, MOST_STEPS)
+    centred = estimate(given, asked, MOST_STEPS, ROUGH)
     model, best, theta = given.model, np.inf, given.theta
     mass = centred.theta[model.index("mass_kg")]
     places = [model.index(name) for name in CENTRE]

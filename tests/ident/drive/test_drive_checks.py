@@ -5,10 +5,15 @@ import json
 import numpy as np
 import pytest
 
+from freeswing.cdpr.driven.behaviour import rest_pose, simulate
+from freeswing.cdpr.driven.record import observed
+from freeswing.cdpr.driven.statics import CENTRE
+from freeswing.cdpr.files.drive_csv import write_drive_run
 from freeswing.ident.drive.checks import findings
 from freeswing.main import main
 from freeswing.session.drive_session import read_drive_session
-from tests.ident.drive.made_sessions import TOML, write_session
+from tests.cdpr.driven_robots import inca
+from tests.ident.drive.made_sessions import INSTRUMENTS, TOML, write_session
 
 
 @pytest.fixture(scope="module")
@@ -48,6 +53,17 @@ def swapped(names, values):
     return values
 
 
+def swapped_currents(names, values):
+    a, b = names.index("I3_A"), names.index("I7_A")
+    values[:, [a, b]] = values[:, [b, a]]
+    return values
+
+
+def off(names, values):
+    values[:, names.index("I6_A")] = 0.0
+    return values
+
+
 def jumping(_, values):
     values[700:, 0] += 0.25
     return values
@@ -83,6 +99,11 @@ def test_commands_of_free_swings_say_which_take_it(made, capsys):
         ({"run": scaled("theta4", -1.0)}, ["run ident", "motor 4 falls where its cable is wound"]),
         ({"run": scaled("I", 1000.0)}, ["run ident", "look like mA"]),
         ({"run": swapped}, ["motors 2 and 5", "columns are swapped"]),
+        ({"run": swapped_currents}, ["currents of motors 3 and 7", "columns are swapped"]),
+        ({"run": off}, ["current of motor 6 does not follow its reference"]),
+        ({"static": scaled("theta", 57.29578)}, ["static poses: angles are 57", "degrees?"]),
+        ({"static": scaled("theta", 4096 / 6.2832)}, ["static poses: angles are", "counts?"]),
+        ({"static": scaled("I", 1000.0)}, ["static poses: currents reach", "look like mA"]),
         ({"run": jumping}, ["run ident", "time jumps by 0.251 s after 0.699 s"]),
         ({"run": cut}, ["run ident", "starts in motion"]),
         ({"run": scaled("theta", 1e-4)}, ["encoder steps: nothing is excited"]),
@@ -100,6 +121,28 @@ def test_spoiled_recordings_end_with_1(made, tmp_path, capsys, how, words):
     missing = [word for word in words if word not in said]
     assert not missing, f"{missing} not in: {said}"
     assert not (folder / "results").exists()
+
+
+def test_what_no_run_excites_is_named_and_has_no_value(tmp_path, capsys):
+    """All motors alike: the platform goes up and down, and nothing tells its inertia."""
+    folder = write_session(tmp_path, 40, 0.06, robot="robot.toml")
+    model, still = inca(), np.zeros(8)
+    state = np.concatenate([rest_pose(model, still), np.zeros(6)])
+    references = np.zeros((601, 8))
+    references[100:300] = references[450:] = 1.0
+    motion = simulate(model, state, references, 1000.0, currents_A=still)
+    for name in ("ident", "check"):
+        record = observed(motion, CENTRE, INSTRUMENTS, np.random.default_rng(len(name)))
+        write_drive_run(folder / f"{name}.csv", record)
+    head, _, tail = TOML.partition("[unknown]")
+    few = '[unknown]\ndynamic = ["mass_kg", "Ixx_kg_m2", "coulomb_N_m"]\n[static]'
+    (folder / "drive.toml").write_text(head + few + tail.partition("[static]")[2])
+    assert main(["drive", str(folder), "--quiet"]) == 0
+    assert "Ixx_kg_m2 is not determined by these recordings" in capsys.readouterr().err
+    document = json.loads((folder / "results" / "drive.json").read_text())
+    found = {one["name"]: one for one in document["estimates"]["joint"]["parameters"]}
+    assert found["Ixx_kg_m2"]["value"] is None
+    assert abs(found["mass_kg"]["value"] - 0.289) < 4.0 * found["mass_kg"]["std"]
 
 
 @pytest.mark.parametrize(
