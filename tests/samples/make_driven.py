@@ -95,7 +95,7 @@ def main() -> None:
         references[:, motor - 1] = RAMP_A_S * np.arange(len(references)) / RATE_HZ
         _record(folder, plant, f"ramp_{motor}", references, generator)
         text += _table(f"ramp_{motor}", "validate")
-    _static(folder / "static.csv", plant, generator)
+    write_static_poses(folder / "static.csv", plant, generator)
     (folder / "drive.toml").write_text(text)
     truth = {
         "seed": SEED,
@@ -133,7 +133,7 @@ def robot() -> Plant:
     )
 
 
-def _rest(plant: Plant, currents: Array) -> Array:
+def rest(plant: Plant, currents: Array) -> Array:
     """The pose at rest under held currents, (6,)."""
     hanging = np.array([0.0, 0.0, -0.2, 0.0, 0.0, 0.0])
     return fsolve(lambda x: plant.second_rates(x, np.zeros(6), currents), hanging, xtol=1e-12)
@@ -160,7 +160,7 @@ def _record(
 ) -> None:
     """One run from rest without current."""
     still = np.zeros(8)
-    poses = plant.motion(_rest(plant, still), references, RATE_HZ, still)
+    poses = plant.motion(rest(plant, still), references, RATE_HZ, still)
     times = np.arange(len(poses)) / RATE_HZ
     currents, flows = np.empty_like(references), still
     left = np.exp(-1.0 / (RATE_HZ * plant.lag_s))
@@ -189,10 +189,10 @@ def _names(what: str, unit: str) -> list[str]:
     return [f"{what}{k}_{unit}" for k in range(1, 9)]
 
 
-def _static(path: Path, plant: Plant, generator: np.random.Generator) -> None:
+def write_static_poses(path: Path, plant: Plant, generator: np.random.Generator) -> None:
     """Nine poses at rest: without current, and with 1 A in one motor after another."""
     currents = np.vstack([np.zeros(8), np.eye(8)])
-    poses = np.array([_rest(plant, row) for row in currents])
+    poses = np.array([rest(plant, row) for row in currents])
     seen = _measured(plant, poses, STD / 10.0, generator)
     rows = [",".join([*_names("I", "A"), *_names("theta", "rad"), POSE])]
     for row in np.hstack([currents, _angles(plant, poses), seen]):
