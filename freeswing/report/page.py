@@ -70,8 +70,12 @@ PANELS: tuple[Panel, ...] = (
     ControlPanel(),
     Provenance(),
 )
-# A driven robot without a session of free swings.
-DRIVEN: tuple[Panel, ...] = (DrivenEstimates(), EffectLadder(), DrivenMotion(), ControlPanel())
+
+
+def driven_panels(material: Material) -> tuple[Panel, ...]:
+    """The sections of a driven robot without a session of free swings."""
+    looked_for = (EffectLadder(),) if material.diagnosis is not None else ()
+    return (DrivenEstimates(), *looked_for, DrivenMotion(), ControlPanel())
 
 
 def render_page(material: Material, panels: tuple[Panel, ...] = PANELS) -> str:

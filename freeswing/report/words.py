@@ -19,6 +19,9 @@ _UNITS = {
     "rad_s": (1.0, "rad/s"),
     "1_m": (1.0, "1/m"),
     "1_s": (1.0, "1/s"),
+    "N_m_s": (1e3, "mN m s"),
+    "N_m_A": (1e3, "mN m/A"),
+    "N_m": (1e3, "mN m"),
     "m2": (1e3, "10⁻³ m²"),
     "N_kg": (1.0, "N/kg"),
     "m": (1e3, "mm"),
@@ -54,17 +57,24 @@ def millimetres(value_m: object, digits: int = 3) -> str:
     return f"{number(value_m * 1e3, digits)} mm"
 
 
-def unit_of(name: str) -> tuple[str, float, str]:
-    """A parameter's name without its unit, the scale to the readable unit, and that unit."""
+def unit_of(name: str, effect: str = "") -> tuple[str, float, str]:
+    """A parameter's name without its unit, the scale to the readable unit, and that unit.
+
+    Args:
+        name: of the parameter.
+        effect: that it is of, if of one: of springs N_m means N/m, of friction N m.
+    """
+    if name.endswith("_N_m") and "spring" in f"{effect} {name}":
+        return name.removesuffix("_N_m"), 1.0, "N/m"
     for suffix, (scale, unit) in _UNITS.items():
         if name.endswith(f"_{suffix}"):
             return name.removesuffix(f"_{suffix}"), scale, unit
     return name, 1.0, ""
 
 
-def parameter_row(parameter: Parameter) -> dict[str, str]:
+def parameter_row(parameter: Parameter, effect: str = "") -> dict[str, str]:
     """One parameter in a readable unit with its 95 % interval, digits following the interval."""
-    stem, scale, unit = unit_of(parameter.name)
+    stem, scale, unit = unit_of(parameter.name, effect)
     value, std = _scaled(parameter.value, scale), _scaled(parameter.std, scale)
     percent = getattr(parameter, "std_percent", None)
     percent = _percent(value, std) if percent is None else percent

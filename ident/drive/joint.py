@@ -115,6 +115,7 @@ class Problem:
         self.n_start = N_POSE + given.model.n_cables
         self.size = self.n_shared + self.n_start * len(given.runs) + 6 * self.n_static
         self.seen: list[Seen] = []
+        self.at: Array | None = None  # where `seen` was
 
     def start(self) -> Array:
         """Where the search begins, (size,)."""
@@ -153,7 +154,7 @@ class Problem:
         """The normal equations at a point."""
         theta, zero, by_zero = self.zero(x[: self.k], x[self.k : self.n_shared])
         cost, gradient = 0.0, np.zeros(self.size)
-        matrix, count, self.seen = np.zeros((self.size, self.size)), 0, []
+        matrix, count, self.seen, self.at = np.zeros((self.size, self.size)), 0, [], x.copy()
         for r, run in enumerate(self.given.runs):
             own = self._own(r)
             pose, first = moved(self.starts[r], x[own][:N_POSE]), x[own][N_POSE:]
@@ -244,7 +245,9 @@ def estimate(
     problem = Problem(given, asked)
     low, high = problem.bounds()
     found = minimise(problem.normal, problem.start(), low, high, most, misfit_gain)
-    at = problem.normal(found.values)
+    at = found.normal
+    if not np.array_equal(problem.at, found.values):  # its last step was not taken
+        at = problem.normal(found.values)
     k = problem.k
     inverse, known = covariance_of(at.matrix)
     robust = _sandwich(inverse, problem.scores(found.values, at), known)

@@ -65,7 +65,7 @@ def driven_page(named: Path, folder: str | None) -> tuple[Path, Material]:
     from freeswing.cdpr.files.documents import InputError
     from freeswing.cdpr.system.confine import results_folder
     from freeswing.report.material import read_material
-    from freeswing.report.page import DRIVEN, write_page
+    from freeswing.report.page import driven_panels, write_page
 
     results = results_folder(named.parent, folder)
     material = read_material(named.resolve().parent.name, results, folder=str(named.parent))
@@ -74,7 +74,7 @@ def driven_page(named: Path, folder: str | None) -> tuple[Path, Material]:
         todo = f"freeswing {'design' if named.name == 'robot.toml' else 'drive'} {named}"
         raise InputError(why or f"{results}: nothing to show of a driven robot yet: {todo}")
     page = results / "report.html"
-    write_page(page, material, DRIVEN)
+    write_page(page, material, driven_panels(material))
     return page, material
 
 

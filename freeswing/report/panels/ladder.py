@@ -46,10 +46,10 @@ class EffectLadder:
 
 def effect_rows(effect: FoundEffect) -> list[dict[str, str]]:
     """The numbers of an accepted effect with their 95 % intervals."""
-    name = plain(effect.effect) + (f" (part {effect.part})" if effect.part else "")
+    name = _named(effect)
     rows = []
     for parameter in effect.parameters:
-        row = parameter_row(parameter)
+        row = parameter_row(parameter, effect.effect)
         size = f"{row['value']} ± {row['half_width']} {row['unit']}"
         rows.append({"effect": name, "number": row["name"], "value ± 95 %": size})
     return rows
@@ -67,7 +67,12 @@ def _gain(entry: Candidate) -> float:
 def _rival(entry: Candidate) -> str:
     others = ", ".join(plain(name) for name in entry.confounded_with)
     tail = f" {entry.experiment}" if entry.experiment else ""
-    return f"{plain(entry.effect)} cannot be told from {others}.{tail}"
+    return f"{_named(entry)} cannot be told from {others}.{tail}"
+
+
+def _named(one: Candidate | FoundEffect) -> str:
+    """An effect with the cable or motor that it is of."""
+    return plain(one.effect) + (f" ({one.part})" if one.part else "")
 
 
 def _rows(candidates: list[Candidate]) -> list[dict[str, str]]:
@@ -79,7 +84,7 @@ def _rows(candidates: list[Candidate]) -> list[dict[str, str]]:
 
 def _row(entry: Candidate) -> dict[str, str]:
     row = {
-        "candidate": plain(entry.effect) + (f" ({entry.part})" if entry.part else ""),
+        "candidate": _named(entry),
         "verdict": plain(entry.verdict),
         "error taken away on held-out runs (%)": _percent(entry.held_out_gain),
     }
@@ -122,7 +127,7 @@ def _chart(candidates: list[Candidate]) -> object:
                 va="center",
                 fontsize=7.5,
             )
-        axes.set_yticks(range(len(shown)), [plain(one.effect) for one in shown])
+        axes.set_yticks(range(len(shown)), [_named(one) for one in shown])
         axes.invert_yaxis()
         axes.margins(x=0.25)
         axes.set_xlabel(what)
