@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import welch
 
 from freeswing.cdpr.effects import driven_catalogue
 from freeswing.cdpr.files.documents import InputError
@@ -113,6 +112,8 @@ def _short(values: Array) -> Array:
 
 def _spectrum(fit: RunFit) -> tuple[Array, Array]:
     """Power of the angles' residuals, motors together: rates (k,) and rad2/Hz (k,)."""
+    from scipy.signal import welch  # takes a second to import, and few commands need it
+
     gaps, rate = fit.gaps_rad, fit.run.rate_hz
     piece = min(len(gaps), round(SPECTRUM_S * rate))
     rates, power = welch(gaps, rate, nperseg=piece, axis=0)

@@ -11,7 +11,7 @@ from freeswing.cdpr.model.batch import evaluate
 
 Array = NDArray[np.float64]
 
-MOST_ITERATIONS = 20
+MOST_ITERATIONS = 60  # a drum 2 % off takes 24
 # Metres and radians: a thousandth of an encoder step. Angles that fit no pose exactly (elastic
 # cables, other geometry) make the iteration's end linear rather than quadratic.
 DONE = 1e-8

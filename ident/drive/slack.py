@@ -52,8 +52,8 @@ def before_slack(
         theta: their numbers.
         runs: whole recordings.
         zero: L / r where the angles are zero, (n,).
-        at_least: numbers that a search only starts from may see slack where none is: `SHORTEST_S`
-            of each run stay then.
+        at_least: numbers that a search only starts from may see slack where none is, or not
+            follow a run at all: `SHORTEST_S` of each run stay then, or all of it.
 
     Raises:
         ValueError: when too little is left of one, or it cannot be simulated.
@@ -62,7 +62,12 @@ def before_slack(
 
 
 def _cut(model: DrivenModel, theta: Array, run: DriveRun, zero: Array, at_least: bool) -> DriveRun:
-    motion = simulated(model, theta, run, start_pose(model, theta, run, zero))
+    try:
+        motion = simulated(model, theta, run, start_pose(model, theta, run, zero))
+    except ValueError:
+        if at_least:
+            return run
+        raise
     until = first_slack(motion)
     if until == len(motion.times_s):
         return run

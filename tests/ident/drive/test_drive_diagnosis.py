@@ -99,7 +99,7 @@ def test_a_motor_that_rubs_is_found_and_a_stand_in_is_not_accepted(tmp_path, cap
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "truth"), FLAWS.items())
 def test_what_is_missing_is_found_with_its_part(tmp_path, name, truth):
-    document = diagnosed(write_flawed(tmp_path, 62, 5.0, {name: truth}))
+    document = diagnosed(write_flawed(tmp_path, 62, 1.5, {name: truth}))
     value, std = value_of(document, name)
     assert abs(value - truth) < max(3.0 * std, 0.05 * truth), (value, std)
     assert len(document["accepted"]) == 1, document["accepted"]
@@ -109,7 +109,7 @@ def test_what_is_missing_is_found_with_its_part(tmp_path, name, truth):
 
 @pytest.mark.slow
 def test_an_undeclared_weight_is_found_with_its_place(tmp_path):
-    document = diagnosed(write_flawed(tmp_path, 65, 2.0, WEIGHT))
+    document = diagnosed(write_flawed(tmp_path, 65, 1.5, WEIGHT))
     for name, truth in WEIGHT.items():
         value, std = value_of(document, name)
         assert abs(value - truth) < max(3.0 * std, 0.05 * truth), (name, value, std)
@@ -118,7 +118,7 @@ def test_an_undeclared_weight_is_found_with_its_place(tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [63, 64])
 def test_nothing_is_found_where_nothing_is(tmp_path, seed):
-    document = diagnosed(write_flawed(tmp_path, seed, 5.0, {}))
+    document = diagnosed(write_flawed(tmp_path, seed, 1.5, {}))
     assert document["accepted"] == []
     assert not document["unexplained"]["present"]
     assert np.isclose(document["before"]["motor_rmse_rad"], document["after"]["motor_rmse_rad"])
