@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.cdpr.driven.model import DrivenModel, build_driven
+from freeswing.cdpr.driven.statics import CENTRE
 from freeswing.ident.drive.diagnose.candidates import Candidate
 from freeswing.ident.drive.joint import Estimate, Premise, Problem
 from freeswing.ident.drive.run_problem import (
@@ -15,7 +16,6 @@ from freeswing.ident.drive.run_problem import (
     gives_way,
     head_of,
     simulated,
-    start_pose,
     step_of,
 )
 from freeswing.ident.drive.unknowns import Asked, Group
@@ -122,9 +122,9 @@ def _refusal(given: Premise, larger: Grown, candidate: Candidate) -> str:
         theta[model.index(name)] += step_of(model, larger.theta, name)
         for run in given.runs:
             first = head_of(run, 0.0)
-            start = start_pose(model, larger.theta, first, given.offsets)
+            seen = first.record.poses[first.record.seen]
             try:
-                simulated(model, theta, first, start)
+                simulated(model, theta, first, seen[0] if len(seen) else CENTRE)
             except ValueError as error:
                 return str(error)
     return ""

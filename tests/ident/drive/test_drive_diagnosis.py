@@ -108,6 +108,16 @@ def test_what_is_missing_is_found_with_its_part(tmp_path, name, truth):
 
 
 @pytest.mark.slow
+def test_an_encoder_that_jumped_is_found_with_its_motor(tmp_path):
+    name, truth = "encoder_jump.jump_2_rad", 0.05
+    flaws = {name: truth, "encoder_jump.after_s": 0.6}
+    document = diagnosed(write_flawed(tmp_path, 62, 1.5, flaws))
+    value, std = value_of(document, name)
+    assert abs(value - truth) < max(3.0 * std, 0.05 * truth), (value, std)
+    assert [entry["part"] for entry in document["accepted"]] == ["2"]
+
+
+@pytest.mark.slow
 def test_an_undeclared_weight_is_found_with_its_place(tmp_path):
     document = diagnosed(write_flawed(tmp_path, 65, 1.5, WEIGHT))
     for name, truth in WEIGHT.items():
