@@ -294,6 +294,8 @@ def _held_out(session: DriveSession, fit: Fitted) -> dict[str, Any]:
 def _candidate(verdict: Verdict) -> dict[str, Any]:
     one = verdict.candidate
     entry = {"effect": one.effect} | ({"part": one.part} if one.part else {})
+    if verdict.fit is not None:
+        entry |= {"parameters": _numbers(one, verdict.fit)}
     return entry | {
         "verdict": verdict.verdict,
         "delta_bic": verdict.delta_bic if np.isfinite(verdict.delta_bic) else None,
@@ -304,15 +306,19 @@ def _candidate(verdict: Verdict) -> dict[str, Any]:
 
 
 def _accepted(one: Candidate, after: Fitted, below: Fitted, above: Fitted) -> dict[str, Any]:
-    names, found = after.found.asked.names, after.found
-    parameters = []
+    entry = {"effect": one.effect} | ({"part": one.part} if one.part else {})
+    return entry | {"parameters": _numbers(one, after), "evidence": _evidence(below, above)}
+
+
+def _numbers(one: Candidate, fit: Fitted) -> list[dict[str, Any]]:
+    """A candidate's numbers by a fit that has it."""
+    names, found, parameters = fit.found.asked.names, fit.found, []
     for group in one.groups:
         k = names.index(group.name)
         std = found.std[k] if found.determined[k] else None
         short = group.name.partition(".")[2]
         parameters.append({"name": short, "value": found.values[k], "std": std})
-    entry = {"effect": one.effect} | ({"part": one.part} if one.part else {})
-    return entry | {"parameters": parameters, "evidence": _evidence(below, above)}
+    return parameters
 
 
 def _evidence(below: Fitted, above: Fitted) -> list[dict[str, Any]]:

@@ -160,11 +160,7 @@ def diagnose(path: Path, results: str | None, only: list[str] | None, console: C
 def _say_missing(document: dict[str, Any], console: Console) -> None:
     for entry in document["accepted"]:
         part = f" of {entry['part']}" if "part" in entry else ""
-        values = ", ".join(
-            f"{p['name']} {p['value']:.4g} +- {p['std'] or float('nan'):.2g}"
-            for p in entry["parameters"]
-        )
-        console.say(f"  accepted: {entry['effect']}{part} ({values})")
+        console.say(f"  accepted: {entry['effect']}{part} ({_values(entry)})")
         for one in entry["evidence"][:2]:
             console.say(
                 f"    seen in {one['run']} from {one['from_s']:g} to {one['to_s']:g} s "
@@ -177,6 +173,9 @@ def _say_missing(document: dict[str, Any], console: Console) -> None:
     }
     for group in groups:
         console.say(f"  these recordings cannot tell apart: {', '.join(group)}")
+        for entry in document["candidates"]:
+            if _label(entry) in group and "parameters" in entry:
+                console.say(f"    if it is {_label(entry)}: {_values(entry)}")
     left = document["unexplained"]
     if left["present"]:
         console.complain(f"none of these explains what remains: {left['signature']}")
@@ -188,6 +187,14 @@ def _say_missing(document: dict[str, Any], console: Console) -> None:
             f"  held-out runs: motor angles off by {before['motor_rmse_rad']:.2g} rad before, "
             f"{after['motor_rmse_rad']:.2g} after (counts leave {after['motor_noise_rad']:.2g})"
         )
+
+
+def _values(entry: dict[str, Any]) -> str:
+    """Numbers of an effect with their deviations."""
+    return ", ".join(
+        f"{p['name']} {p['value']:.4g} +- {p['std'] or float('nan'):.2g}"
+        for p in entry["parameters"]
+    )
 
 
 def _label(entry: dict[str, Any]) -> str:

@@ -46,6 +46,7 @@ class Verdict:
         held_out_gain: share of the held-out excess over the noise that it takes away.
         confounded_with: labels of what the data cannot tell it from.
         reason: a sentence.
+        fit: with it, where the data cannot tell it from others: what it would be.
     """
 
     candidate: Candidate
@@ -54,6 +55,7 @@ class Verdict:
     held_out_gain: float
     confounded_with: tuple[str, ...] = ()
     reason: str = ""
+    fit: Fitted | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,9 +92,11 @@ class _Search:
     def top(self) -> Fitted:
         return self.ladder[-1]
 
-    def say(self, one: Candidate, verdict: str, reason: str, *figures: float, beside=()) -> None:
+    def say(
+        self, one: Candidate, verdict: str, reason: str, *figures: float, beside=(), fit=None
+    ) -> None:
         bic, gain = figures or (0.0, 0.0)
-        self.verdicts[one.label] = Verdict(one, verdict, bic, gain, tuple(beside), reason)
+        self.verdicts[one.label] = Verdict(one, verdict, bic, gain, tuple(beside), reason, fit)
 
 
 def diagnose_drive(
@@ -172,7 +176,7 @@ def _climb(search: _Search, only: Collection[str] | None) -> bool:
             names = [other.label for other in group if other is not one]
             figures = fit.bic_beside(base), share_closed(base, fit)
             reason = f"these recordings cannot tell it from {', '.join(names)}"
-            search.say(one, "confounded", reason, *figures, beside=names)
+            search.say(one, "confounded", reason, *figures, beside=names, fit=fit)
         return False
     search.ladder.append(best)
     search.leads.append(min((fit.times_noise for fit in others), default=np.inf))

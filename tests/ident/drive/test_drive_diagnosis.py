@@ -23,7 +23,6 @@ FLAWS = {
     "attachment_offset.offset_3_x_m": 4e-3,
     "anchor_offset.offset_2_z_m": 15e-3,
     "drum_radius.added_4_m": 0.02 * 0.0175,
-    "gravity_tilt.tilt_x_rad": 0.01,
     "pose_latency.added_s": 0.002,
 }
 WEIGHT = {
@@ -105,6 +104,21 @@ def test_what_is_missing_is_found_with_its_part(tmp_path, name, truth):
     assert len(document["accepted"]) == 1, document["accepted"]
     after = document["after"]
     assert after["motor_rmse_rad"] < 1.2 * after["motor_noise_rad"], after
+
+
+@pytest.mark.slow
+def test_a_tilt_is_a_constant_force_too(tmp_path):
+    """Motors feel no gravity: on a platform hung at its centre both are one, and are said to be."""
+    name, truth = "gravity_tilt.tilt_x_rad", 0.01
+    document = diagnosed(write_flawed(tmp_path, 62, 1.5, {name: truth}))
+    assert document["accepted"] == []
+    assert not document["unexplained"]["present"]
+    said = {e["effect"]: e for e in document["candidates"] if e["verdict"] == "confounded"}
+    assert set(said) == {"gravity_tilt", "constant_force"}
+    assert said["gravity_tilt"]["confounded_with"] == ["constant_force"]
+    told = {p["name"]: p for p in said["gravity_tilt"]["parameters"]}["tilt_x_rad"]
+    assert abs(told["value"] - truth) < max(3.0 * told["std"], 0.05 * truth), told
+    assert said["gravity_tilt"]["held_out_gain"] > 0.99
 
 
 @pytest.mark.slow
