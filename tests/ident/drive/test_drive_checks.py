@@ -54,7 +54,7 @@ def swapped(names, values):
 
 
 def swapped_currents(names, values):
-    a, b = names.index("I3_A"), names.index("I7_A")
+    a, b = names.index("I1_A"), names.index("I5_A")
     values[:, [a, b]] = values[:, [b, a]]
     return values
 
@@ -99,7 +99,7 @@ def test_commands_of_free_swings_say_which_take_it(made, capsys):
         ({"run": scaled("theta4", -1.0)}, ["run ident", "motor 4 falls where its cable is wound"]),
         ({"run": scaled("I", 1000.0)}, ["run ident", "look like mA"]),
         ({"run": swapped}, ["motors 2 and 5", "columns are swapped"]),
-        ({"run": swapped_currents}, ["currents of motors 3 and 7", "columns are swapped"]),
+        ({"run": swapped_currents}, ["currents of motors 1 and 5", "columns are swapped"]),
         ({"run": off}, ["current of motor 6 does not follow its reference"]),
         ({"static": scaled("theta", 57.29578)}, ["static poses: angles are 57", "degrees?"]),
         ({"static": scaled("theta", 4096 / 6.2832)}, ["static poses: angles are", "counts?"]),
@@ -123,6 +123,7 @@ def test_spoiled_recordings_end_with_1(made, tmp_path, capsys, how, words):
     assert not (folder / "results").exists()
 
 
+@pytest.mark.slow
 def test_what_no_run_excites_is_named_and_has_no_value(tmp_path, capsys):
     """All motors alike: the platform goes up and down, and nothing tells its inertia."""
     folder = write_session(tmp_path, 40, 0.06, robot="robot.toml")
@@ -135,7 +136,7 @@ def test_what_no_run_excites_is_named_and_has_no_value(tmp_path, capsys):
         record = observed(motion, CENTRE, INSTRUMENTS, np.random.default_rng(len(name)))
         write_drive_run(folder / f"{name}.csv", record)
     head, _, tail = TOML.partition("[unknown]")
-    few = '[unknown]\ndynamic = ["mass_kg", "Ixx_kg_m2", "coulomb_N_m"]\n[static]'
+    few = '[unknown]\nkinematic = ["drum_m"]\ndynamic = ["mass_kg", "Ixx_kg_m2"]\n[static]'
     (folder / "drive.toml").write_text(head + few + tail.partition("[static]")[2])
     assert main(["drive", str(folder), "--quiet"]) == 0
     assert "Ixx_kg_m2 is not determined by these recordings" in capsys.readouterr().err
