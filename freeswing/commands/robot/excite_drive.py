@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from freeswing.commands.arguments import not_negative, positive, whole
 from freeswing.console import Console
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from freeswing.cdpr.driven.model import DrivenModel
     from freeswing.ident.drive.plan.deviations import Bench
     from freeswing.ident.drive.plan.plan_poses import Poses
@@ -70,8 +71,7 @@ def run_drive(options: Namespace, console: Console) -> None:
     from freeswing.ident.drive.plan.plan_poses import plan_poses, single_motors
     from freeswing.ident.drive.plan.plan_record import Limits, plan_record
 
-    path = Path(options.robot)
-    path = path / "robot.toml" if path.is_dir() else path
+    path = options.robot
     bench, limits = _bench(path, options), Limits(options.margin_n, options.room)
     folder = results_folder(path.parent, options.results)
     try:

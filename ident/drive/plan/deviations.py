@@ -90,6 +90,9 @@ def relative_deviations(bench: Bench, motion: DrivenMotion, static: StaticPoses)
 
     Cramer and Rao's bound of the joint estimate: start pose, start currents and the true poses at
     rest are unknown too.
+
+    Source:
+        Ljung 1999, System Identification, sec. 7.4; start and poses are eliminated as there.
     """
     model, asked = bench.model, bench.asked
     exact = Instruments(bench.instruments.pose_rate_hz, bench.instruments.latency_s)

@@ -98,7 +98,8 @@ def test_a_motor_that_rubs_is_found_and_a_stand_in_is_not_accepted(tmp_path, cap
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "truth"), FLAWS.items())
 def test_what_is_missing_is_found_with_its_part(tmp_path, name, truth):
-    document = diagnosed(write_flawed(tmp_path, 62, 1.5, {name: truth}))
+    seed = 66 if name.startswith("torque") else 62  # motor 1 has no current in that of 62
+    document = diagnosed(write_flawed(tmp_path, seed, 1.5, {name: truth}))
     value, std = value_of(document, name)
     assert abs(value - truth) < max(3.0 * std, 0.05 * truth), (value, std)
     assert len(document["accepted"]) == 1, document["accepted"]
