@@ -61,7 +61,21 @@ SERVO = "tests/servo/test_servo_limits.py"
 FIDIM = "tests/ident/fidim/test_fidim_limits.py"
 MARKERS = "tests/freeswing/doctor/test_marker_limits.py"
 
+SPOTS = "tests/cdpr/markers/test_marker_decisions.py"
+
 HELD = (
+    Held(
+        "cdpr/markers/spacing.py",
+        (
+            "JUMP_M", "JUMP_DEVIATIONS", "UNIT_TOLERANCE", "SMALLEST_PLATFORM_M",
+            "LARGEST_PLATFORM_M", "LABELS_FIT_M", "RENAMED_BETTER",
+        ),
+        SPOTS,
+    ),
+    Held("cdpr/markers/rigidity.py", ("SPOILS", "LEAST_SPOILT_M"), SPOTS),
+    Held("cdpr/markers/slow_residuals.py", ("CHANCE",), SPOTS),
+    Held("cdpr/markers/layout.py", ("CLEAR", "DIFFERENT_M"), SPOTS),
+    Held("cdpr/markers/session_markers.py", ("MOST_OPEN_M",), SPOTS),
     Held("ident/fidim/fidim.py", ("WELL_IDENTIFIED_PERCENT", "NEAR_ZERO", "GOOD_COST"), FIDIM),
     Held("ident/fidim/total_least_squares.py", ("LEAST_GAP", "SMALLEST_RATIO"), FIDIM),
     Held("ident/judge/consistency.py", ("_SIGNIFICANT",), FIDIM),
