@@ -49,17 +49,32 @@ def best_start(given: Premise, asked: Asked, starts: Sequence[Array]) -> Premise
     return replace(given, theta=starts[int(np.argmin(costs))])
 
 
-def followed(given: Premise, asked: Asked) -> Estimate:
+def followed(
+    given: Premise, asked: Asked, first_s: float = FIRST_HEAD_S, lost: float = np.inf
+) -> Estimate:
     """The estimate to which longer and longer heads of the runs lead.
 
     A cable's own swings tell its stiffness, and of a whole run only within a radian at its end:
-    from farther off the search ends in another minimum, where they are a turn apart.
+    from farther off the search ends in another minimum, where they are a turn apart. What a wrong
+    drum does grows along a run in the same way.
+
+    Args:
+        given: what the fit takes as given, where the search begins.
+        asked: the unknowns.
+        first_s: the first heads' length.
+        lost: a head with a larger mean square over the noise is not followed any farther.
+
+    Raises:
+        ValueError: where a head is lost, or a run cannot be simulated.
     """
     longest = max(len(run.record.times_s) / run.rate_hz for run in given.runs)
-    seconds = FIRST_HEAD_S
+    seconds = first_s
     while seconds < longest:
         heads = tuple(head_of(run, seconds) for run in given.runs)
         found = estimate(replace(given, runs=heads), asked, HEAD_STEPS)
+        at = found.found.normal
+        if 2.0 * at.cost > lost * at.n:
+            raise ValueError(f"the first {seconds:g} s of the runs are not explained")
         given = replace(given, theta=found.theta, offsets=found.offsets)
         seconds *= 2.0
     return estimate(given, asked)
