@@ -71,7 +71,8 @@ def driven_page(named: Path, folder: str | None) -> tuple[Path, Material]:
     material = read_material(named.resolve().parent.name, results, folder=str(named.parent))
     if material.control is None and material.drive is None:
         why = material.why_absent("control", "drive")
-        todo = f"freeswing {'design' if named.name == 'robot.toml' else 'drive'} {named}"
+        todo = f"freeswing design {named.parent}"
+        todo += "" if named.name == "robot.toml" else f", or freeswing drive {named}"
         raise InputError(why or f"{results}: nothing to show of a driven robot yet: {todo}")
     page = results / "report.html"
     write_page(page, material, driven_panels(material))
