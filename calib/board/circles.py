@@ -34,6 +34,10 @@ def find_circles(
         counts: circles across and down.
         plane: their middles on the board, row by row, (n, 2).
         asymmetric: every second row is shifted by half a step.
+
+    Source:
+        Heikkila 2000, Geometric camera calibration using circular control points, as OpenCV finds
+        such grids.
     """
     parameters = cv2.SimpleBlobDetector.Params()
     parameters.minArea, parameters.maxArea = _LEAST_AREA_PX2, 0.05 * image.size

@@ -145,7 +145,12 @@ def solve_rig(
 
 
 def shape_std_m(board_points_m: Array) -> Array:
-    """How far a board's shape is from its drawing before anything was seen: sags, growth, (3,)."""
+    """How far a board's shape is from its drawing before anything was seen: sags, growth, (3,).
+
+    Source:
+        Bishop 2006, Pattern Recognition and Machine Learning, sec. 3.3: a Gaussian prior; its sizes
+        are shares of the board's.
+    """
     board_points_m = board_points_m[: board_size(board_points_m)]
     modes = np.abs(shape_modes(board_points_m))
     plane = board_points_m[:, :2]

@@ -17,11 +17,13 @@ from freeswing.ident.drive.run_problem import DriveRun
 Array = NDArray[np.float64]
 
 JUMP = 0.5  # of a sample period: a time stamp that far off is another row's
-WRONG_RATE = 0.01
+WRONG_RATE = 0.01  # another rate is off by a factor, a clock by 1e-4
 # Units: milliampere are 1000 times the current that flows, and between 1 and 1000 lies no unit.
 MILLI = 30.0
 UNLIKE_CURRENT = 0.5  # of the current's own scatter: the loop follows its reference to 1 %
-DEGREES = (30.0, 110.0)  # slope of angles against those of the poses; 57.3 with geometry 30 % off
+# Slope of angles against those of the poses: 57.3 for degrees, where geometry is 30 % off 40 to 82.
+LEAST_DEGREES = 30.0
+MOST_DEGREES = 110.0
 COUNTS = 150.0  # 4096 counts a turn are 652 a radian; 1024 are 163
 ALIKE = 0.9  # correlation of a motor's angle with its own cable's: 0.99 with geometry 30 % off
 STRANGER = 0.97  # with another's cable, where columns are swapped
@@ -180,7 +182,7 @@ def _unit(where: str, size: float) -> list[str]:
     """What angles are in that move so many times as far as the poses' own."""
     if size > COUNTS:
         return [f"{where}: angles are {size:.0f} times those of the poses: counts? write rad"]
-    if DEGREES[0] < size < DEGREES[1]:
+    if LEAST_DEGREES < size < MOST_DEGREES:
         return [f"{where}: angles are {size:.1f} times those of the poses: degrees? write rad"]
     return []
 

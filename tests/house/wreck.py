@@ -89,14 +89,15 @@ HELD = (
     Held(
         "ident/drive/checks.py",
         (
-            "JUMP", "MILLI", "UNLIKE_CURRENT", "COUNTS", "ALIKE", "STRANGER", "LATENCY_S",
-            "START_S", "START_COUNTS", "LEAST_MOTION", "ODD_ROW",
+            "JUMP", "WRONG_RATE", "MILLI", "UNLIKE_CURRENT", "LEAST_DEGREES", "MOST_DEGREES",
+            "COUNTS", "ALIKE", "STRANGER", "LATENCY_S", "START_S", "START_COUNTS", "LEAST_MOTION",
+            "ODD_ROW",
         ),
         DRIVE,
     ),
     Held(
         "ident/drive/diagnose/diagnose.py",
-        ("LEAST_BIC", "CONFOUNDED", "MOST_EFFECTS", "WELL", "HALVED", "LEAD"),
+        ("REFITTED", "LEAST_BIC", "CONFOUNDED", "MOST_EFFECTS", "WELL", "HALVED", "LEAD"),
         CHOICE,
     ),
     Held("ident/drive/joint.py", ("DYNAMIC_REACH", "KINEMATIC_REACH"), CHOICE),

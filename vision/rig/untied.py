@@ -50,6 +50,9 @@ def untied_shifts(
 
     Raises:
         DataError: when a camera has moved by more than calibrations leave.
+
+    Source:
+        Triggs et al. 2000, Bundle Adjustment - A Modern Synthesis, sec. 6: poses eliminated.
     """
     held = [len(base_tag_misses(view, watch)[1]) >= _LEAST_TAGS for view in views]
     if len(views) < 2 or all(held) or not watch.tags or int(poses.known.sum()) < _LEAST_KNOWN:

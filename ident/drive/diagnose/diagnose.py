@@ -22,7 +22,7 @@ from freeswing.ident.drive.inverse_dynamics import inverse_dynamics
 from freeswing.ident.drive.joint import Problem
 from freeswing.ident.drive.slack import before_slack
 
-REFITTED = 4
+REFITTED = 4  # a round: the screen orders them well, and each takes seconds
 # A candidate must be worth this much BIC, as must a lead over its rivals.
 LEAST_BIC = 10.0
 CONFOUNDED = 12.0
