@@ -36,6 +36,7 @@ NAMES = {
     "demo": "demo",
     "export": "export",
     "front": "usage",
+    "doctor": "findings",
     "excite": "plan",
     "homing": "homing",
     "ident": "fit",

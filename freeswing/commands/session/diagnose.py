@@ -51,6 +51,7 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
 
     from freeswing.cdpr.effects import catalogue
     from freeswing.cdpr.files.documents import DataError, InputError
+    from freeswing.doctor.quaternions import refuse_mistaken_quaternions
     from freeswing.ident.diagnose.diagnose import diagnose
     from freeswing.results.diagnosis import Diagnosis
     from freeswing.results.motion_from_results import ladder_motions
@@ -73,6 +74,7 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
         )
     swings = list(load_swings(session, robot, load_target(session)))
     refuse_repeated(swings)
+    refuse_mistaken_quaternions(swings, robot)
     refuse_exchanged_lengths(swings, robot)
     candidates = None if only is None else tuple(only)
     count = crew.processes or os.cpu_count() or 1

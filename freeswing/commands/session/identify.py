@@ -67,6 +67,7 @@ def run(options: Namespace, console: Console) -> None:
 def make(session: Session, console: Console, settings: dict[str, Any], crew: Crew) -> Made:
     """identification.json and motion.json as documents."""
     from freeswing.cdpr.files.documents import InputError
+    from freeswing.doctor.quaternions import refuse_mistaken_quaternions
     from freeswing.ident.identify import IdentifySettings, identify
     from freeswing.ident.likelihood.cable_ends import GeometryPriors
     from freeswing.ident.swing_places import swing_places
@@ -87,6 +88,7 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
     markers = read_marker_runs(session, target)
     swings = load_swings(session, robot, target, markers)
     refuse_repeated(swings)
+    refuse_mistaken_quaternions(swings, robot)
     refuse_exchanged_lengths(swings, robot)
     try:
         geometry = GeometryPriors(settings.get("entry_std_m"), settings.get("attachment_std_m"))

@@ -1,0 +1,72 @@
+"""Orientations that were meant otherwise: named with the remedy, before anything is fitted."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from freeswing.cdpr.files.robot_file import read_robot
+from freeswing.cdpr.files.trajectory_files import read_trajectory
+from freeswing.cdpr.measured.trajectory import Trajectory
+from freeswing.doctor.quaternions import READINGS, mistaken_quaternions
+from freeswing.ident.runs import SwingRun
+from freeswing.main import main
+from tests.places import SAMPLES
+
+SAMPLE = SAMPLES / "three-cables"
+ROBOT = read_robot(SAMPLE / "robot.toml")
+ORDERS = {"wxyz": [0, 1, 2, 3], "xyzw": [1, 2, 3, 0]}
+
+
+def written(path: Path, order: str, inverse: bool) -> None:
+    """A run's file again, its quaternions in another order or those of the inverse."""
+    lines = path.read_text(encoding="utf-8").splitlines()
+    rows = [line.split(",") for line in lines[1:]]
+    made = [lines[0]]
+    for row in rows:
+        q = [row[4], *(str(-float(c)) if inverse and c else c for c in row[5:8])]
+        made.append(",".join([*row[:4], *(q[k] for k in ORDERS[order]), *row[8:]]))
+    path.write_text("\n".join(made) + "\n", encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("order", "inverse", "said"),
+    [
+        ("xyzw", False, "quaternions stand as x y z w:"),
+        ("wxyz", True, "orientations are those of the base in the platform:"),
+        ("xyzw", True, "quaternions stand as x y z w, of the base in the platform:"),
+    ],
+)
+def test_each_is_named(order: str, inverse: bool, said: str, tmp_path: Path) -> None:
+    path = tmp_path / "swing-01.csv"
+    shutil.copy(SAMPLE / "runs" / "swing-01.csv", path)
+    written(path, order, inverse)
+    run = SwingRun("swing-01", "identify", read_trajectory(path))
+    found, remedy = mistaken_quaternions(run, ROBOT)
+    assert found.startswith(said), found
+    assert remedy == READINGS[said[:-1]][1]
+
+
+@pytest.mark.parametrize("command", ["check", "identify", "diagnose"])
+def test_commands_name_it(command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    shutil.copytree(SAMPLE, tmp_path / "session")
+    for path in (tmp_path / "session" / "runs").glob("*.csv"):
+        written(path, "xyzw", False)
+    assert main([command, str(tmp_path / "session")]) == 1
+    told = capsys.readouterr()
+    assert "run swing-01" in told.out + told.err
+    assert "quaternions stand as x y z w: cable lengths are off by" in told.out + told.err
+    assert "write w into qw" in told.out + told.err
+
+
+def test_what_is_right_and_what_is_merely_wrong_is_not_named() -> None:
+    right = SwingRun("a", "identify", read_trajectory(SAMPLE / "runs" / "swing-01.csv"))
+    assert mistaken_quaternions(right, ROBOT) == ("", "")
+    seen = right.trajectory
+    moved = Trajectory.from_poses(seen.times_s, seen.positions() + 0.3, seen.rotations())
+    far = replace(right, trajectory=moved, lengths_m=np.array([1.0, 1.0, 1.0]))
+    assert mistaken_quaternions(far, ROBOT) == ("", "")
