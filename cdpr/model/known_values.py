@@ -1,12 +1,13 @@
-"""What is known beforehand of a model's values, as a joint Gaussian."""
+"""What is known of a model's values beforehand, a joint Gaussian; models with other effects."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from freeswing.cdpr.model.equations import IntArray, Model
+from freeswing.cdpr.model.equations import IntArray, Model, build_model
 from freeswing.cdpr.robot import Array
 
 
@@ -44,3 +45,27 @@ def with_known(
     together[places] = together[:, places] = 0.0
     together[np.ix_(places, places)] = covariance / np.outer(stds, stds)
     return replace(model, parameters=tuple(parameters), correlations=together)
+
+
+def with_effects(model: Model, names: Sequence[str]) -> Model:
+    """A model with further effects; what is known of those that it has stays known."""
+    more = build_model(model.robot, (*model.effects, *names))
+    known = model.parameters
+    parameters = (*known, *more.parameters[len(known) :])
+    together = model.correlations
+    if together is not None:
+        together = np.eye(len(parameters))
+        together[: len(known), : len(known)] = model.correlations
+    return replace(more, parameters=parameters, correlations=together)
+
+
+def without_effect(model: Model, name: str) -> Model:
+    """A model without one of its effects; what is known of the others stays known."""
+    kept = np.ones(len(model.parameters), dtype=bool)
+    kept[model.place_of(name)] = False
+    fewer = build_model(model.robot, tuple(other for other in model.effects if other != name))
+    parameters = tuple(one for one, stays in zip(model.parameters, kept, strict=True) if stays)
+    together = model.correlations
+    if together is not None:
+        together = together[np.ix_(kept, kept)]
+    return replace(fewer, parameters=parameters, correlations=together)

@@ -9,13 +9,13 @@ import numpy as np
 
 from freeswing.cdpr.effects import effect_named
 from freeswing.cdpr.model.equations import Model
-from freeswing.cdpr.model.known_values import with_known
+from freeswing.cdpr.model.known_values import with_effects, with_known, without_effect
 from freeswing.cdpr.robot import Array
 from freeswing.ident.diagnose.leave_one_out import Evidence, Score, score
 from freeswing.ident.diagnose.outstanding_runs import tempered
 from freeswing.ident.diagnose.screen import screen
 from freeswing.ident.diagnose.spectrum import residual_powers
-from freeswing.ident.diagnose.variants import effect_of, extended, inside, reduced
+from freeswing.ident.diagnose.variants import effect_of, inside
 from freeswing.ident.likelihood.blocks import each_run, effect_blocks, free_of
 from freeswing.ident.likelihood.fit_swings import LikelihoodFit, correlation_factor, fit
 from freeswing.ident.likelihood.joint_problem import State
@@ -101,7 +101,7 @@ def _joined(
     name, chosen = effect_of(key), inside(before.robot, key)
     if name in before.effects:
         return before, unknowns.estimating(name, chosen)
-    model = extended(before, (name,))
+    model = with_effects(before, (name,))
     count = sum(p.per_run for p in model.parameters[model.place_of(name)])
     return model, unknowns.joined(
         *effect_blocks(model, name, values, chosen, np.zeros((runs, count)))
@@ -156,7 +156,7 @@ def polished(found: LikelihoodFit, noise_scales: Array) -> Refit:
 def without(found: LikelihoodFit, name: str, noise_scales: Array) -> Refit:
     """A fit without one of its effects, from where it stands, converged."""
     mine = (name, each_run(name)) if each_run(name) in found.unknowns else (name,)
-    unknowns, fewer = found.unknowns.without(*mine), reduced(found.model, name)
+    unknowns, fewer = found.unknowns.without(*mine), without_effect(found.model, name)
     state = found.start_of(unknowns, fewer, found.scales)
     exact = fit(
         fewer, found.samples, state, free_of(unknowns, fewer), estimate_scales=False, grow=False

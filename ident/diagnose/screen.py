@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from freeswing.cdpr.model.equations import Model
-from freeswing.cdpr.model.known_values import prior_whitener
+from freeswing.cdpr.model.known_values import prior_whitener, with_effects
 from freeswing.cdpr.robot import Array
 from freeswing.cdpr.simulation.sensitivity import linearise
 from freeswing.ident.diagnose.leave_one_out import Evidence
-from freeswing.ident.diagnose.variants import effect_of, extended, inside
+from freeswing.ident.diagnose.variants import effect_of, inside
 from freeswing.ident.likelihood.blocks import columns_of, shared_size
 from freeswing.ident.likelihood.fit_swings import LikelihoodFit
 from freeswing.ident.likelihood.run_residuals import Samples, reduce_run
@@ -60,7 +60,7 @@ def screen(
             that a model does not reach count that much less beside the priors.
     """
     fresh = [n for n in dict.fromkeys(map(effect_of, keys)) if n not in fit.model.effects]
-    model = extended(fit.model, fresh) if fresh else fit.model
+    model = with_effects(fit.model, fresh) if fresh else fit.model
     values = model.start_values.copy()
     values[: len(fit.values)] = fit.values
     for name in fresh:

@@ -4,8 +4,12 @@ import numpy as np
 import pytest
 
 from freeswing.cdpr.model.equations import build_model
-from freeswing.cdpr.model.known_values import prior_whitener, with_known
-from freeswing.ident.diagnose.variants import extended, reduced
+from freeswing.cdpr.model.known_values import (
+    prior_whitener,
+    with_effects,
+    with_known,
+    without_effect,
+)
 from tests.oracle.robots import declared_robot
 
 PLACES = np.array([3, 4, 5])
@@ -30,9 +34,9 @@ def test_the_whitener_makes_the_joint_prior_of_unit_deviation(known):
 
 def test_what_is_known_stays_known_in_larger_and_smaller_models(known):
     model, covariance = known
-    larger = extended(model, ("translational_drag",))
-    for one in (larger, reduced(larger, "translational_drag")):
+    larger = with_effects(model, ("translational_drag",))
+    for one in (larger, without_effect(larger, "translational_drag")):
         whitener = prior_whitener(one)
         precision = (whitener.T @ whitener)[np.ix_(PLACES, PLACES)]
         assert np.linalg.inv(precision) == pytest.approx(covariance, rel=1e-9)
-    assert reduced(larger, "attachment_offset").correlations.shape == (2, 2)
+    assert without_effect(larger, "attachment_offset").correlations.shape == (2, 2)

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from freeswing.cdpr.model.equations import build_model
-from freeswing.cdpr.model.known_values import with_known
+from freeswing.cdpr.model.known_values import with_known, without_effect
 from freeswing.ident.diagnose.refit import BY_LENGTHS, _joined
-from freeswing.ident.diagnose.variants import reduced
 from freeswing.ident.likelihood.blocks import (
     INERTIA,
     PAYLOADS,
@@ -79,7 +78,7 @@ def test_the_blocks_are_the_vectors(found):
 
 def test_nothing_is_lost_where_an_effect_leaves(found):
     """Payloads stay, and so does what each run has for itself of another effect."""
-    fewer = reduced(found.model, EFFECTS[1])
+    fewer = without_effect(found.model, EFFECTS[1])
     left = found.unknowns.without(EFFECTS[1])
     state = found.start_of(left, fewer, found.scales)
     assert state.loads.tolist() == found.loads.tolist()
@@ -87,7 +86,7 @@ def test_nothing_is_lost_where_an_effect_leaves(found):
     assert state.values.tolist() == found.values[found.model.place_of(EFFECTS[0])].tolist()
     assert state.own_values.tolist() == found.state.own_values.tolist()
     none = found.unknowns.without(EFFECTS[0], each_run(EFFECTS[0]))
-    bare = found.start_of(none, reduced(found.model, EFFECTS[0]), found.scales)
+    bare = found.start_of(none, without_effect(found.model, EFFECTS[0]), found.scales)
     assert bare.own_values.shape == (2, 0)
     assert bare.loads.tolist() == found.loads.tolist()
     assert bare.values.tolist() == found.values[found.model.place_of(EFFECTS[1])].tolist()
