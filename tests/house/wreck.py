@@ -54,6 +54,7 @@ BENCH = "tests/ident/bench/test_bench_limits.py"
 
 DRIVE = "tests/ident/drive/test_drive_limits.py"
 CHOICE = "tests/ident/drive/test_drive_decisions.py"
+SEARCH = "tests/ident/drive/test_drive_search_limits.py"
 LIKELIHOOD = "tests/ident/likelihood/test_likelihood_limits.py"
 FILES = "tests/cdpr/files/test_file_limits.py"
 SERVO = "tests/servo/test_servo_limits.py"
@@ -100,6 +101,11 @@ HELD = (
         ("REFITTED", "LEAST_BIC", "CONFOUNDED", "MOST_EFFECTS", "WELL", "HALVED", "LEAD"),
         CHOICE,
     ),
+    Held("ident/drive/checks.py", ("CLEAR",), SEARCH),
+    Held("ident/drive/slack.py", ("SHORTEST_S", "LASTING_S", "MARGIN_S"), SEARCH),
+    Held("ident/drive/ramps.py", ("MOVED_STEPS", "LEAST_ROWS"), SEARCH),
+    Held("ident/drive/solver.py", ("MISFIT",), SEARCH),
+    Held("ident/drive/diagnose/refit.py", ("LOST",), SEARCH),
     Held("ident/drive/joint.py", ("DYNAMIC_REACH", "KINEMATIC_REACH"), CHOICE),
     Held("freeswing/results/drive.py", ("LARGEST_SHARE",), CHOICE),
     Held("ident/likelihood/calibration_modes.py", ("UNLIKELY",), LIKELIHOOD),
