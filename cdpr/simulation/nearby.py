@@ -132,6 +132,16 @@ class Surroundings:
         return local + (self.by_start @ states[..., None])[..., 0]
 
 
+def obeys(motion: Motion, tolerance_m: float) -> bool:
+    """Whether a motion's accelerations are its model's, to what moves a segment by a tolerance."""
+    t = table(motion.accelerations.shape[1])
+    times = motion.starts_s[:, None] + motion.steps_s[:, None] * t.nodes
+    state = (times, *_at_nodes(motion, t), motion.inertia, motion.values)
+    lacking = evaluate(only(motion.model.acceleration, 0), *state)[0] - motion.accelerations
+    moved = motion.steps_s[:, None, None] ** 2 * lacking
+    return bool(np.sqrt(np.sum(moved**2, (1, 2))).max() < tolerance_m)
+
+
 def _from(aimed: Motion, start: Array, found: Array, t: Table) -> Motion:
     """A motion whose segments join, from its start and node accelerations."""
     step = aimed.steps_s[:, None]

@@ -7,6 +7,7 @@ its transition, and the chain of transitions the whole motion.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -38,20 +39,35 @@ class Linearised:
 
     def at(self, times_s: Array) -> tuple[Array, Array]:
         """Derivatives of zeta and of the rates at times (n,), each (n, 6, 21 + k)."""
-        motion = self.motion
+        motion, (s, m) = self.motion, self.accelerations.shape[:2]
         index, fractions = motion.locate(times_s)
-        step = motion.steps_s[index, None, None]
-        _, once, twice = interpolation(motion.accelerations.shape[1], fractions)
-        nodes = self.accelerations.reshape(*self.accelerations.shape[:2], -1)
-        zetas = np.empty((len(index), nodes.shape[-1]))
-        rates = np.empty_like(zetas)
-        for k in np.unique(index):
-            inside = index == k
-            zetas[inside], rates[inside] = twice[inside] @ nodes[k], once[inside] @ nodes[k]
-        start = self.states[index]
-        shape = (len(index), 6, -1)
-        moved = start[:, :6] + step * fractions[:, None, None] * start[:, 6:]
-        return moved + step**2 * zetas.reshape(shape), start[:, 6:] + step * rates.reshape(shape)
+        once = interpolation(m, fractions)[1]
+        step = motion.steps_s[:, None, None]
+        nodes, speeds = self.accelerations.reshape(s, m, -1), self.states[:, 6:].reshape(s, 1, -1)
+        parts = np.concatenate([speeds, step * nodes], axis=1)
+        rates = _combined(np.column_stack([np.ones(len(index)), once]), parts, index)
+        return self.poses_at(times_s), rates.reshape(len(index), 6, -1)
+
+    def poses_at(self, times_s: Array) -> Array:
+        """Derivatives of zeta alone at times (n,), (n, 6, 21 + k)."""
+        motion, (s, m) = self.motion, self.accelerations.shape[:2]
+        index, fractions = motion.locate(times_s)
+        twice = interpolation(m, fractions)[2]
+        step = motion.steps_s[:, None, None]
+        states = self.states.reshape(s, 2, -1) * np.concatenate([np.ones_like(step), step], axis=1)
+        parts = np.concatenate([states, step**2 * self.accelerations.reshape(s, m, -1)], axis=1)
+        weights = np.column_stack([np.ones(len(index)), fractions, twice])
+        return _combined(weights, parts, index).reshape(len(index), 6, -1)
+
+
+def _combined(weights: Array, parts: Array, index: np.ndarray) -> Array:
+    """Each row of weights (n, q) times the parts (s, q, c) of its segment, (n, c)."""
+    found = np.empty((len(index), parts.shape[-1]))
+    edges = [0, *(np.flatnonzero(np.diff(index)) + 1).tolist(), len(index)]
+    for first, last in pairwise(edges):
+        if last > first:
+            np.matmul(weights[first:last], parts[index[first]], out=found[first:last])
+    return found
 
 
 def linearise(motion: Motion, still: int = 0) -> Linearised:

@@ -35,6 +35,8 @@ NO_WORSE_OF_GAIN = 0.1
 # application differ a little from reality, and 0.1 mm samples see it.
 LEAST_GAIN_LATER = 0.25
 LEAST_EXCESS_LATER = 0.005
+# What promises less than this of the excess to first order does not come to a quarter once fitted.
+LEAST_PROMISE_LATER = 0.05
 # What may well be it instead of the best: more probable than this, or behind by no more than e^6 in
 # the likelihood of left-out runs. A gain that 15 % of the runs contradict is none.
 RIVAL = 0.05
@@ -110,7 +112,11 @@ def by_lengths(place: WrongPlace, share: float) -> tuple[Candidate, ...]:
 
 
 def promising(
-    current: Refit, linear: dict[str, Score], colour: float, tried: Collection[str] = ()
+    current: Refit,
+    linear: dict[str, Score],
+    colour: float,
+    tried: Collection[str] = (),
+    later: bool = False,
 ) -> list[str]:
     """The next candidates worth fitting, those nearest to the linear best first.
 
@@ -124,16 +130,21 @@ def promising(
         linear: what each makes of the linear evidence.
         colour: of the current residual.
         tried: keys that were fitted.
+        later: whether something was accepted before: a further effect must be worth its place.
     """
+    count = float(current.evidence.counts.sum())
+    excesses = current.held_out - count, (current.score.cost - count) / colour
     held_out = {n: current.held_out - float(one.held_out.sum()) for n, one in linear.items()}
     likelihood = {
         n: (current.score.cost - one.cost) / colour - penalty(current, n)
         for n, one in linear.items()
     }
     chosen: list[str] = []
-    for gains in (held_out, likelihood):
+    for gains, excess in zip((held_out, likelihood), excesses, strict=True):
         ranked = _best_of_each(sorted(gains, key=lambda n: -gains[n]))
-        least = LEAST_GAIN if tried else max(NEARLY_AS_GOOD * gains[ranked[0]], LEAST_GAIN)
+        share = NEARLY_AS_GOOD * gains[ranked[0]] if not tried else 0.0
+        share = max(share, LEAST_PROMISE_LATER * excess) if later else share
+        least = max(share, LEAST_GAIN)
         further = [n for n in ranked if gains[n] > least and n not in tried]
         chosen += [n for n in further[:REFITTED] if n not in chosen]
     return chosen

@@ -315,16 +315,15 @@ def _ladder(
     stages: list[Refit] = [search.rounds[0].before, *(one.after for one in accepted[:-1])]
     stages += [last] if accepted else []
     rungs = []
-    for k, stage in enumerate(stages):
-        if progress:
-            progress("before and after", k / len(stages))
-        found = stage.fit
-        rungs.append(
-            Rung(
-                claims(stage.effects),
-                held_out(found.model, runs, free, found.inertia, found.values),
-            )
-        )
+    with search.pool_of() as pool:
+        confronted = [
+            held_out(one.model, runs, free, one.inertia, one.values, pool)
+            for one in (stage.fit for stage in stages)
+        ]
+        for k, (stage, seen) in enumerate(zip(stages, confronted, strict=True)):
+            if progress:
+                progress("before and after", k / len(stages))
+            rungs.append(Rung(claims(stage.effects), seen()))
     return tuple(rungs)
 
 

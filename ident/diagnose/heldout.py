@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from concurrent.futures import Executor
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -100,8 +103,9 @@ def held_out(
     free: tuple[str, ...] | None,
     inertia: Array,
     values: Array,
-) -> HeldOut:
-    """Confront validation runs with a model.
+    pool: Executor | None = None,
+) -> Callable[[], HeldOut]:
+    """Confront validation runs with a model: begun at once, and waited for where it is called.
 
     Args:
         model: with its effects.
@@ -109,8 +113,13 @@ def held_out(
         free: the coordinates measured, or None for full poses.
         inertia: (9,).
         values: effect values, (k,).
+        pool: runs side by side; None: one after another, when they are asked for.
     """
-    return HeldOut(tuple(_one(model, run, free, inertia, values) for run in runs))
+    jobs = [(model, run, free, inertia, values) for run in runs]
+    calls = [
+        pool.submit(_one, *job).result if pool is not None else partial(_one, *job) for job in jobs
+    ]
+    return lambda: HeldOut(tuple(call() for call in calls))
 
 
 def _one(

@@ -18,7 +18,7 @@ from freeswing.ident.diagnose.spectrum import residual_powers
 from freeswing.ident.diagnose.variants import effect_of, inside
 from freeswing.ident.likelihood.blocks import each_run, effect_blocks, free_of
 from freeswing.ident.likelihood.fit_swings import LikelihoodFit, correlation_factor, fit
-from freeswing.ident.likelihood.joint_problem import State
+from freeswing.ident.likelihood.joint_problem import State, with_motions
 from freeswing.ident.likelihood.unknowns import Unknowns
 
 RANKING_STEPS = 12
@@ -88,6 +88,7 @@ def refit(
     runs = len(current.samples)
     model, unknowns = _joined(current.model, current.unknowns, candidate, values, runs)
     state = current.start_of(unknowns, model, noise_scales * np.sqrt(colour))
+    state = with_motions(state, model, current.motions, RANKING_ACCURACY_M)
     return rescored(_fitted(model, current, state, free_of(unknowns, model)), noise_scales, colour)
 
 

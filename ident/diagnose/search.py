@@ -97,7 +97,7 @@ class Search:
         self._tell("base dynamics", 0.0)
         current = rescored(base, self.noise_scales, colour_of(base, self.noise_scales))
         current = self._geometry(current)
-        with self._pool() as self.pool:
+        with self.pool_of() as self.pool:
             for index in range(MOST_ROUNDS):
                 if index and (excess_of(current) < LEAST_EXCESS_LATER or too_small(current.fit)):
                     break
@@ -145,7 +145,7 @@ class Search:
         tried: dict[str, Refit] = {}
         asked: list[str] = []
         while True:
-            more = promising(current, linear, colour, asked)
+            more = promising(current, linear, colour, asked, bool(self.rounds))
             tried |= self._refits(current, screens, more, index, colour)
             asked += more
             decision = decided(current, linear, tried, bool(self.rounds), colour, self.noise_scales)
@@ -226,7 +226,7 @@ class Search:
             found |= {} if result is None else {name: result}
         return found
 
-    def _pool(self) -> AbstractContextManager[Executor | None]:
+    def pool_of(self) -> AbstractContextManager[Executor | None]:
         """Who makes the calls; None for this process itself."""
         if self.executor is not None or self.workers < 2:
             return nullcontext(self.executor)

@@ -12,7 +12,7 @@ from freeswing.cdpr.model.free_motion import admissible_rates
 from freeswing.cdpr.model.known_values import prior_whitener
 from freeswing.cdpr.robot import Array
 from freeswing.cdpr.simulation.free_swing import LARGEST_TAIL, Motion, simulate, tails
-from freeswing.cdpr.simulation.nearby import Surroundings
+from freeswing.cdpr.simulation.nearby import Surroundings, obeys
 from freeswing.cdpr.simulation.sensitivity import linearise
 from freeswing.ident.judge.consistency import nearest_possible
 from freeswing.ident.likelihood.payload_runs import Loads
@@ -63,6 +63,28 @@ class State:
         if self.own_values is not None:
             values[own] = self.own_values[run]
         return values
+
+
+def with_motions(
+    state: State, model: Model, motions: Sequence[Motion], tolerance_m: float
+) -> State:
+    """A state that begins where other motions stand, with these where the model has them too.
+
+    A candidate that does nothing yet changes no motion: none has to be simulated again.
+
+    Args:
+        state: of the model, its starts those of the motions.
+        model: which they may obey.
+        motions: one a run.
+        tolerance_m: local error that a segment may have.
+    """
+    told = tuple(
+        replace(one, model=model, values=state.values_of(run, model.own_values))
+        for run, one in enumerate(motions)
+    )
+    if not all(obeys(one, tolerance_m) for one in told):
+        return state
+    return replace(state, motions=told)
 
 
 @dataclass(frozen=True, slots=True)

@@ -169,11 +169,21 @@ def reduce_run(
     motion = linear.motion
     seen = predicted(motion, samples.times_s)
     off = differences(seen, samples)
-    matrix = _whitened_change(_pose_change(linear, samples), seen, off, samples, scales)
+    maps = _residual_map(seen, off, samples, scales)
+    matrix = _sample_rows(linear, samples, maps)
     white = _whitened(off, samples, scales)
-    rows = np.concatenate([matrix.reshape(-1, matrix.shape[-1]), _length_rows(motion, samples)])
+    size = matrix.shape[-1]
+    further = 0 if shifts is None else shifts.shape[2]
     lengths = lengths_residual(motion, samples)
-    right = np.concatenate([white.reshape(-1), lengths])
+    everything = np.zeros((white.size + len(lengths), size + further + 1))
+    everything[: white.size, :size] = matrix.reshape(-1, size)
+    everything[white.size :, :size] = _length_rows(motion, samples)
+    everything[:, -1] = np.concatenate([white.reshape(-1), lengths])
+    if shifts is not None:
+        everything[: white.size, size:-1] = (maps @ shifts).reshape(white.size, -1)
+    # What follows combines columns: a triangle of them serves as well, and is a hundredth as long.
+    everything = np.linalg.qr(everything, mode="r")
+    rows, beside, right = everything[:, :size], everything[:, size:-1], everything[:, -1]
     basis = _allowed_states(motion)
     directions = STATE - motion.model.robot.n_cables
     body = rows[:, :STATE] @ basis
@@ -182,11 +192,7 @@ def reduce_run(
     own = np.hstack([body[:, :directions], shared[:, mine]])
     shared[:, mine] = 0.0
     n_own = own.shape[1]
-    further = np.zeros((len(rows), 0 if shifts is None else shifts.shape[2]))
-    if shifts is not None:
-        modes = _whitened_change(shifts, seen, off, samples, scales)
-        further[: white.size] = modes.reshape(white.size, -1)
-    together = np.column_stack([own, shared, further, right + body[:, -1]])
+    together = np.column_stack([own, shared, beside, right + body[:, -1]])
     together = np.vstack([together, _own_priors(motion, directions, together.shape[1])])
     triangle = np.linalg.qr(together, mode="r")
     size = together.shape[1]
@@ -225,39 +231,40 @@ def _whitened(off: Array, samples: Samples, scales: Array) -> Array:
     return (samples.whitener @ off[..., None])[..., 0] / noise
 
 
-def _pose_change(linear: Linearised, samples: Samples) -> Array:
-    """Derivatives of the predicted pose by the unknowns, (n, 6, 21 + k)."""
+def _sample_rows(linear: Linearised, samples: Samples, maps: Array) -> Array:
+    """Derivatives of the whitened residuals by the unknowns, (n, c, 21 + k)."""
     motion = linear.motion
-    change, change_rates = linear.at(samples.times_s)
-    if _changes_measurement(motion):
-        zetas, rates, _ = motion.at(samples.times_s)
-        function = with_jacobian(motion.model.measured, (1, 2, 3, 4))
-        arguments = (samples.times_s, zetas, rates, motion.inertia, motion.values)
-        slopes = evaluate(function, *arguments)[1]
-        direct = slopes[:, :, STATE:]
-        change = slopes[:, :, :6] @ change + slopes[:, :, 6:STATE] @ change_rates
-        change[:, :, STATE:] += direct
-    return change
+    if not _changes_measurement(motion):
+        return maps @ linear.poses_at(samples.times_s)
+    zetas, rates, _ = motion.at(samples.times_s)
+    function = with_jacobian(motion.model.measured, (1, 2, 3, 4))
+    arguments = (samples.times_s, zetas, rates, motion.inertia, motion.values)
+    slopes = maps @ evaluate(function, *arguments)[1]
+    if slopes[:, :, 6:STATE].any():
+        change, change_rates = linear.at(samples.times_s)
+        found = slopes[:, :, :6] @ change + slopes[:, :, 6:STATE] @ change_rates
+    else:
+        found = slopes[:, :, :6] @ linear.poses_at(samples.times_s)
+    found[:, :, STATE:] += slopes[:, :, STATE:]
+    return found
 
 
-def _whitened_change(
-    change: Array, seen: Array, off: Array, samples: Samples, scales: Array
-) -> Array:
-    """A change of the predicted pose (n, 6, m), as it shows in the whitened residuals.
+def _residual_map(seen: Array, off: Array, samples: Samples, scales: Array) -> Array:
+    """What a change of the predicted pose does to the whitened residuals, (n, c, 6).
 
     Args:
-        change: of x y z phi theta chi.
         seen: the prediction, (n, 6).
         off: its `differences`, (n, c).
         samples: what was measured.
         scales: noise scale of metres and of radians, (2,).
     """
+    maps = np.zeros((len(samples.times_s), len(samples.coordinates), 6))
     if samples.is_pose:
-        turn = log_slope(off[:, 3:]) @ angle_rate_matrix(seen[:, 3:])
-        change = np.concatenate([change[:, :3], turn @ change[:, 3:]], axis=1)
+        maps[:, :3, :3] = np.eye(3)
+        maps[:, 3:, 3:] = log_slope(off[:, 3:]) @ angle_rate_matrix(seen[:, 3:])
     else:
-        change = change[:, samples.columns]
-    return samples.whitener @ change / (samples.temper * scales[samples.groups])[:, None]
+        maps[:, np.arange(len(samples.columns)), samples.columns] = 1.0
+    return samples.whitener @ maps / (samples.temper * scales[samples.groups])[:, None]
 
 
 def _length_rows(motion: Motion, samples: Samples) -> Array:

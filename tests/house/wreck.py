@@ -217,13 +217,18 @@ HELD = (
         (
             "REFITTED", "NEARLY_AS_GOOD", "LEAST_GAIN", "ACCEPTED",
             "MOST_WORSE", "NO_WORSE", "NO_WORSE_OF_GAIN", "LEAST_GAIN_LATER",
-            "LEAST_EXCESS_LATER", "CONFOUNDED_DIFFERENCE", "LEAST_EXCESS", "RIVAL",
-            "CONTRADICTED", "LEAST_SHARE_EXPLAINED", "MOST_BELOW_NOISE",
+            "LEAST_EXCESS_LATER", "LEAST_PROMISE_LATER", "CONFOUNDED_DIFFERENCE",
+            "LEAST_EXCESS", "RIVAL", "CONTRADICTED", "LEAST_SHARE_EXPLAINED", "MOST_BELOW_NOISE",
         ),
         DECISION,
     ),
     Held("ident/diagnose/diagnose.py", ("LARGEST_EXCESS_LEFT",), DECISION),
     Held("ident/diagnose/lengths/inclusion.py", ("ACCEPTED", "RIVAL"), INCLUSION),
+    Held(
+        "ident/diagnose/lengths/equilibria.py",
+        ("CONTRADICTED",),
+        "tests/ident/diagnose/lengths/test_equilibria.py",
+    ),
     Held("ident/diagnose/lengths/wrong_places.py", ("LESS_TRUST",), INCLUSION),
     Held(
         "ident/diagnose/lengths/joint_lengths.py",

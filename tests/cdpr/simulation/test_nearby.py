@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from freeswing.cdpr.model.equations import build_model
 from freeswing.cdpr.model.free_motion import admissible_rates
 from freeswing.cdpr.simulation import nearby
 from freeswing.cdpr.simulation.free_swing import simulate, tails
-from freeswing.cdpr.simulation.nearby import Surroundings
+from freeswing.cdpr.simulation.nearby import Surroundings, obeys
 from freeswing.cdpr.simulation.sensitivity import linearise
 from tests.cdpr.model_cases import swing_start
 
@@ -57,3 +60,11 @@ def test_a_start_that_the_cables_do_not_allow_is_refused() -> None:
     )
     with pytest.raises(ValueError, match="lengthen cable"):
         around.motion_at(zeta, rates + 0.1, inertia, values, TOLERANCE_M)
+
+
+def test_a_motion_obeys_a_model_that_adds_nothing_and_no_other() -> None:
+    model, inertia, zeta, rates = swing_start("bologna-4", ())
+    known = simulate(model, zeta, rates, SPAN_S, inertia, None, TOLERANCE_M)
+    wider = build_model(model.robot, ("translational_drag",))
+    assert obeys(replace(known, model=wider, values=np.zeros(2)), TOLERANCE_M)
+    assert not obeys(replace(known, model=wider, values=np.array([1e-3, 0.0])), TOLERANCE_M)

@@ -131,13 +131,13 @@ def before_count(one: SimpleNamespace, count: float) -> SimpleNamespace:
     return SimpleNamespace(**{**vars(one), "evidence": SimpleNamespace(counts=np.array([count]))})
 
 
-def ranked(gains: dict[str, float], tried=()) -> list[str]:
+def ranked(gains: dict[str, float], tried=(), later=False) -> list[str]:
     """Who is fitted next, of candidates that promise these gains by both measures."""
     count = 4.0
     before = fitted([1000.0], 1000.0, count)
     price = 2.0 * float(np.log(count))
     linear = {name: score([1000.0 - gain], 1000.0 - gain - price) for name, gain in gains.items()}
-    return promising(before, linear, 1.0, tried)
+    return promising(before, linear, 1.0, tried, later)
 
 
 @pytest.mark.parametrize(("share", "chosen"), [(0.47, ["best"]), (0.53, ["best", "other"])])
@@ -148,6 +148,14 @@ def test_at_first_those_nearly_as_good(share, chosen) -> None:
 @pytest.mark.parametrize(("gain", "chosen"), [(9.3, []), (10.7, ["other"])])
 def test_later_all_that_promise_anything(gain, chosen) -> None:
     assert ranked({"best": 100.0, "other": gain}, tried=("best",)) == chosen
+
+
+@pytest.mark.parametrize(("gain", "chosen"), [(46.0, []), (54.0, ["other"])])
+def test_what_promises_little_of_the_excess_is_no_further_effect(gain, chosen) -> None:
+    """Of an excess of a thousand a twentieth; where nothing was found yet it is fitted too."""
+    gains = {"best": 100.0, "other": gain}
+    assert ranked(gains, tried=("best",), later=True) == chosen
+    assert ranked(gains, tried=("best",)) == ["other"]
 
 
 def test_four_at_a_time() -> None:

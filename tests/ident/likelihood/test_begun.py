@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from freeswing.cdpr.model.equations import build_model
 from freeswing.cdpr.model.free_motion import admissible_rates
-from freeswing.ident.likelihood.joint_problem import Problem, State
+from freeswing.ident.likelihood.joint_problem import Problem, State, with_motions
 from freeswing.ident.likelihood.run_residuals import Samples
 from tests.cdpr.model_cases import swing_start
 
@@ -53,3 +54,14 @@ def test_others_are_simulated(what: str) -> None:
     assert not before or found[0] is not before[0]
     np.testing.assert_array_equal(found[0].inertia, state.inertia)
     np.testing.assert_array_equal(found[0].values, state.values)
+
+
+def test_motions_are_carried_into_a_model_that_adds_nothing_yet() -> None:
+    _, state = problem_and_state()
+    wider = build_model(state.motions[0].model.robot, ("translational_drag", "rotational_drag"))
+    fresh = replace(state, values=np.append(state.values, 0.0), motions=())
+    carried = with_motions(fresh, wider, state.motions, 1e-8)
+    assert carried.motions[0].model is wider
+    assert carried.motions[0].accelerations is state.motions[0].accelerations
+    there = replace(fresh, values=np.append(state.values, 0.05))
+    assert with_motions(there, wider, state.motions, 1e-8).motions == ()
