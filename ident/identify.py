@@ -279,8 +279,9 @@ def _meaningless(
 def _compared(free: Estimate, full: Estimate) -> tuple[ParameterComparison, ...]:
     shown = free.essential | full.essential
     between = np.zeros(9)
-    if set(free.without_run) == set(full.without_run):
-        pairs = [(free.without_run[name], full.without_run[name]) for name in free.without_run]
+    both = [name for name in free.without_run if name in full.without_run]
+    if both:
+        pairs = [(free.without_run[name], full.without_run[name]) for name in both]
         between = between_runs(np.array([after - before for before, after in pairs]))
     return compare(free.values, free.std, full.values, full.std, shown, between)
 

@@ -59,6 +59,7 @@ class Estimate(Entry):
         weighting: of FIDIM, where it is not the published one.
         noise_ratio: of FIDIM's weighted form.
         calibration_std: the cameras' calibration's share of the deviations (FIDIM).
+        published_std: deviations as published (FIDIM), where those between runs are larger.
         calibration_modes: calibration errors fitted beside (maximum likelihood).
     """
 
@@ -77,6 +78,7 @@ class Estimate(Entry):
     weighting: str = absent(default="")
     noise_ratio: float | None = absent(default=None)
     calibration_std: Numbers | None = absent(default=None)
+    published_std: Numbers | None = absent(default=None)
     calibration_modes: Any = absent(default=None)
 
 

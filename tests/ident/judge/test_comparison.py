@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
+from freeswing.ident.estimate import fidim_entry
 from freeswing.ident.fidim.fidim import fidim
+from freeswing.ident.fidim.fidim_stage import _as_runs_say
 from freeswing.ident.judge.comparison import between_runs, compare
 
 ALL = np.ones(9, dtype=bool)
@@ -43,3 +45,27 @@ def test_fidim_without_each_run_is_fidim_of_the_others():
         rest = fidim(runs[:k] + runs[k + 1 :])
         assert found.without_run[k] == pytest.approx(rest.values, rel=1e-9)
     assert np.isnan(fidim(runs[:1]).without_run).all()
+
+
+def test_deviations_are_those_between_runs_where_the_models_errors_repeat():
+    """Each run sees inertias of its own: scatter within runs says nothing of that."""
+    rng = np.random.default_rng(5)
+    truth = rng.normal(size=9)
+
+    def entry(apart: float):
+        runs = []
+        for _ in range(12):
+            chi = np.append(1.0, truth + apart * rng.normal(size=9))
+            W = rng.normal(size=(200, 2, 10))
+            W -= (W @ chi)[..., None] * chi / (chi @ chi)
+            runs.append(W + 1e-4 * rng.normal(size=W.shape))
+        raw = fidim(runs)
+        return raw, _as_runs_say(fidim_entry(raw, (), ()), raw)
+
+    raw, told = entry(0.05)
+    assert told.extra["published_std"] == pytest.approx(raw.std)
+    assert (told.std > 2.0 * raw.std).all()
+    assert np.abs((told.values - truth) / told.std).max() < 3.0
+    assert "runs say apart" in told.notes[-1]
+    raw, told = entry(0.0)
+    assert told.std == pytest.approx(raw.std, rel=0.5)
