@@ -15,7 +15,13 @@ ESTIMATES = {
 # Suffixes of names, the longest first: scale to the readable unit, and that unit.
 _UNITS = {
     "kg_m2": (1e3, "10⁻³ kg m²"),
+    "m2_s2": (1e3, "10⁻³ m²/s²"),
+    "m2_s": (1e3, "10⁻³ m²/s"),
+    "s2_m": (1e6, "10⁻⁶ s²/m"),
+    "s3_m": (1e6, "10⁻⁶ s³/m"),
+    "1_s2": (1.0, "1/s²"),
     "m_s2": (1.0, "m/s²"),
+    "m_s": (1e6, "µm/s"),
     "rad_s": (1.0, "rad/s"),
     "1_m": (1.0, "1/m"),
     "1_s": (1.0, "1/s"),

@@ -9,7 +9,6 @@ from freeswing.commands.arguments import add_session, add_workers, crew_of, open
 from freeswing.console import Console
 
 if TYPE_CHECKING:
-    from freeswing.results.common import SeenDirection
     from freeswing.results.diagnosis import Diagnosis
     from freeswing.session.made import Made
     from freeswing.session.session_file import Session
@@ -87,6 +86,7 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
 
 def _summarise(document: Diagnosis, console: Console) -> None:
     from freeswing.report.panels.answer import verdict
+    from freeswing.report.panels.ladder import seen_directions
     from freeswing.report.words import millimetres, number, plain
 
     for entry in document.accepted:
@@ -109,21 +109,3 @@ def _summarise(document: Diagnosis, console: Console) -> None:
             f"{millimetres(after.prediction_rmse_m)} after "
             f"(noise floor {millimetres(after.noise_floor_m)})"
         )
-
-
-def seen_directions(directions: tuple[SeenDirection, ...]) -> list[str]:
-    """Along which directions a displaced point is known best and worst, a sentence a point."""
-    points: dict[str, list[SeenDirection]] = {}
-    for one in directions:
-        points.setdefault(one.point, []).append(one)
-    return [
-        f"{point}: known to {_along(ones[0])}, to {_along(ones[-1])}"
-        for point, ones in points.items()
-    ]
-
-
-def _along(one: SeenDirection) -> str:
-    from freeswing.report.words import millimetres
-
-    axis = ", ".join(f"{part:.2f}" for part in one.direction)
-    return f"{millimetres(one.std_m)} along ({axis})"

@@ -8,13 +8,15 @@ from matplotlib.figure import Figure
 
 from freeswing.report.figures import AFTER, BEFORE, FAINT, figure
 from freeswing.report.material import Material
-from freeswing.report.words import number, parameter_row, plain
-from freeswing.results.common import FoundEffect
+from freeswing.report.words import millimetres, number, parameter_row, plain
+from freeswing.results.common import FoundEffect, SeenDirection
 from freeswing.results.diagnosis import Candidate
 
 ORDER = ("accepted", "confounded", "rejected", "not_identifiable")
 _STYLE = {"accepted": (AFTER, ""), "confounded": (BEFORE, "////")}
 MOST_SHOWN = 12
+# Of what remains, what its sentence says already.
+IN_SIGNATURE = ("coordinate", "rms", "frequency_hz", "hint")
 
 
 class EffectLadder:
@@ -31,17 +33,27 @@ class EffectLadder:
         candidates = sorted(diagnosis.candidates, key=_rank)
         remaining = diagnosis.unexplained
         evidence = {
-            plain(key): number(value) if isinstance(value, int | float) else str(value)
+            plain(key): _told(value)
             for key, value in (remaining.evidence if remaining else {}).items()
+            if key not in IN_SIGNATURE
         }
         return {
             "effects": [row for entry in diagnosis.accepted for row in effect_rows(entry)],
+            "directions": [
+                line for entry in diagnosis.accepted for line in seen_directions(entry.directions)
+            ],
             "rivals": [_rival(one) for one in candidates if one.verdict == "confounded"],
             "rows": _rows(candidates),
             "chart": _chart(candidates),
             "signature": remaining.signature if remaining and remaining.present else "",
             "evidence": evidence,
         }
+
+
+def _told(value: object) -> str:
+    if isinstance(value, dict):
+        return ", ".join(f"{plain(key)} {number(one)}" for key, one in value.items())
+    return number(value) if isinstance(value, int | float) else str(value)
 
 
 def effect_rows(effect: FoundEffect) -> list[dict[str, str]]:
@@ -130,8 +142,26 @@ def _chart(candidates: list[Candidate]) -> object:
         axes.set_yticks(range(len(shown)), [_named(one) for one in shown])
         axes.invert_yaxis()
         axes.margins(x=0.25)
+        if judged:
+            axes.set_xticks(range(0, 101, 20))
         axes.set_xlabel(what)
         axes.grid(visible=False, axis="y")
 
     caption = f"The leading candidates by {what}: accepted filled, confounded hatched, others grey."
     return figure(draw, 4.6, 0.7 + 0.22 * len(shown), caption)
+
+
+def seen_directions(directions: tuple[SeenDirection, ...]) -> list[str]:
+    """Along which directions a displaced point is known best and worst, a sentence a point."""
+    points: dict[str, list[SeenDirection]] = {}
+    for one in directions:
+        points.setdefault(one.point, []).append(one)
+    return [
+        f"{plain(point)}: known to {_along(ones[0])}, to {_along(ones[-1])}"
+        for point, ones in points.items()
+    ]
+
+
+def _along(one: SeenDirection) -> str:
+    axis = ", ".join(f"{part:.2f}" for part in one.direction)
+    return f"{millimetres(one.std_m)} along ({axis})"

@@ -1,6 +1,6 @@
 """What `diagnose` says of the directions in which a point is known."""
 
-from freeswing.commands.session.diagnose import seen_directions
+from freeswing.report.panels.ladder import seen_directions
 from freeswing.results.common import SeenDirection
 
 
@@ -16,6 +16,6 @@ def test_best_and_worst_direction_of_each_point_are_told():
         )
     )
     assert told == [
-        "offset_2: known to 0.300 mm along (0.00, 0.60, 0.80), to 6.00 mm along (0.00, -0.80, 0.60)"
+        "offset 2: known to 0.300 mm along (0.00, 0.60, 0.80), to 6.00 mm along (0.00, -0.80, 0.60)"
     ]
     assert seen_directions(()) == []

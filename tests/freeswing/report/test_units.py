@@ -1,0 +1,32 @@
+"""Every number of every effect is told in its own unit: a drag in m²/s was once told in ms."""
+
+from __future__ import annotations
+
+import pytest
+
+from freeswing.cdpr.effects import catalogue
+from freeswing.report.words import unit_of
+from tests.ident.swings import paper_model
+
+# Numbers without a unit.
+PURE = ("coefficient", "rest_share")
+NAMES = sorted(
+    {p.name for effect in catalogue().values() for p in effect.parameters(paper_model().robot)}
+)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_name_ends_in_its_unit(name: str) -> None:
+    stem, scale, unit = unit_of(name)
+    if name.startswith(PURE):
+        return
+    assert unit, name
+    # What is left of the name holds no part of a unit any more.
+    assert stem.rpartition("_")[2] not in ("m", "m2", "s", "s2", "rad", "kg"), (name, stem)
+    assert scale in (1.0, 100.0, 1e3, 1e6)
+
+
+def test_losses_have_their_units() -> None:
+    assert unit_of("rate_m2_s") == ("rate", 1e3, "10⁻³ m²/s")
+    assert unit_of("torque_m2_s2") == ("torque", 1e3, "10⁻³ m²/s²")
+    assert unit_of("mass_over_stiffness_s2_m") == ("mass_over_stiffness", 1e6, "10⁻⁶ s²/m")
