@@ -5,7 +5,8 @@
 makes the sessions of benchmarks/sealed_sessions.py in OUT (those that are not there), runs
 `freeswing diagnose` on each as a user would, and prints the confusion matrix, the false alarms,
 the smallest size found of each effect, and prediction errors before and after beside the noise.
-A session that has a result is not run again. Figures go to OUT/sealed_diagnosis.json too.
+A session that has a result is not run again, and kinds take turns, so that a run may be stopped.
+Figures go to OUT/sealed_diagnosis.json too; benchmarks/reliability.py draws the probabilities.
 """
 
 from __future__ import annotations
@@ -16,7 +17,8 @@ import subprocess
 import sys
 import time
 from collections import Counter
-from itertools import pairwise
+from collections.abc import Sequence
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +27,7 @@ for place in (ROOT, ROOT / "benchmarks"):
     if str(place) not in sys.path:
         sys.path.insert(0, str(place))
 
+from reliability import Told, binned  # noqa: E402
 from sealed_sessions import made, selected  # noqa: E402
 
 from tests.oracle.cases import TIERS, Case  # noqa: E402
@@ -103,14 +106,21 @@ def of_lab_day(document: dict[str, Any], folder: Path) -> dict[str, Any]:
 
 def reliability(rows: list[dict[str, Any]]) -> list[str]:
     """Of effects given so much probability, how many are there, as lines."""
-    told = [(p, there) for row in rows for _, p, there in row.get("probabilities", ())]
+    told = [Told(row["case"], *one) for row in rows for one in row.get("probabilities", ())]
     lines = ["", "probability told: how many, mean told, share that is there"]
-    for low, high in pairwise((0.0, 0.01, 0.1, 0.5, 0.9, 0.99, 1.0 + 1e-9)):
-        inside = [(p, there) for p, there in told if low <= p < high]
-        if inside:
-            mean, share = (sum(one[k] for one in inside) / len(inside) for k in (0, 1))
-            lines.append(f"  {low:4.2f} to {high:4.2f}: {len(inside):4d} {mean:6.3f} {share:6.3f}")
+    for one in binned(told):
+        span = f"{one.low:4.2f} to {one.high:4.2f}"
+        lines.append(f"  {span}: {one.count:4d} {one.told:6.3f} {one.there:6.3f}")
     return lines
+
+
+def telling_first(cases: Sequence[Case]) -> list[Case]:
+    """Kinds taking turns and medium sizes first, so that a run that is stopped says something."""
+    medium = sorted(cases, key=lambda case: any(size != "medium" for _, size in case.effects))
+    kinds = dict.fromkeys(case.kind for case in cases)
+    queues = [[case for case in medium if case.kind == kind] for kind in kinds]
+    turns = zip_longest(*queues)
+    return [case for turn in turns for case in turn if case is not None]
 
 
 def right(row: dict[str, Any]) -> bool:
@@ -175,7 +185,7 @@ def main(arguments: list[str] | None = None) -> None:
     options = parser.parse_args(arguments)
     rows = []
     print(f"{'case':66s} ok?   before    after      s answer (errors over the noise floor)")
-    for case in selected(options.tier, options.only):
+    for case in telling_first(selected(options.tier, options.only)):
         rows.append(diagnosed(case, options.out))
         print(line(rows[-1]), flush=True)
     print("\n".join(summary(rows)))
