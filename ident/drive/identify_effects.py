@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,7 @@ from freeswing.ident.drive.diagnose.refit import MOST_STEPS, weighted
 from freeswing.ident.drive.diagnose.screen import jump_start
 from freeswing.ident.drive.elastic_search import best_start, followed, known_at_rest, stretches
 from freeswing.ident.drive.identify import (
+    HEAD_S,
     SECOND_START,
     DriveIdentification,
     DriveSession,
@@ -31,6 +33,8 @@ from freeswing.ident.drive.identify import (
 from freeswing.ident.drive.inverse_dynamics import Regression, inverse_dynamics
 from freeswing.ident.drive.joint import Estimate, Premise, Problem, estimate
 from freeswing.ident.drive.kinematics import Kinematics
+from freeswing.ident.drive.solver import MISFIT
+from freeswing.ident.drive.unknowns import Asked
 
 Array = NDArray[np.float64]
 
@@ -55,7 +59,7 @@ def identify_with_effects(session: DriveSession, progress: Progress) -> DriveIde
     if not elastic or len({_of(name) for name in asked.added}) > 1:
         progress("without the effects", 0.1)
         started = _started(session, given, estimate(given, asked.without_effects, MOST_STEPS))
-    search = followed if elastic else estimate
+    search = followed if elastic else partial(_searched, given)
     progress("joint estimate", 0.4)
     joint, used = clear_of_slack(session, started, search(started, asked), search)
     started = replace(started, runs=used)
@@ -74,6 +78,23 @@ def identify_with_effects(session: DriveSession, progress: Progress) -> DriveIde
         as_declared(session, given.offsets),
         ramps_of(session, joint),
     )
+
+
+def _searched(given: Premise, started: Premise, asked: Asked) -> Estimate:
+    """The estimate from a start, or by heads of the runs from what static poses tell of `given`.
+
+    Without the effects whole runs pull the start far off: where the search from there leaves more
+    than the noise, the other one is taken if it leaves less.
+    """
+    found = estimate(started, asked)
+    at = found.found.normal
+    if 2.0 * at.cost <= MISFIT * at.n:
+        return found
+    try:
+        other = followed(known_at_rest(replace(given, runs=started.runs), asked), asked, HEAD_S)
+    except ValueError:  # it loses the runs: the first one stands
+        return found
+    return min(found, other, key=lambda one: one.found.normal.cost)
 
 
 def _rigid_start(
