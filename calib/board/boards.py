@@ -22,6 +22,7 @@ from freeswing.cdpr.files.documents import InputError, read_text
 CIRCLES = ("circles", "asymmetric_circles")
 KINDS = ("charuco", "chessboard", "aprilgrid", *CIRCLES)
 _MOST_YAML_BYTES = 1 << 20
+SIDE_KEYS = {"aprilgrid": "tagSize"}  # what files call the side; else square_m
 LARGEST_SQUARE_M = 1.0
 """A board that a person can wave has squares of 10 to 200 mm."""
 
@@ -62,8 +63,8 @@ class Board:
             raise ValueError(f"board: square side is {self.square_m} m, must be above 0")
         if self.square_m > LARGEST_SQUARE_M:
             raise ValueError(
-                f"board: a square or tag of {self.square_m:g} m: lengths are in metres, "
-                f"{1e-3 * self.square_m:g} if these are millimetres"
+                f"{SIDE_KEYS.get(self.kind, 'square_m')} is {self.square_m:g} m: lengths are in "
+                f"metres, {1e-3 * self.square_m:g} if these are millimetres"
             )
         if self.kind == "charuco" and not 0.0 < self.marker_m < self.square_m:
             raise ValueError(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -34,6 +34,8 @@ def calibration_findings(session: Session) -> Iterator[Finding]:
         yield Finding("error", "cameras", text, "add one of them")
     else:
         yield Finding("note", "cameras", "not calibrated yet", "run freeswing calibrate")
+    if source is not None and source.board is not None:
+        yield from _board(source.board)
     if source is not None and source.recordings is not None:
         if not camera_names(source.recordings):
             text = f"{source.recordings} holds no <camera>.mkv and no <camera>/*.png"
@@ -43,6 +45,16 @@ def calibration_findings(session: Session) -> Iterator[Finding]:
             yield Finding("warning", "calibration", text, "survey a tag on the frame")
     if session.target is None:
         yield Finding("error", "target", "videos need a target.toml", "name the tags or markers")
+
+
+def _board(table: Mapping[str, object]) -> Iterator[Finding]:
+    from freeswing.calib.board.boards import board_from
+
+    try:
+        board_from(table)
+    except InputError as failure:
+        text = str(failure).removeprefix("board: ")
+        yield Finding("error", "calibration.board", text, "correct session.toml")
 
 
 def video_findings(session: Session, run: Run) -> Iterator[Finding]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -13,10 +15,12 @@ from freeswing.cdpr.model.equations import build_model
 from freeswing.cdpr.robot import POSE_COORDINATES
 from freeswing.doctor.geometry import robot_findings
 from freeswing.doctor.motion import run_findings
+from freeswing.doctor.recordings import calibration_findings
 from freeswing.doctor.split import split_findings
 from freeswing.ident.runs import SwingRun
 from freeswing.session.session_file import read_session
 from tests.oracle.robots import declared_robot
+from tests.places import SAMPLES
 
 ROBOT = declared_robot("bologna-4")
 REST = np.array([1.2, -0.2, -0.9, 0.0, 0.0, 0.0])
@@ -186,3 +190,16 @@ def test_few_runs_to_identify(tmp_path, count, levels) -> None:
     (tmp_path / "session.toml").write_text(text, encoding="utf-8")
     found = split_findings(read_session(tmp_path), [])
     assert told(found, "identify runs") == levels
+
+
+@pytest.mark.parametrize(("side_m", "levels"), [(0.99, []), (1.01, ["error"])])
+def test_boards_in_millimetres(side_m, levels, tmp_path) -> None:
+    """By name and key, before anything is calibrated."""
+    shutil.copytree(SAMPLES / "filmed", tmp_path, dirs_exist_ok=True)
+    path = tmp_path / "session.toml"
+    text = path.read_text(encoding="utf-8")
+    text = re.sub(r"square_m = [\d.]+", f"square_m = {side_m}", text)
+    path.write_text(text, encoding="utf-8")
+    found = list(calibration_findings(read_session(tmp_path)))
+    assert told(found, f"square_m is {side_m} m: lengths are in metres") == levels
+    assert all(one.subject == "calibration.board" for one in found if one.level == "error")
