@@ -11,6 +11,7 @@ import numpy as np
 from freeswing.doctor.finding import Finding
 from freeswing.ident.runs import SwingRun
 from freeswing.session.provenance import hashes
+from freeswing.session.repeated_runs import SHARED
 from freeswing.session.session_file import Run, Session
 
 # One run left out leaves two, which still disagree with each other where something is wrong.
@@ -46,16 +47,18 @@ def _same_recording(session: Session) -> Iterator[Finding]:
 
 
 def _overlap(first: Run, second: Run) -> Iterator[Finding]:
-    start, end = (
-        max((run.window_s or (-np.inf, np.inf))[0] for run in (first, second)),
-        min((run.window_s or (-np.inf, np.inf))[1] for run in (first, second)),
-    )
-    if start < end:
-        leaks = first.role != second.role
-        text = f"runs {first.name} and {second.name} are the same recording"
-        text += ", one to identify, one to validate" if leaks else ""
-        remedy = "the held-out check would be worthless" if leaks else "it counts twice"
-        yield Finding("error" if leaks else "warning", "runs", text, remedy)
+    """Two runs of one recording: half of the shorter one in both is what identify refuses."""
+    windows = [run.window_s or (-np.inf, np.inf) for run in (first, second)]
+    start, end = max(one[0] for one in windows), min(one[1] for one in windows)
+    if not start < end:
+        return
+    shortest = min(one[1] - one[0] for one in windows)
+    repeats = np.isinf(shortest) or end - start >= SHARED * shortest
+    leaks = first.role != second.role
+    text = f"runs {first.name} and {second.name} are the same recording"
+    text += ", one to identify, one to validate" if leaks else ""
+    remedy = "the held-out check would be worthless" if leaks else "it counts twice: keep one"
+    yield Finding("error" if leaks or repeats else "warning", "runs", text, remedy)
 
 
 def _same_samples(swings: Sequence[SwingRun]) -> Iterator[Finding]:

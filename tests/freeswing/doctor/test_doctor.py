@@ -192,6 +192,22 @@ def test_few_runs_to_identify(tmp_path, count, levels) -> None:
     assert told(found, "identify runs") == levels
 
 
+@pytest.mark.parametrize(
+    ("second", "levels"),
+    [(None, ["error"]), ((5.1, 15.1), ["warning"]), ((4.9, 14.9), ["error"]), ((10.0, 20.0), [])],
+)
+def test_one_recording_in_two_runs(tmp_path, second, levels) -> None:
+    """What identify refuses is no mere warning: half of the shorter run in both."""
+    text = SESSION
+    (tmp_path / "a.csv").write_text("1\n", encoding="utf-8")
+    for k, window in enumerate(((0.0, 10.0), second)):
+        text += f'[[runs]]\nname = "r{k}"\nrole = "identify"\ntrajectory = "a.csv"\n'
+        text += "" if second is None else f"window_s = {list(window)}\n"
+    (tmp_path / "session.toml").write_text(text, encoding="utf-8")
+    found = split_findings(read_session(tmp_path), [])
+    assert told(found, "the same recording") == levels
+
+
 @pytest.mark.parametrize(("side_m", "levels"), [(0.99, []), (1.01, ["error"])])
 def test_boards_in_millimetres(side_m, levels, tmp_path) -> None:
     """By name and key, before anything is calibrated."""

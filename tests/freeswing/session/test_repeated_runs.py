@@ -48,3 +48,5 @@ def test_a_copy_is_refused_by_name(
     for command in ("identify", "diagnose"):
         assert main([command, str(session)]) == 1
         assert "runs swing-01 and again hold the same samples" in capsys.readouterr().err
+    assert main(["check", str(session)]) == 1
+    assert "runs swing-01 and again are the same recording" in capsys.readouterr().out
