@@ -21,6 +21,7 @@ _UNIT_TOLERANCE = 1e-3
 # Focal length over the longer side: a fisheye of 220 degrees has 0.25, a lens of one degree 57.
 SHORTEST_FOCAL, LONGEST_FOCAL = 0.1, 100.0
 HALFWAY = 0.5  # of the way from the middle to the corners every usable calibration reaches
+LEAST_SEEN = 0.3  # of a pinhole's angle there: the worst pincushion of a lens leaves 0.8
 
 
 def read_cameras(path: Path | str) -> tuple[Camera, ...]:
@@ -89,11 +90,23 @@ def _question_lens(entry: Reader, model: str, size_px: Array, params: Array) -> 
         return
     middle = (size_px - 1) / 2
     halfway = middle + HALFWAY * np.array([[-1, -1], [1, -1], [-1, 1], [1, 1]]) * middle
-    if not np.isfinite(normalise(model, halfway, params)).all():
+    seen = normalise(model, halfway, params)
+    if not np.isfinite(seen).all():
         entry.add(
             "params",
             f"the distortion {params[len(focal) + 2 :].tolist()} folds the image over within half "
             "of its diagonal: no lens does; check the model's name and the coefficients' order",
+        )
+        return
+    straight = np.linalg.norm((halfway - centre) / focal, axis=1)
+    far = int(np.argmax(straight))
+    shrunk = float(np.linalg.norm(seen[far]) / straight[far])
+    if shrunk < LEAST_SEEN:
+        entry.add(
+            "params",
+            f"the distortion {params[len(focal) + 2 :].tolist()} leaves {100 * shrunk:.2g} % of the "
+            "angle that half of the image's diagonal sees: no lens does; check the model's name "
+            "and the coefficients' order",
         )
 
 

@@ -54,6 +54,11 @@ t_camera_base_m = [0.0, 0.0, 0.0]
             '"OPENCV"\nparams = [1000.0, 1000.0, 639.5, 511.5, -3.0, 0.0, 0.0, 0.0]',
             "folds the image over",
         ),
+        (
+            '"PINHOLE"\nparams = [1000.0, 1000.0, 639.5, 511.5]',
+            '"OPENCV"\nparams = [1000.0, 1000.0, 639.5, 511.5, 160.0, 0.0, 0.0, 0.0]',
+            "% of the angle that half of the image's diagonal sees",
+        ),
         ('name = "a"', 'title = "a"', "title"),
         ("cameras/1", "cameras/2", "cameras/2"),
         ("[[cameras]]", "[[kameras]]", "cameras: missing"),
@@ -71,6 +76,7 @@ def test_nonsense_is_named(tmp_path, old, new, named):
     [
         'PINHOLE"\nparams = [129.0, 127999.0, 1919.0, -511.0]',
         'OPENCV"\nparams = [1000.0, 1000.0, 639.5, 511.5, -0.45, 0.2, 0.0, 0.0]',
+        'OPENCV"\nparams = [1000.0, 1000.0, 639.5, 511.5, 140.0, 0.0, 0.0, 0.0]',
         'OPENCV_FISHEYE"\nparams = [330.0, 330.0, 639.5, 511.5, 0.1, -0.02, 0.0, 0.0]',
     ],
 )
