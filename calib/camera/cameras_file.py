@@ -104,9 +104,9 @@ def _question_lens(entry: Reader, model: str, size_px: Array, params: Array) -> 
     if shrunk < LEAST_SEEN:
         entry.add(
             "params",
-            f"the distortion {params[len(focal) + 2 :].tolist()} leaves {100 * shrunk:.2g} % of the "
-            "angle that half of the image's diagonal sees: no lens does; check the model's name "
-            "and the coefficients' order",
+            f"the distortion {params[len(focal) + 2 :].tolist()} leaves {100 * shrunk:.2g} % "
+            "of the angle that half of the image's diagonal sees: no lens does; check the model's "
+            "name and the coefficients' order",
         )
 
 
