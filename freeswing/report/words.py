@@ -14,6 +14,9 @@ ESTIMATES = {
 }
 # Suffixes of names, the longest first: scale to the readable unit, and that unit.
 _UNITS = {
+    "N_m_s": (1e3, "mN m s"),
+    "N_m_A": (1e3, "mN m/A"),
+    "N_m": (1e3, "mN m"),
     "kg_m2": (1e3, "10⁻³ kg m²"),
     "m2_s2": (1e3, "10⁻³ m²/s²"),
     "m2_s": (1e3, "10⁻³ m²/s"),
@@ -25,9 +28,6 @@ _UNITS = {
     "rad_s": (1.0, "rad/s"),
     "1_m": (1.0, "1/m"),
     "1_s": (1.0, "1/s"),
-    "N_m_s": (1e3, "mN m s"),
-    "N_m_A": (1e3, "mN m/A"),
-    "N_m": (1e3, "mN m"),
     "m2": (1e3, "10⁻³ m²"),
     "N_kg": (1.0, "N/kg"),
     "m": (1e3, "mm"),

@@ -115,7 +115,7 @@ class Problem:
         self.n_start = N_POSE + given.model.n_cables
         self.size = self.n_shared + self.n_start * len(given.runs) + 6 * self.n_static
         self.seen: list[Seen] = []
-        self.at: Array | None = None  # where `seen` was
+        self.at: Array = np.zeros(0)  # where `seen` was
 
     def start(self) -> Array:
         """Where the search begins, (size,)."""

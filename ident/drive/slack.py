@@ -29,7 +29,7 @@ def first_slack(motion: DrivenMotion) -> int:
     """
     if motion.lengths_out_m is not None:
         return len(motion.times_s)
-    pushing = motion.slack.any(axis=1)
+    pushing = np.asarray(motion.slack.any(axis=1))
     lasting = max(1, round(LASTING_S / (motion.times_s[1] - motion.times_s[0])))
     if len(pushing) < lasting:
         return len(pushing)

@@ -102,8 +102,7 @@ def _tensions(one: Table, found: Table) -> Markup:
     def draw(sheet: Figure) -> None:
         axes = sheet.subplots()
         for k, name in enumerate(names):
-            style = {"color": SERIES[k % len(SERIES)], "ls": DASHES[k // len(SERIES) % len(DASHES)]}
-            axes.plot(times, tensions[:, k], lw=0.8, label=name, **style)
+            axes.plot(times, tensions[:, k], lw=0.8, label=name, **_line(k))
         for limit in limits:
             axes.axhline(limit, color=INK, lw=0.8, ls=":")
         axes.axhline(0.0, color=INK, lw=0.8)
@@ -126,6 +125,11 @@ def _tensions(one: Table, found: Table) -> Markup:
     return figures([draw, bars], 2.6, caption, 4.4)
 
 
+def _line(k: int) -> dict[str, Any]:
+    """Colour and dash of the k-th line."""
+    return {"color": SERIES[k % len(SERIES)], "ls": DASHES[k // len(SERIES) % len(DASHES)]}
+
+
 def _spectrum(found: Table) -> Markup:
     """Power of the residuals against that of counts alone."""
 
@@ -135,9 +139,8 @@ def _spectrum(found: Table) -> Markup:
         for k, one in enumerate(found["runs"]):
             rates = np.array(one["spectrum_hz"], dtype=float)
             top = max(top, float(rates.max(initial=1.0)))
-            style = {"color": SERIES[k % len(SERIES)], "ls": DASHES[k // len(SERIES) % len(DASHES)]}
             power = np.array(one["spectrum_rad2_hz"], dtype=float)
-            axes.plot(rates, power, lw=0.9, label=str(one["run"]), **style)
+            axes.plot(rates, power, lw=0.9, label=str(one["run"]), **_line(k))
         white = found["angle_noise_rad"] ** 2 / top
         axes.axhline(white, color=INK, lw=0.8, ls=":", label="counts alone")
         axes.set_xscale("log")
@@ -173,7 +176,7 @@ def _evidence(material: Material) -> Sequence[dict[str, str]]:
             "run": one.run,
             "from (s)": f"{one.from_s:g}",
             "to (s)": f"{one.to_s:g}",
-            "of what it explains (%)": f"{100.0 * one.share:.0f}",
+            "of what it explains (%)": f"{100.0 * (one.share or 0.0):.0f}",
         }
         for effect in accepted
         for one in effect.evidence

@@ -57,7 +57,7 @@ def changed(
     now: References,
     rate_hz: float,
     limits: Array,
-    motors: Array,
+    motors: NDArray[np.int64],
     generator: np.random.Generator,
 ) -> References:
     """The same with some motors drawn anew."""
