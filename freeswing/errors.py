@@ -19,6 +19,7 @@ NAMES = {
     "calib.camera": "lens",
     "calib.exchange": "other-cameras",
     "calib.footage": "footage",
+    "calib.scene": "scene",
     "calib.tags": "tags",
     "cdpr": "model",
     "cdpr.driven": "driven-robot",

@@ -133,7 +133,7 @@ def track_session(
     tracks = [replace(t, problems=(*remarks[t.name], *t.problems)) for t in tracks]
     document = tracking_document(tracks, watch, change, refined=settings.refine_layout)
     known = {track.name: track.trajectory for track in tracks if track.trajectory is not None}
-    return Tracked(document, known, _empty_run(tracks))
+    return Tracked(document, known, empty_run(tracks))
 
 
 def sightings_folder(results: Path, run: str) -> Path:
@@ -223,7 +223,7 @@ def _scaled(progress: Progress | None, low: float, high: float) -> Progress | No
     return lambda label, share: progress(label, low + (high - low) * share)
 
 
-def _empty_run(tracks: Sequence[RunTrack]) -> str | None:
+def empty_run(tracks: Sequence[RunTrack]) -> str | None:
     """Says in which run the platform was not seen, None where it was in all."""
     empty = next((track for track in tracks if track.known == 0), None)
     if empty is None:

@@ -100,6 +100,7 @@ def adjust(
     sigma = _noise(scene, problem, residuals, sigma)
     normal = normal_equations(scene, problem, sigma)
     covariance, boards, rank, weakest, condition = covariances(normal, problem.free)
+    covariance = problem.spread(problem.spread(covariance).T)
     fixed = np.zeros((0, 2)) if problem.fixed is None else fixed_residuals(scene, problem.fixed)
     return Adjustment(
         scene, covariance, boards, sigma, residuals, fixed, cost, rank, weakest, condition,
@@ -145,7 +146,11 @@ class _Search:
         normal = place.normal
         shared, boards = damped_step(normal, self.problem.free, damping)
         fall = float(shared @ normal.shared_slope + np.sum(boards * normal.board_slopes)) / 2.0
-        return _Step(shared, boards, fall) if np.isfinite(fall) else None
+        if not np.isfinite(fall):
+            return None
+        if self.problem.points_only:
+            boards = np.pad(boards, ((0, 0), (0, 3)))
+        return _Step(self.problem.spread(shared), boards, fall)
 
     def moved(self, place: _At, step: _Step) -> _At:
         """The scene after a step, its cost infinite where a corner cannot be seen."""
@@ -207,7 +212,9 @@ def _unknowns_per_residual(scene: Scene, problem: Problem, index: int) -> float:
     per_piece = np.bincount(problem.views.piece, weights=seen)
     own = problem.views.camera == index
     piece = problem.views.piece[own]
-    boards = float(np.sum(scene.board_unknowns * seen[own] / per_piece[piece]))
+    # a single point has no direction
+    unknowns = min(scene.board_unknowns, 3 * len(problem.board_points_m))
+    boards = float(np.sum(unknowns * seen[own] / per_piece[piece]))
     return (boards + problem.free.sum() / len(scene.cameras)) / (2.0 * seen[own].sum())
 
 

@@ -41,6 +41,8 @@ class Problem:
         free: which shared unknowns may move, in the order of `calib.rig.reprojection`, bool (p,).
         warp_std_m: how far the board's shape may be from its drawing, one standard deviation of
             each of `warp_m`, infinite where nothing is known beforehand, (3,).
+        equal: unknowns that are one: each of the first row is that of the second, and is not
+            free: images of one camera have one lens, (2, k); None without.
     """
 
     board_points_m: Array
@@ -48,6 +50,20 @@ class Problem:
     fixed: FixedPoints | None
     free: np.ndarray
     warp_std_m: Array = field(default_factory=lambda: np.full(WARP, np.inf))
+    equal: np.ndarray | None = None
+
+    def spread(self, shared: Array) -> Array:
+        """Shared unknowns along the last axis, what is equal filled in."""
+        if self.equal is None:
+            return shared
+        full = np.array(shared)
+        full[..., self.equal[0]] = full[..., self.equal[1]]
+        return full
+
+    @property
+    def points_only(self) -> bool:
+        """Whether boards are single points: they move and do not turn."""
+        return len(self.board_points_m) == 1 and not self.board_points_m.any()
 
 
 @cache
@@ -71,9 +87,27 @@ def normal_equations(scene: Scene, problem: Problem, sigma: Array) -> Normal:
         len(problem.free),
     )
     found = _with_shape(found, scene, problem.warp_std_m, end)
-    if problem.fixed is None:
-        return found
-    return _with_fixed(found, scene, problem.fixed, sigma)
+    if problem.fixed is not None:
+        found = _with_fixed(found, scene, problem.fixed, sigma)
+    if problem.points_only:
+        cross, boards = found.cross[..., :3], found.boards[:, :3, :3]
+        found = found._replace(
+            cross=np.ascontiguousarray(cross),
+            boards=np.ascontiguousarray(boards),
+            board_slopes=np.ascontiguousarray(found.board_slopes[:, :3]),
+        )
+    return found if problem.equal is None else _gathered(found, problem.equal)
+
+
+def _gathered(found: Normal, equal: np.ndarray) -> Normal:
+    """The equations of unknowns that are one, at the place of the one that they equal."""
+    shared, slope, cross = found.shared.copy(), found.shared_slope.copy(), found.cross.copy()
+    for one in np.unique(equal[1]).tolist():
+        many = equal[0, equal[1] == one]
+        for array in (slope, shared, shared.T, np.swapaxes(cross, 0, 1)):
+            array[one] += array[many].sum(axis=0)
+            array[many] = 0.0
+    return found._replace(shared=shared, shared_slope=slope, cross=cross)
 
 
 def _with_shape(found: Normal, scene: Scene, std_m: Array, first: int) -> Normal:

@@ -114,23 +114,23 @@ def camera_findings(one: CameraNumbers) -> list[Finding]:
     empty = f"; nothing seen {' and '.join(one.empty[:3])}" if one.empty else ""
     film = f"film the board all over this camera's image, tilted 20 to 40 degrees{empty}"
     said = [
-        _low(
+        low(
             (one.views, GOOD_VIEWS, LEAST_VIEWS),
             f"{name}: {one.views} views of the board, want {GOOD_VIEWS} "
             f"(least {LEAST_VIEWS}): {film}",
         ),
-        _low(
+        low(
             (one.tilt_deg, GOOD_TILT_DEG, LEAST_TILT_DEG),
             f"{name}: its views are alike, the board turned by {one.tilt_deg:.0f} degrees in all, "
             f"want {GOOD_TILT_DEG:.0f} (least {LEAST_TILT_DEG:.0f}): film it tilted left, right, "
             "up, down",
         ),
-        _low(
+        low(
             (one.filled, GOOD_FILLED, LEAST_FILLED),
             f"{name}: the board covered {100 * one.filled:.0f} % of the image, want "
             f"{100 * GOOD_FILLED:.0f} % (least {100 * LEAST_FILLED:.0f} %): {film}",
         ),
-        _high(
+        high(
             (one.focal_std, GOOD_FOCAL_STD, WORST_FOCAL_STD),
             f"{name}: focal length known to {100 * one.focal_std:.2g} %, want "
             f"{100 * GOOD_FOCAL_STD:.2g} % (worst {100 * WORST_FOCAL_STD:.2g} %): film the board "
@@ -147,21 +147,21 @@ def _errors(one: CameraNumbers, name: str) -> list[Finding | None]:
     ratio = one.sigma_px / max(one.alone_px, LEAST_ALONE_PX)
     filmed = one.dropped + one.views
     return [
-        _refused(
+        refused(
             one.sigma_px > WORST_PX,
             f"{name}: corners lie {one.sigma_px:.1f} px off, limit {WORST_PX} px: the lens is no "
             f"{one.model}, the focus changed, or the board's numbers are wrong",
         ),
-        _high(
+        high(
             (held_out, GOOD_HELD_OUT, WORST_HELD_OUT),
             f"{name}: error {one.held_out_px:.2f} px on views not used, {held_out:.1f} times that "
             "of views used: film more views of more kinds",
         ),
-        _refused(
+        refused(
             one.dropped > WORST_DROPPED * filmed,
             f"{name}: {one.dropped} of {filmed} views had to be dropped",
         ),
-        _refused(
+        refused(
             one.among > 1 and ratio > WORST_RIG_OVER_ALONE,
             f"{name}: fits itself to {one.alone_px:.2f} px but the other cameras only to "
             f"{one.sigma_px:.2f} px: the cameras are not simultaneous, or one moved; record with "
@@ -175,23 +175,23 @@ def rig_findings(one: RigNumbers) -> list[Finding]:
     apart = "film more views that several cameras share"
     limits = f"want {1e3 * GOOD_VOLUME_M:.0f} mm (worst {1e3 * WORST_VOLUME_M:.0f} mm)"
     said = [
-        _refused(
+        refused(
             one.rank < one.unknowns,
             f"{one.unknowns - one.rank} of {one.unknowns} unknowns cannot be found from these "
             f"views (first {one.weakest}): film the board where two cameras see it, and tilted",
         ),
-        _high(
+        high(
             (abs(one.length_bias), GOOD_LENGTH_BIAS, WORST_LENGTH_BIAS),
             f"known lengths on the board come out {100 * one.length_bias:+.2f} % (limit "
             f"{100 * WORST_LENGTH_BIAS:.0f} %): measure the board, or film more views",
         ),
         _untested(one),
-        _high(
+        high(
             (one.halves_shape_rms_m, GOOD_VOLUME_M, WORST_VOLUME_M),
             "two halves of the recordings disagree by "
             f"{1e3 * one.halves_shape_rms_m:.2f} mm, {limits}: {apart}",
         ),
-        _high(
+        high(
             (one.volume_std_m, GOOD_VOLUME_M, WORST_VOLUME_M),
             "points where the board was are known to "
             f"{1e3 * one.volume_std_m:.2f} mm, {limits}: {apart}",
@@ -213,17 +213,18 @@ def _untested(one: RigNumbers) -> Finding | None:
 Limits = tuple[float, float, float]
 
 
-def _low(number: Limits, text: str) -> Finding | None:
+def low(number: Limits, text: str) -> Finding | None:
     """A (value, good, worst) of which more is better; NaN says nothing."""
     value, good, worst = number
     return Finding(value < worst, text) if value < good else None
 
 
-def _high(number: Limits, text: str) -> Finding | None:
+def high(number: Limits, text: str) -> Finding | None:
     """A (value, good, worst) of which less is better; NaN says nothing."""
     value, good, worst = number
     return Finding(value > worst, text) if value > good else None
 
 
-def _refused(wrong: bool, text: str) -> Finding | None:
+def refused(wrong: bool, text: str) -> Finding | None:
+    """A finding that refuses, where something is wrong."""
     return Finding(True, text) if wrong else None

@@ -8,7 +8,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from freeswing.cdpr.files.documents import Problems, Reader, dump_toml, load_toml
+from freeswing.cdpr.files.documents import (
+    InputError,
+    Problems,
+    Reader,
+    dump_toml,
+    inside,
+    load_toml,
+)
 from freeswing.cdpr.robot import frozen_array
 from freeswing.cdpr.rotation import matrix_from_quaternion, quaternion_from_matrix, transform
 
@@ -18,6 +25,8 @@ SMALLEST_M = 1e-4
 LARGEST_TAG_M = 3.0  # a tag wider than a room's wall; 5 mm taken for metres is above it
 LARGEST_MARKER_M = 0.5
 QUATERNION_TOLERANCE = 1e-3
+# Of named points' extent: nearer to one line they leave the turn about it to a click's error.
+LEAST_BREADTH = 0.1
 UNIT_CORNERS = 0.5 * np.array([[-1.0, 1, 0, 0], [1, 1, 0, 0], [1, -1, 0, 0], [-1, -1, 0, 0]])
 
 
@@ -74,11 +83,27 @@ class Marker:
 
 
 @dataclass(frozen=True, slots=True)
+class Untagged:
+    """A platform that is followed by its own looks.
+
+    Attributes:
+        rest: folder with `<camera>/*.png` or `<camera>.mkv` of the platform at rest.
+        clicks: table of the named points marked there: camera, point, u_px, v_px.
+        points: the named points, which give the platform frame; no diameters.
+    """
+
+    rest: Path
+    clicks: Path
+    points: tuple[Marker, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Target:
     """Everything on the platform that can be seen."""
 
     tags: tuple[Tag, ...] = ()
     markers: tuple[Marker, ...] = ()
+    untagged: Untagged | None = None
 
     @property
     def marker_names(self) -> tuple[str, ...]:
@@ -101,7 +126,8 @@ def read_target(path: Path | str) -> Target:
     reader = Reader(load_toml(path, "target", problems), problems)
     tag_readers = reader.children("tags", required=False)
     marker_readers = reader.children("markers", required=False)
-    if not tag_readers and not marker_readers:
+    untagged = _read_untagged(reader.child("untagged", required=False), Path(path).parent)
+    if not tag_readers and not marker_readers and "untagged" not in reader:
         problems.add("tags, markers", "none; a target needs at least one tag or marker")
     tags = [_read_tag_values(table) for table in tag_readers]
     markers = [_read_marker_values(table) for table in marker_readers]
@@ -115,7 +141,33 @@ def read_target(path: Path | str) -> Target:
             for family, number, size, q, t in tags
         ),
         tuple(Marker(*values) for values in markers),
+        untagged,
     )
+
+
+def _read_untagged(reader: Reader | None, folder: Path) -> Untagged | None:
+    """The table, None where there is none or its numbers are wrong, which the problems say."""
+    if reader is None:
+        return None
+    paths = []
+    for key in ("rest", "clicks"):
+        try:
+            paths.append(inside(folder, reader.string(key), key))
+        except InputError as error:
+            reader.add(key, str(error).removeprefix(f"{key}: "))
+    tables = reader.children("points")
+    points = [(table.string("name"), table.vector("position_m", 3)) for table in tables]
+    for table in tables:
+        table.finish()
+    reader.finish()
+    places = np.array([place for _, place in points]).reshape(-1, 3)
+    breadth = np.linalg.svd(places - places.mean(axis=0), compute_uv=False) if len(points) else []
+    if len(points) < 3 or not breadth[1] > LEAST_BREADTH * breadth[0]:
+        reader.add("points", f"{len(points)}; three that are not on one line give the frame")
+        return None
+    if len(paths) < 2 or not np.isfinite(places).all():
+        return None
+    return Untagged(paths[0], paths[1], tuple(Marker(name, place) for name, place in points))
 
 
 def write_target(path: Path | str, target: Target) -> None:

@@ -60,6 +60,7 @@ class Checks(Entry):
     halves_shape_rms_m: float | None = absent(default=None)
     volume_std_m: float | None = absent(default=None)
     volume_size_m: Numbers | None = absent(default=None)
+    deviations_grown: float | None = absent(default=None)
     survey_points: int | None = absent(default=None)
     survey_scale: float | None = absent(default=None)
     survey_rms_m: float | None = absent(default=None)

@@ -10,6 +10,8 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
+from freeswing.calib.scene.scene_keys import read_scene
+from freeswing.calib.scene.source import SceneSource
 from freeswing.cdpr.files.documents import InputError, Problems, Reader, inside, load_toml
 from freeswing.cdpr.robot import frozen_array
 from freeswing.cdpr.system.confine import results_folder
@@ -50,11 +52,13 @@ class CalibrationSource:
         recordings: folder with `<camera>.mkv` or `<camera>/*.png`, or None.
         board: the board's `kind` and its numbers as in the file, or None.
         base_tags: surveyed tags that tie the cameras to the base frame.
+        scene: images of the laboratory at rest, or None.
     """
 
     recordings: Path | None = None
     board: Mapping[str, object] | None = None
     base_tags: tuple[BaseTag, ...] = ()
+    scene: SceneSource | None = None
 
     @property
     def plumb_line(self) -> Path | None:
@@ -225,10 +229,12 @@ def _read_calibration(reader: Reader, paths: _Paths) -> CalibrationSource:
     table = reader.child("board", required=False)
     board = None if table is None else _read_board(table)
     tags = [read_base_tag(entry) for entry in reader.children("base_tags", required=False)]
+    scene = read_scene(reader.child("scene", required=False), paths.optional)
     reader.finish()
     if (recordings is None) != (board is None):
         reader.add("recordings, board", "give both or neither: footage of a board and the board")
-    return CalibrationSource(recordings, board, tuple(tag for tag in tags if tag is not None))
+    known = tuple(tag for tag in tags if tag is not None)
+    return CalibrationSource(recordings, board, known, scene)
 
 
 def _read_board(reader: Reader) -> Mapping[str, object]:

@@ -95,16 +95,30 @@ def _robot_files(session: Session) -> list[Path]:
 
 def _calibration_files(session: Session) -> list[Path]:
     source = session.calibration
+    scene = [] if source is None or source.scene is None else source.scene.files
     if source is None or source.recordings is None:
-        return [session.path]
+        return [session.path, *scene]
     judged = [] if source.plumb_line is None else [session.robot]  # by its gravity
-    return [session.path, source.recordings, *judged]
+    return [session.path, source.recordings, *judged, *scene]
 
 
 def _tracking_files(session: Session) -> list[Path]:
     videos = [run.video for run in session.video_runs if run.video is not None]
     covariance = session.results / "calibration.json"
-    return [*_robot_files(session), session.cameras, covariance, *videos]
+    looks = _looks_files(session)
+    return [*_robot_files(session), session.cameras, covariance, *videos, *looks]
+
+
+def _looks_files(session: Session) -> list[Path]:
+    """Images and marks of a platform without tags."""
+    from freeswing.cdpr.files.documents import InputError
+    from freeswing.cdpr.measured.target import read_target
+
+    try:
+        untagged = None if session.target is None else read_target(session.target).untagged
+    except InputError:
+        return []  # said by those who need it
+    return [] if untagged is None else [untagged.rest, untagged.clicks]
 
 
 def _motion_files(session: Session) -> list[Path]:
@@ -144,7 +158,7 @@ def _is_bench(session: Session) -> bool:
 def _needs_calibration(session: Session) -> bool:
     """Cameras that came from elsewhere are not calibrated again."""
     source = session.calibration
-    has_recordings = source is not None and source.recordings is not None
+    has_recordings = source is not None and (source.recordings or source.scene) is not None
     is_ours = (session.results / "calibration.json").is_file()
     return (
         has_recordings and bool(session.video_runs) and (is_ours or not session.cameras.is_file())

@@ -11,7 +11,7 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 from freeswing.calib.board.recordings import Recording
 from freeswing.calib.camera.camera import Camera
 from freeswing.cdpr.system.arrays import save_arrays, whole_arrays
-from freeswing.vision.look.follow import Follower, FrameView
+from freeswing.vision.look.follow import Follower, FrameView, Look
+from freeswing.vision.look.single_pose import Pose
 from freeswing.vision.look.watched_target import Watch
 
 Array = NDArray[np.float64]
@@ -108,7 +109,17 @@ def piece_path(folder: Path, camera: str, inputs: str, index: int) -> Path:
     return folder / f"{camera}-{inputs}-{index:06d}.npz"
 
 
-def save_piece(path: Path, piece: Piece, follower: Follower) -> None:
+class Remembers(Protocol):
+    """A tracker with what it knows of the frames before."""
+
+    past: list[tuple[float, Pose]]
+    base_rays: dict[int, Array]
+    before: dict[int, Look]
+    misses: int
+    count: int
+
+
+def save_piece(path: Path, piece: Piece, follower: Remembers) -> None:
     """Writes a piece and the tracker's state after it."""
     past = follower.past
     members = {name: getattr(piece, name) for name in Piece.__slots__}

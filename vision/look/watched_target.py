@@ -28,6 +28,7 @@ class Watch:
         markers: names of round markers.
         marker_positions_m: platform frame, (k, 3).
         marker_diameters_m: (k,), 0 when unknown.
+        named: whether sightings of markers say which they are, as matched features do.
     """
 
     tags: tuple[TagKey, ...]
@@ -37,6 +38,7 @@ class Watch:
     markers: tuple[str, ...]
     marker_positions_m: Array
     marker_diameters_m: Array
+    named: bool = False
 
     @staticmethod
     def of(target: Target, base_tags: Iterable[SurveyedTag] = ()) -> Watch:

@@ -27,6 +27,7 @@ class Patch:
         T_parent_patch: patch to parent coordinates, (4, 4).
         parent: `base` stands still, `platform` moves.
         shown_s: base-time intervals in which the patch is there; None = always.
+        layer: all of a lower layer is drawn before, whatever its distance: walls are behind things.
     """
 
     cells: Array
@@ -34,6 +35,7 @@ class Patch:
     T_parent_patch: Array = field(default_factory=lambda: np.eye(4))
     parent: Parent = "platform"
     shown_s: tuple[tuple[float, float], ...] | None = None
+    layer: int = 0
 
     def moved(self, T_parent_patch: Array, parent: Parent) -> Patch:
         """The same patch elsewhere."""

@@ -169,12 +169,12 @@ class Renderer:
         positions, rotations = self.scene.motion(np.array([time_s]))
         T_base_platform = _pose(positions[0], rotations[0])
 
-        def distance(patch: Patch) -> float:
+        def depth(patch: Patch) -> tuple[int, float]:
             parent = np.eye(4) if patch.parent == "base" else T_base_platform
             centre = (parent @ patch.T_parent_patch)[:3, 3]
-            return -float(np.linalg.norm(self.camera.to_camera(centre)))
+            return patch.layer, -float(np.linalg.norm(self.camera.to_camera(centre)))
 
-        return sorted(self.scene.patches, key=distance)
+        return sorted(self.scene.patches, key=depth)
 
     def _parents_in_camera(self, parent: str, times_s: Array) -> Array:
         """T_camera_parent at each time, (n, 4, 4)."""

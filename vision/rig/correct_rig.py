@@ -94,7 +94,7 @@ def correct_rig(
         refuse_gross(views, watch, started.pairs)
     instants = instants_of(views)
     start = None
-    if watch.markers and len(instants):
+    if watch.markers and not watch.named and len(instants):
         views, start = label_markers(views, watch, instants)
     poses, before = fuse(views, watch, instants, start=start)
     if not look or int(poses.known.sum()) < _LEAST_KNOWN:

@@ -23,6 +23,8 @@ def add_arguments(parser: ArgumentParser) -> None:
     models = ("PINHOLE", "OPENCV", "FULL_OPENCV", "OPENCV_FISHEYE")
     parser.add_argument("--model", choices=models, default="OPENCV", help="default OPENCV")
     text = "adjust the same corners by COLMAP as well, and say where the two differ"
+    seen = "tie the cameras by images of the laboratory ([calibration.scene]) instead of a board"
+    parser.add_argument("--scene", action="store_true", help=seen)
     parser.add_argument("--check-with", choices=("pycolmap",), help=text)
 
 
@@ -34,6 +36,8 @@ def run(options: Namespace, console: Console) -> None:
     settings = {"model": options.model}
     if options.check_with:
         settings["check_with"] = options.check_with
+    if options.scene:
+        settings["scene"] = True
     result = CALIBRATE.take(session, console, settings)
     console.say(str(session.cameras))
     console.show_file(result)
@@ -42,13 +46,12 @@ def run(options: Namespace, console: Console) -> None:
 def make(session: Session, console: Console, settings: dict[str, Any], crew: Crew) -> Made:
     """calibration.json as a document, and cameras.toml where it may be used."""
     from freeswing.calib.calibrate import KEPT_BOARDS, Aids, PlumbLine, calibrate_session
-    from freeswing.calib.camera.cameras_file import cameras_text
     from freeswing.cdpr.files.documents import InputError
     from freeswing.cdpr.files.robot_file import read_robot
-    from freeswing.results.calibration import Calibration
-    from freeswing.session.made import Made
 
     source = session.calibration
+    if settings.get("scene") or (source and source.scene and source.recordings is None):
+        return _made(_by_scene(session, console, settings), session, console, {})
     if source is None or source.recordings is None or source.board is None:
         raise InputError(f"{session.path}: [calibration] names no recordings and no board")
     plumb_line = None
@@ -64,13 +67,47 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
         beside=Aids(plumb_line, partial(_swings, session)),
         progress=console.progress,
     )
+    checked = settings.get("check_with") and found.refused is None
+    return _made(found, session, console, _beside_colmap(found, console) if checked else {})
+
+
+def _by_scene(session: Session, console: Console, settings: dict[str, Any]) -> CalibrationResult:
+    """The cameras tied by what the laboratory looks like."""
+    from freeswing.calib.scene.calibrate_scene import KEPT_SCENE, calibrate_scene
+    from freeswing.cdpr.files.documents import InputError
+
+    source = session.calibration
+    if source is None or source.scene is None:
+        raise InputError(
+            f"{session.path}: --scene needs [calibration.scene]: frames (each camera's recording "
+            "of the laboratory at rest) and walk (stills of a camera carried through it)"
+        )
+    if settings.get("check_with"):
+        raise InputError("--check-with is for boards: --scene starts from COLMAP itself")
+    return calibrate_scene(
+        source.scene,
+        source.base_tags,
+        session.results / KEPT_SCENE,
+        model=settings["model"],
+        progress=console.progress,
+    )
+
+
+def _made(
+    found: CalibrationResult, session: Session, console: Console, beside: dict[str, Any]
+) -> Made:
+    """What is written of a calibration, and what is said of it."""
+    from freeswing.calib.camera.cameras_file import cameras_text
+    from freeswing.results.calibration import Calibration
+    from freeswing.session.made import Made
+
     if found.refused is not None:
         explained = Calibration.from_json(found.document)
         return Made((("calibration.json", explained),), refused=found.refused)
-    beside = _beside_colmap(found, console) if settings.get("check_with") else {}
     document = Calibration.from_json({**found.document, **beside})
+    seen = "points of the laboratory" if document.board.get("kind") == "scene" else "views"
     for entry in document.cameras:
-        console.say(f"camera {entry.name}: {entry.views} views, {entry.reprojection_px:.3f} px")
+        console.say(f"camera {entry.name}: {entry.views} {seen}, {entry.reprojection_px:.3f} px")
     vertical = document.vertical
     if vertical is not None and vertical.verdict == "agrees":  # else it is among the warnings
         console.say(vertical.sentence)

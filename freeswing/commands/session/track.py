@@ -10,9 +10,12 @@ from freeswing.commands.arguments import add_session, add_workers, crew_of, open
 from freeswing.console import Console
 
 if TYPE_CHECKING:
+    from freeswing.cdpr.measured.target import Target
     from freeswing.results.tracking import Tracking
     from freeswing.session.made import Made
     from freeswing.session.session_file import Session
+    from freeswing.vision.settings import Settings
+    from freeswing.vision.track_session import Tracked
     from freeswing.workers.crew import Crew
 
 
@@ -27,6 +30,11 @@ def add_arguments(parser: ArgumentParser) -> None:
     )
     parser.add_argument(
         "--refine-layout", action="store_true", help="fit the tags' places to the recordings"
+    )
+    parser.add_argument(
+        "--no-tags",
+        action="store_true",
+        help="follow the platform by what it looks like: [untagged] of target.toml",
     )
     parser.add_argument(
         "--write-clocks",
@@ -55,6 +63,9 @@ def run(options: Namespace, console: Console) -> None:
 
         require_viewer()
     settings = {"correct_rig": not options.trust_cameras, "refine_layout": options.refine_layout}
+    if options.no_tags:
+        settings["no_tags"] = True
+        _refuse_drawing(options)
     with crew_of(options, session) as crew:
         result = TRACK.take(session, console, settings, crew)
     if options.view or options.overlay:
@@ -69,10 +80,7 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
     """tracking.json as a document, and the tracks."""
     from freeswing.calib.camera.cameras_file import read_cameras
     from freeswing.cdpr.files.documents import DataError, InputError
-    from freeswing.cdpr.files.trajectory_csv import csv_pieces
-    from freeswing.results.tracking import Tracking
     from freeswing.session.load_swings import load_target
-    from freeswing.session.made import Made
     from freeswing.vision.settings import Settings
     from freeswing.vision.track_session import track_session
 
@@ -81,6 +89,9 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
     target = load_target(session)
     if target is None:
         raise InputError(f"{session.path}: target: missing; it says what is on the platform")
+    how = Settings(settings["correct_rig"], settings["refine_layout"])
+    if settings.get("no_tags") or not (target.tags or target.markers):
+        return _made(_by_looks(session, console, how, crew, target), session, console)
     found = track_session(
         session.video_runs,
         read_cameras(session.cameras),
@@ -88,11 +99,53 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
         results=session.results,
         base_tags=session.calibration.base_tags if session.calibration else (),
         frame_rate_hz=session.frame_rate_hz,
-        settings=Settings(**settings),
+        settings=how,
         workers=crew.processes,
         executor=crew.executor,
         progress=console.progress,
     )
+    return _made(found, session, console)
+
+
+def _refuse_drawing(options: Namespace) -> None:
+    from freeswing.cdpr.files.documents import InputError
+
+    flags = {"--view": options.view, "--overlay": options.overlay}
+    for flag in (flag for flag, wanted in flags.items() if wanted):
+        raise InputError(f"{flag} draws tags and markers: leave it out with --no-tags")
+
+
+def _by_looks(
+    session: Session, console: Console, settings: Settings, crew: Crew, target: Target
+) -> Tracked:
+    """The platform followed by its own features."""
+    from freeswing.calib.camera.cameras_file import read_cameras
+    from freeswing.cdpr.files.documents import InputError
+    from freeswing.vision.untagged.track_untagged import track_untagged
+
+    if target.untagged is None:
+        raise InputError(
+            f"{session.target}: --no-tags needs [untagged]: rest (images of the platform at rest), "
+            "clicks (named points marked there) and [[untagged.points]] (where they are on it)"
+        )
+    return track_untagged(
+        session.video_runs,
+        read_cameras(session.cameras),
+        target.untagged,
+        results=session.results,
+        frame_rate_hz=session.frame_rate_hz,
+        settings=settings,
+        workers=crew.processes,
+        progress=console.progress,
+    )
+
+
+def _made(found: Tracked, session: Session, console: Console) -> Made:
+    """What is written of tracked runs, and what is said of them."""
+    from freeswing.cdpr.files.trajectory_csv import csv_pieces
+    from freeswing.results.tracking import Tracking
+    from freeswing.session.made import Made
+
     document = Tracking.from_json(found.document)
     if found.refused is None:
         _summarise(document, console)

@@ -1,0 +1,1 @@
+"""Cameras tied by what the laboratory looks like: no board needed."""

@@ -1,0 +1,58 @@
+"""[calibration.scene]: images of the laboratory at rest, and what was measured in it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from freeswing.calib.scene.source import TAPE_STD_M, Distance, SceneSource, SurveyedPoint
+from freeswing.cdpr.files.documents import Reader
+
+
+def read_scene(
+    reader: Reader | None, path_of: Callable[[Reader, str], Path | None]
+) -> SceneSource | None:
+    """The table, None where there is none or it names no frames, which its problems then say.
+
+    Args:
+        reader: of the table.
+        path_of: the path that a key of it names, inside the session's folder.
+    """
+    if reader is None:
+        return None
+    frames, walk = path_of(reader, "frames"), path_of(reader, "walk")
+    clicks = path_of(reader, "clicks")
+    surveyed = [_point(entry) for entry in reader.children("surveyed", required=False)]
+    distances = [_distance(entry) for entry in reader.children("distances", required=False)]
+    reader.finish()
+    names = [point.name for point in surveyed]
+    for name in sorted({name for name in names if names.count(name) > 1}):
+        reader.add("surveyed", f"two points are named {name!r}")
+    if frames is None:
+        reader.add("frames", "missing: the folder with a recording of each camera at rest")
+        return None
+    return SceneSource(frames, walk, clicks, tuple(surveyed), tuple(distances))
+
+
+def _std(reader: Reader) -> float:
+    given = reader.optional_number("std_m", above=0.0)
+    return TAPE_STD_M if given is None else given
+
+
+def _point(reader: Reader) -> SurveyedPoint:
+    name, place, std = reader.string("name"), reader.vector("position_base_m", 3), _std(reader)
+    reader.finish()
+    return SurveyedPoint(name, np.asarray(place, dtype=np.float64), std)
+
+
+def _distance(reader: Reader) -> Distance:
+    ends = reader.raw("between")
+    good = isinstance(ends, list) and len(ends) == 2 and all(isinstance(e, str) for e in ends)
+    if not good or ends[0] == ends[1]:
+        reader.add("between", 'must be the names of two points, such as ["A", "B"]')
+        ends = ["", " "]
+    length, std = reader.number("distance_m", above=0.0), _std(reader)
+    reader.finish()
+    return Distance((ends[0], ends[1]), length, std)

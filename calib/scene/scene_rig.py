@@ -1,0 +1,199 @@
+"""The rig from a map: our own adjustment of cameras, lenses and points of the laboratory.
+
+A point of the laboratory is a board of one corner that rests at one moment, an image of the walk a
+camera whose lens is that of all others, so that `calib.rig` adjusts it all as it adjusts boards.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from freeswing.calib.camera.camera import Camera
+from freeswing.calib.camera.lens_models import Array
+from freeswing.calib.rig.bundle_adjustment import ROUGHLY_CONVERGED, Adjustment, adjust
+from freeswing.calib.rig.normal_equations import Problem
+from freeswing.calib.rig.reprojection import Scene, camera_slices
+from freeswing.calib.rig.reprojection_kernels import WARP
+from freeswing.calib.rig.solve_rig import Rig, free_unknowns
+from freeswing.calib.rig.views import Views, make_views
+from freeswing.calib.scene.lab_map import LabMap
+from freeswing.calib.scene.stills import Still
+from freeswing.cdpr.rotation import invert
+
+# A match that is wrong lies anywhere: 4 deviations leave 1 good sighting in 3000 out.
+MATCH_SIGMAS = 4.0
+# Seen three times a point tests itself; of two sightings one cannot be told to be wrong.
+LEAST_SIGHTINGS = 3
+# Points taken from each image, longest tracks first: 600 at 0.3 px place a camera of the rig to
+# 0.02 px; images of the walk need only hold together what those see.
+POINTS_A_CAMERA, POINTS_A_STILL = 600, 120
+# A blob's middle errs in proportion to its size; noise of pixels bounds that of the smallest.
+LEAST_SIZE_PX = 1.0
+_MOST_SWEEPS = 2
+
+
+def rig_of_map(found: LabMap, stills: Sequence[Still], model: str) -> Rig:
+    """The map adjusted in the frame of its first camera, in a scale of its own.
+
+    Cameras of the rig come first, then the walk's images that could be tied in. The first camera
+    stands at the identity and one coordinate of the one farthest from it is held: the scale.
+
+    Args:
+        found: the map, all cameras of the rig in it.
+        stills: what it was made of, cameras of the rig first.
+        model: lens model.
+    """
+    scene, views = _start(found, stills, model)
+    fresh = np.array([s.walk for s, tied in zip(stills, found.tied, strict=True) if tied])
+    free, equal = _unknowns(scene.cameras, fresh)
+    problem = Problem(np.zeros((1, 3)), views, None, free, equal)
+    result = adjust(scene, problem, rounds=1, converged=ROUGHLY_CONVERGED)
+    trimmed = 0
+    for _ in range(_MOST_SWEEPS):
+        keep = _kept(result, problem)
+        if keep.all():
+            break
+        trimmed += int((~keep).sum())
+        views, pieces = problem.views.select(keep).compacted()
+        problem = replace(problem, views=views)
+        result = adjust(result.scene.pieces(pieces), problem, result.sigma_px, 1, ROUGHLY_CONVERGED)
+    result = adjust(result.scene, problem, result.sigma_px, rounds=1)
+    return Rig(result, problem, 0, (), trimmed)
+
+
+def _start(found: LabMap, stills: Sequence[Still], model: str) -> tuple[Scene, Views]:
+    """The map as `calib.rig` has it: cameras, points as boards, and the sightings chosen."""
+    tied = np.flatnonzero(found.tied)
+    number = np.full(len(stills), -1)
+    number[tied] = np.arange(len(tied))
+    first = invert(found.poses[tied[0]])
+    cameras = tuple(
+        Camera(
+            stills[k].name,
+            (stills[k].image.shape[1], stills[k].image.shape[0]),
+            model,
+            found.params[k],
+            found.poses[k] @ first,
+        )
+        for k in tied.tolist()
+    )
+    _, once = np.unique(np.stack([found.image, found.point]), axis=1, return_index=True)
+    camera, point, pixels = number[found.image[once]], found.point[once], found.pixels[once]
+    variance = feature_variance(found.size_px[once])
+    keep = chosen_points(camera, point, np.array([stills[k].walk for k in tied]))
+    chosen = np.isin(point, keep)
+    views, kept = make_views(
+        camera[chosen],
+        point[chosen],
+        pixels[chosen][:, None],
+        covariance_px2=variance[chosen][:, None, None, None] * np.eye(2),
+        label=tuple(
+            f"{cameras[c].name}/{p}" for c, p in zip(camera[chosen], point[chosen], strict=True)
+        ),
+    ).compacted()
+    boards = np.tile(np.eye(4), (len(kept), 1, 1))
+    T_first_map = found.poses[tied[0]]
+    boards[:, :3, 3] = found.points[kept] @ T_first_map[:3, :3].T + T_first_map[:3, 3]
+    return Scene(cameras, boards, np.zeros(WARP), np.zeros((0, 3))), views
+
+
+def feature_variance(size_px: Array) -> Array:
+    """Variance of features by the size of their blobs, up to a common factor, (m,)."""
+    return LEAST_SIZE_PX**2 + size_px**2
+
+
+def chosen_points(camera: np.ndarray, point: np.ndarray, walk: np.ndarray) -> np.ndarray:
+    """The points that are adjusted: of every image the most often seen, sorted.
+
+    Args:
+        camera: camera of each sighting, (m,).
+        point: point of each, (m,).
+        walk: whether a camera is an image of the walk, (n_cameras,).
+    """
+    sightings = np.bincount(point)
+    chosen: set[int] = set()
+    for index, carried in enumerate(walk):
+        own = point[camera == index]
+        own = own[sightings[own] >= LEAST_SIGHTINGS]
+        order = np.argsort(-sightings[own], kind="stable")
+        most = POINTS_A_STILL if carried else POINTS_A_CAMERA
+        chosen |= set(own[order[:most]].tolist())
+    return np.array(sorted(chosen), dtype=int)
+
+
+def _unknowns(cameras: tuple[Camera, ...], walk: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Which unknowns are free, and which lenses are one."""
+    free = free_unknowns(cameras, held_pose=0)
+    slices, lens = camera_slices(cameras), len(cameras[0].params)
+    t = np.abs([camera.T_camera_base[:3, 3] for camera in cameras])
+    farthest, axis = np.unravel_index(int(np.argmax(t)), t.shape)
+    free[slices[int(farthest)].start + lens + int(axis)] = False
+    carried = np.flatnonzero(walk)
+    many = [np.arange(lens) + slices[k].start for k in carried[1:]]
+    if not many:
+        return free, np.zeros((2, 0), dtype=int)
+    followers = np.concatenate(many)
+    leaders = np.tile(np.arange(lens) + slices[int(carried[0])].start, len(many))
+    free[followers] = False
+    return free, np.stack([followers, leaders])
+
+
+def _kept(result: Adjustment, problem: Problem) -> np.ndarray:
+    """Sightings that agree, of points that are still seen often enough, bool (n_views,)."""
+    views = problem.views
+    error = np.linalg.norm(result.residuals_px[:, 0], axis=-1)
+    keep = error <= MATCH_SIGMAS * result.sigma_px[views.camera]
+    sightings = np.bincount(views.piece[keep], minlength=len(result.scene.T_base_boards))
+    return keep & (sightings[views.piece] >= LEAST_SIGHTINGS)
+
+
+def scaled(rig: Rig, factor: float) -> Rig:
+    """The rig with all lengths times `factor`; its covariance is that of the old scale."""
+    scene = rig.adjustment.scene
+
+    def longer(T: Array) -> Array:
+        moved = np.array(T)
+        moved[..., :3, 3] *= factor
+        return moved
+
+    cameras = tuple(replace(c, T_camera_base=longer(c.T_camera_base)) for c in scene.cameras)
+    scene = replace(
+        scene,
+        cameras=cameras,
+        T_base_boards=longer(scene.T_base_boards),
+        base_points_m=scene.base_points_m * factor,
+    )
+    return replace(rig, adjustment=replace(rig.adjustment, scene=scene))
+
+
+def rig_part(rig: Rig, count: int) -> Rig:
+    """The first `count` cameras alone, with their share of the covariance: what is handed on."""
+    result, views = rig.adjustment, rig.problem.views
+    cameras = rig.cameras[:count]
+    end, before = (camera_slices(some)[-1].stop for some in (cameras, rig.cameras))
+    index = np.concatenate([np.arange(end), np.arange(before, len(result.covariance))])
+    own = views.camera < count
+    fixed = rig.problem.fixed
+    seen = None if fixed is None else fixed.camera < count
+    problem = replace(
+        rig.problem,
+        views=views.select(own),
+        free=rig.problem.free[index],
+        equal=None,
+        fixed=fixed if fixed is None or seen is None else fixed.select(seen),
+    )
+    result = replace(
+        result,
+        scene=replace(result.scene, cameras=cameras),
+        covariance=result.covariance[np.ix_(index, index)],
+        weakest=result.weakest[index],
+        sigma_px=result.sigma_px[:count],
+        residuals_px=result.residuals_px[own],
+        fixed_residuals_px=result.fixed_residuals_px
+        if seen is None
+        else result.fixed_residuals_px[seen],
+    )
+    return Rig(result, problem, rig.reference, rig.dropped, rig.n_trimmed)

@@ -1,0 +1,232 @@
+"""The platform as points with descriptors, from the calibrated cameras' frames of it at rest."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from freeswing.calib.camera.camera import Camera
+from freeswing.calib.rig.triangulation import triangulate
+from freeswing.cdpr.files.documents import DataError, InputError, read_text
+from freeswing.cdpr.files.number_table import comma_separated
+from freeswing.cdpr.measured.target import Untagged
+from freeswing.cdpr.rotation import transform
+from freeswing.vision.untagged.features import FeatureFinder, Features, matched
+from freeswing.vision.untagged.still_pose import still_pose
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Image = NDArray[np.uint8]
+
+# Grey levels between a frame at rest and one of a swing: noise makes 5, another print 20 and more.
+CHANGED_GREY = 12.0
+# Share of a swing's frames that differ where the platform hangs at rest; where it only passes by,
+# few do.
+CHANGED_SHARE = 0.4
+# A point whose cameras disagree by more is a wrong match.
+WORST_PX = 2.0
+# Six numbers of a pose from points of two numbers each; 30 leave a tenth of a point's noise.
+LEAST_POINTS = 30
+# Named points where clicked against where stated: a millimetre is a click, 10 mm another point.
+WORST_NAMED_M = 0.01
+CLICK_STD_PX = 0.5
+_COLUMNS = ("camera", "point", "u_px", "v_px")
+_MOST_BYTES = 1 << 24
+_SMOOTH_PX = 1.5
+
+
+@dataclass(frozen=True, slots=True)
+class RestModel:
+    """Points of the platform.
+
+    Attributes:
+        points_m: platform frame, (n, 3).
+        T_base_rest: platform to base at rest, by the named points, (4, 4).
+        seen: by camera name: points, and their features at rest, in one order.
+        frame_std: how well the marks give its frame, of position (m) and small rotation, (6,).
+    """
+
+    points_m: Array
+    T_base_rest: Array
+    seen: Mapping[str, tuple[Ints, Features]]
+    frame_std: Array
+
+
+def moving_part(rest: Image, frames: Sequence[Image]) -> NDArray[np.bool_]:
+    """Where the platform hangs at rest: what differs from most frames of a swing, (h, w)."""
+    if not len(frames):
+        return np.ones(rest.shape, dtype=bool)
+    still = cv2.GaussianBlur(rest.astype(np.float32), (0, 0), _SMOOTH_PX)
+    count = np.zeros(rest.shape)
+    for frame in frames:
+        now = cv2.GaussianBlur(frame.astype(np.float32), (0, 0), _SMOOTH_PX)
+        count += np.abs(now - still) > CHANGED_GREY
+    mask = (count >= CHANGED_SHARE * len(frames)).astype(np.uint8)
+    closed = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, np.ones((15, 15), np.uint8))
+    return np.asarray(cv2.morphologyEx(closed, cv2.MORPH_OPEN, np.ones((5, 5), np.uint8)) > 0)
+
+
+def rest_model(
+    cameras: Sequence[Camera],
+    rests: Mapping[str, Image],
+    swings: Mapping[str, Sequence[Image]],
+    untagged: Untagged,
+) -> RestModel:
+    """The platform's points in the frame that three named points of target.toml give.
+
+    Args:
+        cameras: as calibrated.
+        rests: each camera's image of the platform at rest.
+        swings: some frames of each in which it moves, to tell it from what stands behind.
+        untagged: what target.toml says of it.
+
+    Raises:
+        InputError: marks that make no sense.
+        DataError: too few common features, or named points that do not fit.
+    """
+    seen = [camera for camera in cameras if camera.name in rests]
+    finder = FeatureFinder()
+    found = []
+    for camera in seen:
+        rest = rests[camera.name]
+        features = finder.look(rest)
+        mask = moving_part(rest, swings.get(camera.name, ()))
+        at = np.rint(features.pixels).astype(int)
+        height, width = rest.shape
+        inside = mask[np.clip(at[:, 1], 0, height - 1), np.clip(at[:, 0], 0, width - 1)]
+        found.append(features.select(inside))
+    T_base_rest, frame_std = _named_frame(seen, untagged)
+    pixels, features_of = _tracks(seen, found)
+    points = triangulate(seen, pixels)
+    error = np.stack([_errors(c, points, p) for c, p in zip(seen, pixels, strict=True)])
+    with np.errstate(invalid="ignore"):
+        good = np.isfinite(points[:, 0]) & (np.nanmax(error, axis=0) < WORST_PX)
+    if good.sum() < LEAST_POINTS:
+        counts = ", ".join(f"{c.name} {len(f)}" for c, f in zip(seen, found, strict=True))
+        raise DataError(
+            f"{untagged.rest}: {int(good.sum())} points of the platform are seen by two cameras, "
+            f"need {LEAST_POINTS} (features where it hangs: {counts}): cameras more than 30 "
+            "degrees apart see too little alike; add one between, or stick printed texture on it"
+        )
+    back = np.linalg.inv(T_base_rest)
+    inside = points[good] @ back[:3, :3].T + back[:3, 3]
+    numbers = np.full(len(points), -1)
+    numbers[good] = np.arange(int(good.sum()))
+    by_camera = {}
+    for camera, own, feature in zip(seen, features_of, found, strict=True):
+        rows = np.flatnonzero((own >= 0) & good)
+        by_camera[camera.name] = (numbers[rows], feature.select(own[rows]))
+    return RestModel(inside, T_base_rest, by_camera, frame_std)
+
+
+def _errors(camera: Camera, points: Array, pixels: Array) -> Array:
+    return np.linalg.norm(pixels - camera.project(camera.to_camera(points)), axis=-1)
+
+
+def _tracks(cameras: Sequence[Camera], found: Sequence[Features]) -> tuple[Array, list[Ints]]:
+    """Pixels of each point in each camera, (n_c, n, 2), and its feature there (-1: none)."""
+    tracks: list[dict[int, int]] = []
+    place: dict[tuple[int, int], int] = {}
+    for a in range(len(cameras)):
+        for b in range(a + 1, len(cameras)):
+            pairs = matched(found[a].descriptors, found[b].descriptors)
+            for i, j in zip(*(p.tolist() for p in pairs), strict=True):
+                known = place.get((a, i), place.get((b, j)))
+                if known is None:
+                    known = len(tracks)
+                    tracks.append({})
+                if tracks[known].setdefault(a, i) == i and tracks[known].setdefault(b, j) == j:
+                    place[a, i] = place[b, j] = known
+    pixels = np.full((len(cameras), len(tracks), 2), np.nan)
+    own = [np.full(len(tracks), -1) for _ in cameras]
+    for number, track in enumerate(tracks):
+        for camera, feature in track.items():
+            own[camera][number] = feature
+            pixels[camera, number] = found[camera].pixels[feature]
+    return pixels, own
+
+
+def _named_frame(cameras: Sequence[Camera], untagged: Untagged) -> tuple[Array, Array]:
+    """T_base_platform at rest from the clicked named points, and its deviations, (6,)."""
+    clicks = _clicks(untagged, [camera.name for camera in cameras])
+    names = [point.name for point in untagged.points]
+    pixels = np.full((len(cameras), len(names), 2), np.nan)
+    std_px = np.ones((len(cameras), len(names)))
+    for row, camera in enumerate(cameras):
+        for column, name in enumerate(names):
+            if (camera.name, name) in clicks:
+                pixels[row, column] = clicks[camera.name, name][:2]
+                std_px[row, column] = clicks[camera.name, name][2]
+    places = triangulate(cameras, pixels)
+    known = np.isfinite(places[:, 0])
+    if known.sum() < 3:
+        lost = ", ".join(name for name, ok in zip(names, known, strict=True) if not ok)
+        raise DataError(
+            f"{untagged.clicks}: {int(known.sum())} named points are marked in two cameras, need "
+            f"three; mark {lost} in two cameras each"
+        )
+    stated = np.array([point.position_m for point in untagged.points])
+    own = np.array(names)[known].tolist()
+    start = rigid(stated[known], places[known], str(untagged.clicks), own)
+    camera_of, which = np.nonzero(np.isfinite(pixels[..., 0]))
+    marks, std = pixels[camera_of, which], std_px[camera_of, which]
+    T, covariance = still_pose(cameras, camera_of, stated[which], marks, std, start)
+    return T, np.sqrt(np.diag(covariance))
+
+
+def rigid(stated: Array, places: Array, where: str, names: Sequence[str]) -> Array:
+    """T (4, 4) with places = T stated of least squares.
+
+    Raises:
+        DataError: the points do not fit, with the one that is off most.
+
+    Source:
+        Kabsch 1976, A solution for the best rotation to relate two sets of vectors.
+    """
+    a, b = stated - stated.mean(axis=0), places - places.mean(axis=0)
+    left, _, right = np.linalg.svd(b.T @ a)
+    turn = left @ np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))]) @ right
+    off = np.linalg.norm(b - a @ turn.T, axis=1)
+    if off.max() > WORST_NAMED_M:
+        raise DataError(
+            f"{where}: point {names[int(off.argmax())]} lies {1e3 * off.max():.1f} mm from where "
+            f"target.toml has it beside the others, limit {1e3 * WORST_NAMED_M:.0f} mm: a wrong "
+            "mark, a wrong position_m, or millimetres for metres"
+        )
+    return transform(turn, places.mean(axis=0) - turn @ stated.mean(axis=0))
+
+
+def _clicks(untagged: Untagged, cameras: Sequence[str]) -> dict[tuple[str, str], Array]:
+    """Marks by camera and point: u, v and their deviation, (3,)."""
+    path: Path = untagged.clicks
+    lines = comma_separated(read_text(path, _MOST_BYTES)).splitlines()
+    table = csv.DictReader(lines, skipinitialspace=True)
+    missing = [name for name in _COLUMNS if name not in (table.fieldnames or ())]
+    if missing:
+        raise InputError(f"{path}: line 1: no column {', '.join(missing)}")
+    names = [point.name for point in untagged.points]
+    found = {}
+    for row in table:
+        where = f"{path}: line {table.line_num}"
+        for key, known in (("camera", cameras), ("point", names)):
+            if row[key] not in known:
+                told = ", ".join(known)
+                raise InputError(f"{where}: {key} {(row[key] or '')[:60]!r} is not one of {told}")
+        try:
+            mark = np.array([float(row["u_px"] or ""), float(row["v_px"] or ""), CLICK_STD_PX])
+            mark[2] = float(row.get("std_px") or CLICK_STD_PX)
+        except ValueError as error:
+            raise InputError(f"{where}: u_px, v_px or std_px is not a number") from error
+        if not ((np.abs(mark[:2]) < 1e6).all() and 1e-3 <= mark[2] <= 1e2):
+            raise InputError(
+                f"{where}: u_px {mark[0]:g}, v_px {mark[1]:g} must be pixels, std_px {mark[2]:g} "
+                "from 0.001 to 100"
+            )
+        found[row["camera"] or "", row["point"] or ""] = mark
+    return found
