@@ -49,7 +49,7 @@ def rig_of_map(found: LabMap, stills: Sequence[Still], model: str) -> Rig:
     scene, views = _start(found, stills, model)
     fresh = np.array([s.walk for s, tied in zip(stills, found.tied, strict=True) if tied])
     free, equal = _unknowns(scene.cameras, fresh)
-    problem = Problem(np.zeros((1, 3)), views, None, free, equal)
+    problem = Problem(np.zeros((1, 3)), views, None, free, equal=equal)
     result = adjust(scene, problem, rounds=1, converged=ROUGHLY_CONVERGED)
     trimmed = 0
     for _ in range(_MOST_SWEEPS):
