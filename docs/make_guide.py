@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -207,6 +208,46 @@ def effects() -> Rows:
     return rows
 
 
+def bench_budget() -> Rows:
+    """Where an object's deviation comes from on a bench, by what was done about it."""
+    from freeswing.excite.bench_plan import BenchCase, deviations
+
+    plain = BenchCase(1.26, 0.04, 0.8, 0.0093, radius_m=0.25, length_m=1.2, known_kg=0.4)
+    ways = {
+        "tape measure, platform to 50 g": plain,
+        "no known mass": replace(plain, known_kg=1e-9),
+        "known mass at the radius of gyration": replace(plain, known_at=0.71),
+        "platform weighed to 1 g": replace(plain, mass_std_kg=0.001),
+        "the same, radii to 0.1 mm": replace(plain, mass_std_kg=0.001, radius_std_m=1e-4),
+        "centre of mass unknown to 10 mm": replace(plain, mass_std_kg=0.001, com_std_m=0.01),
+    }
+    names = ["total", *(name for name in deviations(plain) if name != "total")]
+    rows = [["", *names]]
+    for words, case in ways.items():
+        shares = deviations(case)
+        rows.append([words, *(_percent(shares[name] / case.load_izz_kg_m2) for name in names)])
+    return rows
+
+
+def bench_plan() -> Rows:
+    """The plan of `excite` for the same bench: the best of each choice, and its neighbours."""
+    from freeswing.excite.bench_plan import BenchCase, planned
+    from freeswing.excite.bench_table import WORDS
+
+    case = BenchCase(1.26, 0.04, 0.8, 0.0093, radius_m=0.25, length_m=1.2, known_kg=0.4)
+    rows = [["", "Izz of the object ±, by value"]]
+    for what, words in WORDS.items():
+        mine = [row for row in planned(case)[1] if row.what == what]
+        told = [f"{row.value:g}: {_percent(row.percent / 100)}" for row in mine]
+        marked = [f"**{one}**" if row.best else one for one, row in zip(told, mine, strict=True)]
+        rows.append([words, ", ".join(marked)])
+    return rows
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.2f} %"
+
+
 def _examples() -> tuple[numbers.Example, numbers.Example]:
     return numbers.cable_robot(), numbers.string_plate()
 
@@ -216,6 +257,8 @@ QUICK: dict[str, tuple[str, Callable[[], Rows]]] = {
     "placement": ("guide/cameras.md", placement),
     "tag-sizes": ("guide/tags.md", tag_sizes),
     "flatness": ("guide/tags.md", flatness),
+    "bench-budget": ("guide/bench.md", bench_budget),
+    "bench-plan": ("guide/bench.md", bench_plan),
 }
 LONG: dict[str, tuple[str, Callable[[], Rows]]] = {
     "effects": ("guide/verdicts.md", effects),

@@ -144,3 +144,33 @@ class Excitation(Document):
     refinement: Numbers = ()
     seconds: Mapping[str, float | None] = empty(default_factory=dict)
     random_plans: RandomPlans | None = None
+
+
+@entry
+class BenchChoice(Entry):
+    """What a choice would cost, all else as the plan has it: deviation of the object's Izz."""
+
+    what: str
+    value: float
+    percent: float
+    best: bool = False
+
+
+@entry
+class BenchSource(Entry):
+    """What one source adds to the deviation of the object's Izz under the plan."""
+
+    what: str
+    percent: float
+
+
+@entry
+class BenchPlan(Document):
+    """Which swings of a bench tell an object's Izz best, and what remains of its deviation."""
+
+    kind: ClassVar[str] = "bench-plan"
+
+    percent: float
+    choices: tuple[BenchChoice, ...] = ()
+    sources: tuple[BenchSource, ...] = ()
+    assumed: Mapping[str, float] = empty(default_factory=dict)

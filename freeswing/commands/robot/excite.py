@@ -12,6 +12,7 @@ from freeswing.commands.arguments import (
     positive_whole,
     whole,
 )
+from freeswing.commands.robot.excite_bench import add_bench_arguments, run_bench
 from freeswing.commands.robot.excite_drive import (
     RANDOM,
     SCORED,
@@ -65,10 +66,14 @@ def add_arguments(parser: ArgumentParser) -> None:
         help="conditioning of FIDIM, or information of the maximum-likelihood fit",
     )
     add_drive_arguments(parser)
+    add_bench_arguments(parser)
 
 
 def run(options: Namespace, console: Console) -> None:
     """Plan, and say what the plan is worth."""
+    from freeswing.cdpr.files.robot_file import read_robot
+    from freeswing.session.load_bench import hangs_parallel
+
     if options.drive:
         asked = {"duration_s": SECONDS, "starts": SCORED, "random": RANDOM}
     else:
@@ -76,7 +81,14 @@ def run(options: Namespace, console: Console) -> None:
     for name, value in asked.items():
         if getattr(options, name) is None:
             setattr(options, name, value)
-    (run_drive if options.drive else _plan_swings)(options, console)
+    if options.drive:
+        run_drive(options, console)
+        return
+    robot = read_robot(options.robot)
+    if hangs_parallel(robot):
+        run_bench(robot, options, console)
+    else:
+        _plan_swings(options, console)
 
 
 def _plan_swings(options: Namespace, console: Console) -> None:
