@@ -15,6 +15,7 @@ from freeswing.cdpr.measured.marker_recording import MarkerRecording
 from freeswing.cdpr.measured.target import Marker, Target, write_target
 from freeswing.cdpr.robot import Cable, Platform, Robot
 from tests.oracle import session_files as files
+from tests.oracle.benches import make_bench
 from tests.oracle.equilibrium import displaced, lengths_at, settle, tensions_at_rest
 from tests.oracle.geometry import turn
 from tests.oracle.newton_euler import Motion, simulate
@@ -42,6 +43,7 @@ def main() -> None:
     make_two_cables(SAMPLES / "two-cables")
     make_from_oracle(SAMPLES / "three-cables", 31, "three-cable", {})
     make_from_oracle(SAMPLES / "undeclared-drag", 47, "bologna-4", {"translational_drag": 0.06})
+    make_benches(SAMPLES / "trifilar")
 
 
 def make_from_oracle(folder: Path, seed: int, robot: str, effects: dict[str, object]) -> None:
@@ -56,6 +58,13 @@ def make_from_oracle(folder: Path, seed: int, robot: str, effects: dict[str, obj
         duration_s=DURATION_S,
         lengths_std_m=LENGTH_NOISE_M,
     )
+
+
+def make_benches(folder: Path) -> None:
+    """A trifilar bench with an object, by poses and by nothing but a dot on a wall."""
+    for seen, seed in (("poses", 5), ("track", 6)):
+        _emptied(folder / seen)
+        make_bench(folder / seen, seed, wires=3, seen=seen, duration_s=6.0, counts=(2, 2, 2))
 
 
 def make_mocap(folder: Path) -> None:
