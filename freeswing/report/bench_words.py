@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from freeswing.report.words import number
-from freeswing.results.identification import BodyParameter, ClassicRow, Identification
+from freeswing.results.identification import BodyParameter, BudgetShare, ClassicRow, Identification
 
 HALF_WIDTH_95 = 1.959964
 
@@ -14,6 +14,9 @@ def bench_lines(document: Identification) -> list[str]:
     for one in document.objects or ():
         lines.append(one.name)
         lines += [f"  {object_row(row)}" for row in one.parameters]
+    for budget in document.budgets or ():
+        lines.append(f"  deviation of {budget.name}'s Izz_P, by source (kg m2, one deviation):")
+        lines += [f"    {budget_row(share)}" for share in _counting(budget.shares)]
     for row in document.classic or ():
         lines.append(f"  classic formula, {row.run}: {classic_row(row)}")
     for run in document.validation:
@@ -22,6 +25,17 @@ def bench_lines(document: Identification) -> list[str]:
             f"(noise {number(run.noise_floor)})"
         )
     return [*lines, *(f"  note: {note}" for note in document.notes)]
+
+
+def _counting(shares: tuple[BudgetShare, ...]) -> list[BudgetShare]:
+    """The sources that count: down to a twentieth of the largest."""
+    most = max((share.std_kg_m2 for share in shares), default=0.0)
+    return [share for share in shares if share.std_kg_m2 >= 0.05 * most]
+
+
+def budget_row(share: BudgetShare) -> str:
+    """One source of a deviation."""
+    return f"{number(share.std_kg_m2, 2):>9}  {share.what}"
 
 
 def object_row(row: BodyParameter) -> str:

@@ -188,6 +188,22 @@ class ClassicRow(Entry):
 
 
 @entry
+class BudgetShare(Entry):
+    """What one source adds to a deviation, in quadrature."""
+
+    what: str
+    std_kg_m2: float = 0.0
+
+
+@entry
+class Budget(Entry):
+    """Where the deviation of a body's Izz about P comes from, largest first."""
+
+    name: str
+    shares: tuple[BudgetShare, ...] = ()
+
+
+@entry
 class MarkerRun(Entry):
     """How rigid the markers were in one run: standard deviations about a rigid body.
 
@@ -236,6 +252,7 @@ class Identification(Document):
         notes: sentences about the session.
         objects: platform and loads where the session has loads or payloads.
         channels: uncalibrated signals of a bench.
+        budgets: of a bench, where each body's deviation of Izz comes from.
         classic: the classic formula of benches, by run.
         scatter_between_runs_kg_m2: of Izz on a bench beyond noise; 0: none was seen.
         swings: where each run took place.
@@ -254,6 +271,7 @@ class Identification(Document):
     notes: tuple[str, ...] = ()
     objects: tuple[Body, ...] | None = absent(default=None)
     channels: tuple[ChannelResult, ...] | None = absent(default=None)
+    budgets: tuple[Budget, ...] | None = absent(default=None)
     classic: tuple[ClassicRow, ...] | None = absent(default=None)
     scatter_between_runs_kg_m2: float | None = absent(default=None)
     swings: tuple[SwingPlace, ...] = ()

@@ -14,9 +14,11 @@ from freeswing.ident.bench.begin import Glimpse, best_size, first_gains, glimpse
 from freeswing.ident.bench.channel_blocks import channel_blocks
 from freeswing.ident.bench.channels import Channel
 from freeswing.ident.bench.chart import Chart
+from freeswing.ident.bench.considered import named_sway, reference
+from freeswing.ident.bench.modal import SQUARE, ModalSwing
 from freeswing.ident.bench.objects import body_of, moments, specific
 from freeswing.ident.bench.runs import Bench, BenchRun, Load
-from freeswing.ident.bench.swing import BenchSwing, Column, Riding
+from freeswing.ident.bench.swing import COMMON, IZZ, BenchSwing, Column, Riding
 from freeswing.ident.likelihood.unknowns import Gaussian, Unknown, Unknowns
 from freeswing.ident.signals.prepare import guessed_inertia
 
@@ -24,13 +26,16 @@ EFFECTS = ("rotational_drag", "translational_drag")  # air is never absent
 UNIT_NOISE_M, UNIT_NOISE_RAD = 1e-4, 5e-4
 UNSTATED_LENGTH_STD_M = 1e-3
 EACH_LENGTH = 1e-4  # of a wire's length: what weights stretch and rehanging shifts
+TWICE_AS_WIDE = 3.0  # of squared amplitude: a twist of twice the usual is one deviation off
+WRONG_LENGTH = 0.03  # of it: knots, hooks, a unit's slip; what is looked for where sway is seen
 SWAY_RAD = 0.02  # unseen sway after a twist by hand: a degree
 UNSEEN_RAD = 0.3  # an angle that no column measures directly
 SEEN_RAD = 0.5  # where it is measured the samples say all: nothing is assumed
 WIDE_COM = 0.3  # of the attachments' spread: a body lies or hangs among its wires
 UPRIGHT = 0.9  # of gravity along a platform axis: along it the centre may hang far down
-CENTRED_COM = 0.05  # the same of a platform, across: its wires share the weight to a tenth
+CENTRED_COM = 0.02  # the same of a platform, across: its wires share the weight to 4 %
 WIDE_TENSOR = 2.0  # of mass x spread^2: twice a hoop through the wires
+WIDE_PRODUCTS = 0.3  # of its Izz: a body of 1 to 2.5 whose axes lie askew by 25 degrees
 WIDE_MASS = 0.5  # of the declared mass, where payloads are to say it
 SCANNED_RUNS = 4
 
@@ -180,18 +185,21 @@ def assembled(model: Model, bench: Bench, runs: Sequence[BenchRun]) -> Assembled
     runs = [averaged(run) for run in runs]
     columns = [columns_of(run, bench.channels) for run in runs]
     gains = {
-        channel.name: first_gains(channel, held)
-        for channel in bench.channels
+        channel.name: first_gains(channel, held, place)
+        for place, channel in enumerate(bench.channels)
         if (held := [one for seen in columns for one in seen if one.channel == channel])
     }
     guess = first_guess(model, bench, runs, columns, gains)
     wires = _wire_groups(runs)
     swings, glimpses = [], []
+    # Without a measured coordinate in any run the motion's scale is not known: see modal.py.
+    kind = BenchSwing if any(run.coordinates for run in runs) else ModalSwing
     for run, seen, name in zip(runs, columns, wires, strict=True):
         inertia = specific(guess.total(run))
         view = sight(model, run.name, _lengths(run), inertia, run.times_s, seen, gains)
         first = glimpse(model, view, inertia)
-        swings.append(_swing(model, run, seen, first, name))
+        swing = _swing(kind, model, run, seen, first, name)
+        swings.append(replace(swing, place=len(swings)))
         glimpses.append(first)
     unknowns = _unknowns(model, bench, runs, swings, glimpses, guess, gains)
     return Assembled(tuple(swings), unknowns, tuple(runs))
@@ -206,7 +214,12 @@ def _wire_groups(runs: Sequence[BenchRun]) -> list[str]:
 
 
 def _swing(
-    model: Model, run: BenchRun, columns: tuple[Column, ...], first: Glimpse, wires: str
+    kind: type[BenchSwing],
+    model: Model,
+    run: BenchRun,
+    columns: tuple[Column, ...],
+    first: Glimpse,
+    wires: str,
 ) -> BenchSwing:
     noisy = []
     for column, left in zip(columns, first.residuals, strict=True):
@@ -217,7 +230,7 @@ def _swing(
     riding += [Riding(f"load.{one.load}", one.turn, one.shift_m) for one in run.loads]
     known = sum((moments(one.body) for one in run.payloads), np.zeros(10))
     chart = Chart.about(model, first.rest.zeta)
-    return BenchSwing(
+    return kind(
         name=run.name,
         model=model,
         times_s=run.times_s,
@@ -249,21 +262,38 @@ def _unknowns(
         run = runs[[swing.wires for swing in swings].index(name)]
         std = run.lengths_std_m or UNSTATED_LENGTH_STD_M
         blocks.append(_centred(name, np.zeros(robot.n_cables), std, "cable_lengths_std_m"))
-    each = EACH_LENGTH * float(np.mean([_lengths(run) for run in runs]))
+    mean = float(np.mean([_lengths(run) for run in runs]))
+    blocks.append(_centred(COMMON, np.zeros(1), WRONG_LENGTH * mean, "wires as sway has them"))
+    each = EACH_LENGTH * mean
     zero = np.zeros((len(runs), robot.n_cables))
     blocks.append(_centred("wires_each", zero, each, "wires between runs", each_run=True))
     blocks.append(_starts(swings, glimpses))
-    for channel in bench.channels:
+    for place, channel in enumerate(bench.channels):
         if channel.name in gains:
-            blocks += channel_blocks(channel, swings, glimpses, gains[channel.name])
+            named = named_sway(bench, runs, place)
+            blocks += channel_blocks(channel, swings, glimpses, gains[channel.name], named)
+    scaled = reference(bench, runs)
+    if scaled is not None:
+        blocks.append(_amplitude(scaled))
     return Unknowns(tuple(blocks))
+
+
+def _amplitude(channel: Channel) -> Unknown:
+    """How much larger than assumed amplitudes are, squared: as wide as the gain's own spread."""
+    main = channel.main_coordinate
+    wide = TWICE_AS_WIDE
+    if main in channel.gains:
+        wide = 2.0 * channel.gains_std.get(main, 0.0) / abs(channel.gains[main]) + 1e-6
+    prior = Gaussian(np.ones(1), np.full(1, wide), "gains" if main in channel.gains else "a twist")
+    low = np.full(1, 1e-3)
+    return Unknown(SQUARE, np.ones(1), np.full(1, min(1.0, wide)), prior, low=low)
 
 
 def _platform(robot: Robot, bench: Bench, runs: Sequence[BenchRun], guess: Guess) -> Unknown:
     mass, size = guess.platform[0], extent(robot)
     payload = any(run.payloads for run in runs)
     std = bench.mass_std_kg or (WIDE_MASS * mass if payload else None)
-    wide = wide_body(mass, size)
+    wide = wide_body(mass, size, guess.platform[IZZ])
     down = np.abs(robot.gravity_m_s2) / np.linalg.norm(robot.gravity_m_s2)
     wide[:3] *= np.where(down > UPRIGHT, 1.0, CENTRED_COM / WIDE_COM)
     spread = np.concatenate([[std or 1.0], wide])
@@ -274,20 +304,20 @@ def _platform(robot: Robot, bench: Bench, runs: Sequence[BenchRun], guess: Guess
     return Unknown("platform", guess.platform, scale, prior, estimated)
 
 
-def wide_body(mass_kg: float, extent_m: float) -> Array:
+def wide_body(mass_kg: float, extent_m: float, izz_kg_m2: float) -> Array:
     """Prior spread of centre and tensor of a body of which nothing but its size is known, (9,).
 
     Source:
         Bishop 2006, Pattern Recognition and Machine Learning, sec. 2.3: a wide prior; sizes
         by m l^2.
     """
-    return np.concatenate(
-        [np.full(3, WIDE_COM * extent_m), np.full(6, WIDE_TENSOR * mass_kg * extent_m**2)]
-    )
+    tensor = np.full(3, WIDE_TENSOR * mass_kg * extent_m**2)
+    products = np.full(3, WIDE_PRODUCTS * abs(izz_kg_m2))
+    return np.concatenate([np.full(3, WIDE_COM * extent_m), tensor, products])
 
 
 def _load(load: Load, robot: Robot, body: Array) -> Unknown:
-    wide = wide_body(load.mass_kg, extent(robot))
+    wide = wide_body(load.mass_kg, extent(robot), body[IZZ])
     if load.com_std_m is not None:
         wide[:3] = load.com_std_m
     mass_std = load.mass_std_kg or 0.0

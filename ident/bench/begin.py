@@ -23,7 +23,9 @@ MODAL_S = 6.0  # so long do swings of a few degrees stay small oscillations
 MOST_SAMPLES = 400
 SIZES = np.exp(np.arange(-4.0, 3.0, 0.12))  # of the guessed tensor: a pen to a plank
 RIDGE = 1e-4  # of a column's variance: equal modes share what they cannot tell apart
-TYPICAL_YAW_RAD = 0.09  # five degrees: a twist by hand
+TYPICAL_YAW_RAD = 0.06  # three and a half degrees: a twist by hand
+LITTLE = 0.1  # of a gain: not zero, for from zero times zero no step leads away
+SWAY_M = 0.02  # what a further channel is there to see
 LEVER_M = 1.0  # metres that turn a channel's gain for yaw into a first one for sway
 
 
@@ -120,15 +122,16 @@ def sight(
     return Sight(name, rest, since, values, np.isfinite(values), seen, is_direct)
 
 
-def first_gains(channel: Channel, columns: Sequence[Column]) -> Array:
+def first_gains(channel: Channel, columns: Sequence[Column], place: int = 0) -> Array:
     """A first guess of a channel's gains, (terms,): those given, else by a usual twist.
 
-    Squares and cubes start at zero, linear gains never do: amplitude and gain multiply, and from
-    zero times zero no step leads away.
+    Squares and cubes start at zero. Sway has no direction that uncalibrated channels could name:
+    the first answers to its first sway coordinate, the second to the next, a little to the others.
 
     Args:
         channel: of which they are wanted.
         columns: what all runs hold of it.
+        place: of the channel among all of the bench.
 
     Source:
         Press et al. 2007, Numerical Recipes, sec. 14.1: percentiles and medians as a scale.
@@ -140,9 +143,14 @@ def first_gains(channel: Channel, columns: Sequence[Column]) -> Array:
     main = channel.main_coordinate
     usual = channel.gains.get(main, float(np.median(sizes)) / TYPICAL_YAW_RAD)
     found = np.zeros(len(channel.terms))
-    for place, name in enumerate(channel.coordinates):
-        lever = LEVER_M if name in POSE_COORDINATES[:3] else 1.0
-        found[place] = channel.gains.get(name, usual / lever)
+    sway = [name for name in channel.coordinates if name in POSE_COORDINATES[:3]]
+    for k, name in enumerate(channel.coordinates):
+        guess = usual
+        if name in sway:
+            mine = sway.index(name) == place % len(sway)
+            full = usual / LEVER_M if place == 0 else float(np.median(sizes)) / SWAY_M
+            guess = full if mine else LITTLE * full
+        found[k] = channel.gains.get(name, guess)
     return found
 
 

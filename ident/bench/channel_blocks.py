@@ -14,16 +14,28 @@ from freeswing.ident.likelihood.unknowns import Gaussian, Unknown
 
 BENT = 2.0  # squares of a channel per rad, over its gain: a wall hit at 45 degrees
 TWICE_BENT = 4.0  # cubes likewise
-UNKNOWN_GAIN = 0.5  # of a gain guessed from a usual twist
+UNKNOWN_GAIN = 1.0  # of a gain guessed from a usual twist
 OWN_LEVER = 2.0  # gains for sway over that for yaw, 1/m: a dot on a wall half a metre away
 OFFSET = 10.0  # times a channel's spread
 FOLLOWED_RIDGE = 1e-4  # of the motion's variance: coordinates that hardly move get no large gain
 
 
 def channel_blocks(
-    channel: Channel, swings: Sequence[BenchSwing], glimpses: Sequence[Glimpse], gains: Array
+    channel: Channel,
+    swings: Sequence[BenchSwing],
+    glimpses: Sequence[Glimpse],
+    gains: Array,
+    named: tuple[int, ...] = (),
 ) -> list[Unknown]:
-    """The offset of every run, and the gains with what is known of them."""
+    """The offset of every run, and the gains with what is known of them.
+
+    Args:
+        channel: which.
+        swings: of all runs.
+        glimpses: of the same.
+        gains: first guesses, (terms,).
+        named: places of the sway coordinates that its gains name, see `considered.named_sway`.
+    """
     mine = [column for swing in swings for column in swing.columns if column.channel == channel]
     spread = max(float(np.nanstd(column.values)) for column in mine)
     offsets = np.zeros((len(swings), 1))
@@ -37,7 +49,7 @@ def channel_blocks(
         "unknown zero",
     )
     if any(swing.columns[0].channel != channel for swing in swings) and not channel.gains:
-        gains = _followed_gains(channel, swings, glimpses, gains)
+        gains = _followed_gains(channel, swings, glimpses, gains, named)
     std = gain_spread(channel, gains)
     exact = np.array(
         [
@@ -75,9 +87,16 @@ def channel_blocks(
 
 
 def _followed_gains(
-    channel: Channel, swings: Sequence[BenchSwing], glimpses: Sequence[Glimpse], gains: Array
+    channel: Channel,
+    swings: Sequence[BenchSwing],
+    glimpses: Sequence[Glimpse],
+    gains: Array,
+    named: tuple[int, ...],
 ) -> Array:
-    """Linear gains by which a channel follows the motion that other columns tell, (terms,)."""
+    """Linear gains by which a channel follows the motion that other columns tell, (terms,).
+
+    What its gains name is not among what they tell: there the first guess stays.
+    """
     rows, right, linear = [], [], len(channel.coordinates)
     for swing, first in zip(swings, glimpses, strict=True):
         for place, column in enumerate(swing.columns):
@@ -87,10 +106,12 @@ def _followed_gains(
                 rows.append((moved - moved.mean(axis=0))[known])
                 right.append(values[known] - values[known].mean())
     design, told = np.vstack(rows), np.concatenate(right)
+    design = np.where(np.isin(np.arange(linear), named), 0.0, design)
     held = np.sqrt(FOLLOWED_RIDGE * len(told)) * np.abs(design).max() * np.eye(linear)
     found = np.linalg.lstsq(
         np.vstack([design, held]), np.append(told, np.zeros(linear)), rcond=None
     )[0]
+    found = np.where(np.isin(np.arange(linear), named), gains[:linear], found)
     return np.concatenate([found, np.zeros(len(gains) - linear)])
 
 

@@ -12,21 +12,24 @@ from freeswing.cdpr.model.batch import evaluate
 from freeswing.cdpr.model.equations import Model, build_model
 from freeswing.cdpr.robot import INERTIA_NAMES, POSE_COORDINATES, Array, Robot
 from freeswing.ident.bench.assemble import EFFECTS, assembled
-from freeswing.ident.bench.classic import (
+from freeswing.ident.bench.objects import moments, moments_slope, specific, specific_slope
+from freeswing.ident.bench.runs import Bench, BenchRun, Signal
+from freeswing.ident.bench.solve import Solved, solved
+from freeswing.ident.bench.told.budget import bent_std, budget
+from freeswing.ident.bench.told.classic import (
     ClassicRun,
     classic_runs,
     group_sentence,
+    held_sentences,
     leaning_sentence,
+    wires_sentence,
 )
-from freeswing.ident.bench.held_out import HeldOut, held_out
-from freeswing.ident.bench.objects import moments, moments_slope, specific, specific_slope
-from freeswing.ident.bench.report_objects import (
+from freeswing.ident.bench.told.held_out import HeldOut, held_out
+from freeswing.ident.bench.told.report_objects import (
     RESTS_ON_PRIOR,
     channels_document,
     objects_document,
 )
-from freeswing.ident.bench.runs import Bench, BenchRun, Signal
-from freeswing.ident.bench.solve import Solved, solved
 
 LEAST_OVER_NOISE = 5.0  # a channel's spread over the noise between its neighbours
 FROM_POSES_STD_M = 2e-3  # wire lengths from mean poses: as good as the wires' ends are known
@@ -66,9 +69,21 @@ class BenchResult:
             "notes": list(self.notes),
             "objects": objects_document(self.solved, self.bench, runs),
             "channels": channels_document(self.solved, self.bench),
+            "budgets": self._budgets(),
             "classic": [one.document() for one in self.classic],
             "scatter_between_runs_kg_m2": self.solved.scatter_std,
         }
+
+    def _budgets(self) -> list[dict[str, Any]]:
+        """Where the deviation of every body's Izz about P comes from, largest first."""
+        names = [name for name in self.solved.solution.unknowns.names if name.startswith("load.")]
+        return [
+            {
+                "name": name.removeprefix("load."),
+                "shares": [share.document() for share in budget(self.solved, name)],
+            }
+            for name in ("platform", *names)
+        ]
 
     def _platform(self) -> dict[str, Any]:
         """The nine specific numbers of the platform; those that only a prior holds are null."""
@@ -79,7 +94,9 @@ class BenchResult:
         spread = np.zeros(10) if block.prior is None else np.array(block.prior.std)
         spread = np.where(block.mask, spread, 0.0)
         before = np.sum((slope * spread) ** 2, axis=1)
-        values, variances = specific(moments(body)), np.diag(covariance)
+        values, variances = specific(moments(body)), np.array(np.diag(covariance))
+        izz = INERTIA_NAMES.index("Izz_m2")
+        variances[izz] += (bent_std(self.solved, "platform") / body[0]) ** 2
         rows = []
         for k, name in enumerate(INERTIA_NAMES):
             seen = bool(variances[k] < RESTS_ON_PRIOR * before[k])
@@ -217,27 +234,15 @@ def _part(signal: Signal, inside: Array) -> Signal:
 
 
 def _notes(found: Solved, bench: Bench, robot: Robot) -> list[str]:
-    notes = [sentence for sentence in (group_sentence(found),) if sentence]
+    notes = [one for one in (group_sentence(found), wires_sentence(found)) if one]
+    notes += held_sentences(found)
     if bench.loads and found.mass is None and bench.mass_std_kg is None:
         notes.append(
             "no run carries a known payload: the loads' inertia rests on the declared platform "
             "mass (I_load = s m_load + (s - s_tare) m_platform); a run with a known mass far from "
             "the middle, or mass_std_kg, says how well"
         )
-    for channel in bench.channels:
-        name = f"channel.{channel.name}"
-        if channel.main_coordinate in channel.gains or name not in found.solution.unknowns:
-            continue
-        if channel.per_run:
-            notes.append(f"channel {channel.name}: its gains are new in every run and not reported")
-            continue
-        place = channel.coordinates.index(channel.main_coordinate)
-        value = float(found.solution.value(name)[place])
-        std = float(found.solution.std(name)[place])
-        notes.append(
-            f"channel {channel.name}: its gain for {channel.main_coordinate} is not given and "
-            f"rests on how the period depends on amplitude alone: {value:.4g} +- {std:.2g}"
-        )
+    notes += _gain_notes(found, bench)
     if found.scatter_std > 0.0:
         notes.append(
             f"runs scatter by {found.scatter_std:.2g} kg m2 in Izz beyond their noise (rehanging, "
@@ -245,4 +250,28 @@ def _notes(found: Solved, bench: Bench, robot: Robot) -> list[str]:
         )
     if not found.solution.converged:
         notes.append(f"the fit has not converged ({found.solution.reason}): do not rely on it")
+    return notes
+
+
+def _gain_notes(found: Solved, bench: Bench) -> list[str]:
+    """What the gains of uncalibrated channels rest on."""
+    notes = []
+    told = {one["name"]: one["gains"] for one in channels_document(found, bench)}
+    for channel in bench.channels:
+        main = channel.main_coordinate
+        name = f"channel.{channel.name}"
+        if main in channel.gains or name not in found.solution.unknowns:
+            continue
+        if channel.per_run:
+            notes.append(f"channel {channel.name}: its gains are new in every run and not reported")
+            continue
+        if any(main in run.coordinates for run in bench.runs):
+            continue
+        gain = told[channel.name][channel.coordinates.index(main)]
+        rests = f"channel {channel.name}: its gain for {main} is not given and rests on how the "
+        if gain["value"] is None:
+            notes.append(f"{rests}period depends on amplitude, which these runs do not tell")
+        else:
+            value, std = gain["value"], gain["std"]
+            notes.append(f"{rests}period depends on amplitude alone: {value:.4g} +- {std:.2g}")
     return notes

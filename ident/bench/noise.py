@@ -18,7 +18,7 @@ from freeswing.ident.likelihood.unknowns import Gaussian, Unknown
 
 BAND = 3.0  # times the fastest swing: a cubic map moves power up to three times its frequency
 LEAST_SHARE = 0.25  # of a band's degrees of freedom, which a fit cannot use up
-WIDE_SCATTER = 0.05  # of Izz: a run this far off is lost, not scattered
+WIDE_SCATTER = 0.01  # of Izz: a run this far off is lost, not scattered
 SIGNIFICANT = 2.71  # chi-square of one at 10 %: a scatter below is none
 
 

@@ -2,26 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.model.statics import Equilibrium, modes
 from freeswing.cdpr.robot import Array
-from freeswing.ident.bench.assemble import Assembled
+from freeswing.ident.bench.assemble import UNSTATED_LENGTH_STD_M, Assembled
+from freeswing.ident.bench.considered import Held, considered, gauge, holding, sees_sway, unseen
 from freeswing.ident.bench.noise import WIDE_SCATTER, rescaled, scatter_block, scatter_std
 from freeswing.ident.bench.objects import moments, specific
 from freeswing.ident.bench.runs import Bench
-from freeswing.ident.bench.swing import IZZ, BenchSwing
+from freeswing.ident.bench.swing import COMMON, IZZ, BenchSwing
 from freeswing.ident.likelihood.fit_blocks import How, Solution, fit
 from freeswing.ident.likelihood.unknowns import Gaussian, Unknowns
 
 ROUGH = How(steps=30, tolerance=3.0)
-FINE = How(steps=12, tolerance=0.1)
+FINE = How(steps=30, tolerance=0.1)
 LEAST_FOR_SCATTER = 5  # runs: fewer cannot tell scatter from what is looked for
 CONTRADICTED = 3.0  # standard deviations between payload runs and the declared mass
-FIRST_SCATTER = 0.002  # of Izz, where too few runs tell: what rehanging a bench costs at its best
+CHECKING = 0.05  # of the mass: payload runs that tell it as well check it, and what they say counts
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,15 +43,36 @@ class MassVerdict:
 
 
 @dataclass(frozen=True, slots=True)
+class WiresVerdict:
+    """What sway says of all wires' length beside what is stated.
+
+    Attributes:
+        stated_m: mean of the stated lengths.
+        shift_m: longer (or, negative, shorter) by so much, as sway has them.
+        std_m: its deviation.
+        allowed_m: how well the stated lengths are known, on the average of the wires.
+        contradicted: whether they exclude each other: sway's length then serves.
+    """
+
+    stated_m: float
+    shift_m: float
+    std_m: float
+    allowed_m: float
+    contradicted: bool
+
+
+@dataclass(frozen=True, slots=True)
 class Solved:
     """A bench fit.
 
     Attributes:
-        solution: all unknowns.
+        solution: all unknowns, their covariance with all that is held uncertain.
         swings: with the noise that was found.
         first: the unknowns before, whose priors say what rests on nothing else.
         scatter_std: of Izz between runs, kg m2; 0: none was seen.
         mass: what payload runs say of the mass, or None without one.
+        wires: what sway says of the wires, or None where no column shows sway.
+        held: what no run tells, by block.
     """
 
     solution: Solution
@@ -58,6 +80,8 @@ class Solved:
     first: Unknowns
     scatter_std: float
     mass: MassVerdict | None
+    wires: WiresVerdict | None = None
+    held: Held = field(default_factory=dict)
 
 
 def solved(model: Model, bench: Bench, start: Assembled) -> Solved:
@@ -66,23 +90,63 @@ def solved(model: Model, bench: Bench, start: Assembled) -> Solved:
     Raises:
         ValueError: when a run's start cannot be simulated, naming it.
     """
-    swings, unknowns = start.swings, start.unknowns
-    unknowns = _rough(swings, unknowns)
+    swings, held = start.swings, unseen(bench, start.runs, start.unknowns)
+    unknowns = holding(start.unknowns, held)
+    unknowns = holding(unknowns, gauge(bench, start.runs, unknowns))
+    sway = sees_sway(bench, start.runs)
+    unknowns = _rough(swings, unknowns.held(COMMON))
+    if sway:
+        unknowns = unknowns.estimating(COMMON, np.ones(1, bool))
+    scattering = len(swings) >= LEAST_FOR_SCATTER
+    izz = float(moments(unknowns.block("platform").value)[IZZ])
+    if scattering:  # from the start, or the noise would be taken for as large as the scatter
+        unknowns = unknowns.joined(scatter_block(len(swings), izz, WIDE_SCATTER * izz))
     found = fit(swings, unknowns, ROUGH)
     fastest = _fastest(model, found, swings[0])
-    for coloured in (False, True):
-        swings = rescaled(swings, found, fastest, coloured)
-        found = fit(swings, found.unknowns, FINE)
-    izz = float(moments(found.value("platform"))[IZZ])
-    tau = 0.0
-    if len(swings) >= LEAST_FOR_SCATTER:
-        wide = scatter_block(len(swings), izz, WIDE_SCATTER * izz)
-        tau = scatter_std(fit(swings, found.unknowns.joined(wide), How(steps=3, tolerance=0.1)))
-        if tau > 0.0:
-            narrow = scatter_block(len(swings), izz, tau)
-            found = fit(swings, found.unknowns.joined(narrow), FINE)
+    swings = rescaled(swings, found, fastest, coloured=True)
+    found = fit(swings, found.unknowns, FINE)
+    swings = rescaled(swings, found, fastest, coloured=True)
+    tau, kept = 0.0, found.unknowns
+    if scattering:
+        tau = scatter_std(found)
+        kept = kept.without("scatter")
+        kept = kept.joined(scatter_block(len(swings), izz, tau)) if tau > 0.0 else kept
+    found = fit(swings, kept, FINE)
+    wires = _wires(found, start) if sway else None
+    if wires is not None and not wires.contradicted:
+        found = fit(swings, _pinned(found.unknowns, COMMON), FINE)
+    freed = found
     found, mass = _mass(bench, model, swings, found, start)
-    return Solved(found, swings, start.unknowns, tau, mass)
+    doubt = _doubt(freed, mass)
+    right = _who_is_right(found, wires) + doubt
+    found = considered(swings, found, held)
+    found = replace(found, covariance=found.covariance + right)
+    return Solved(found, swings, start.unknowns, tau, mass, wires, held)
+
+
+def _wires(found: Solution, start: Assembled) -> WiresVerdict:
+    """Whether the sway wants wires of other lengths than those that are stated."""
+    shift, std = float(found.value(COMMON)[0]), float(found.std(COMMON)[0])
+    lengths = np.array([swing.lengths_m for swing in start.swings])
+    stds = [run.lengths_std_m or UNSTATED_LENGTH_STD_M for run in start.runs]
+    allowed = float(np.mean(stds)) / float(np.sqrt(lengths.shape[1]))
+    off = abs(shift) / std  # the stated spread is in it: each wire's own shift is an unknown too
+    return WiresVerdict(float(lengths.mean()), shift, std, allowed, bool(off > CONTRADICTED))
+
+
+def _pinned(unknowns: Unknowns, name: str) -> Unknowns:
+    """A block held at zero: what it was there for is not the case."""
+    return unknowns.moved({name: 0.0 * unknowns.block(name).value}).held(name)
+
+
+def _who_is_right(found: Solution, wires: WiresVerdict | None) -> Array:
+    """Where sway contradicts the wires: what a deviation counts for all that hangs on it."""
+    if wires is None or not wires.contradicted:
+        return np.zeros_like(found.covariance)
+    place = found.place(COMMON)
+    column = found.covariance[:, place]
+    change = column / found.covariance[place, place] * wires.shift_m
+    return np.asarray(change @ change.T)
 
 
 def _rough(swings: tuple[BenchSwing, ...], unknowns: Unknowns) -> Unknowns:
@@ -126,9 +190,8 @@ def _mass(
     prior = block.prior
     if prior is None:
         return found, None
-    fitted, std = _without_prior(
-        float(block.value[0]), float(found.std("platform")[0]), prior, bench.mass_std_kg
-    )
+    spread = float(found.std("platform")[0])
+    fitted, std = _without_prior(float(block.value[0]), spread, prior, bench.mass_std_kg)
     off = abs(fitted - declared) / np.hypot(std, bench.mass_std_kg or 0.0)
     verdict = MassVerdict(declared, fitted, std, bool(off > CONTRADICTED))
     if verdict.contradicted:
@@ -139,6 +202,7 @@ def _mass(
     if bench.mass_std_kg:
         return found, verdict
     value: Array = np.array(block.value)
+    value[4:] *= declared / value[0]  # what was seen is inertia over mass: it stays
     value[0] = declared
     estimated = np.array(block.mask)
     estimated[0] = False
@@ -147,6 +211,23 @@ def _mass(
         tuple(trusted if one.name == "platform" else one for one in found.unknowns.blocks)
     )
     return fit(swings, held, FINE), verdict
+
+
+def _doubt(freed: Solution, mass: MassVerdict | None) -> Array:
+    """What deviations count where a declared mass serves: how far payload runs are from it.
+
+    Args:
+        freed: the fit with the mass free.
+        mass: what was made of it.
+    """
+    nothing = np.zeros_like(freed.covariance)
+    if mass is None or mass.contradicted or mass.fitted_std_kg > CHECKING * mass.declared_kg:
+        return nothing
+    place = int(freed.unknowns.columns("platform")[0])
+    shift = mass.declared_kg - mass.fitted_kg
+    change = freed.covariance[:, place] / freed.covariance[place, place] * shift
+    change[place] = 0.0
+    return np.asarray(np.outer(change, change))
 
 
 def _without_prior(

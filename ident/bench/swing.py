@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from freeswing.ident.bench.objects import moments, moments_slope, specific, spec
 
 TOLERANCE_M = 1e-7  # a thousandth of the best tracks' noise
 IZZ = 6  # of the ten moments
+COMMON = "wires_common"  # block: by what all wires of all runs differ from what is stated, (1,)
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +63,22 @@ class Riding:
     block: str
     turn: Array
     shift_m: Array
+
+
+class Responses(NamedTuple):
+    """Derivatives (.., size) of a state or of poses by what moves them.
+
+    Attributes:
+        start: by the numbers of the start.
+        lengths: by the wires' lengths.
+        effects: by drag.
+        inertia: by the nine specific numbers.
+    """
+
+    start: Array
+    lengths: Array
+    effects: Array
+    inertia: Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +129,7 @@ class BenchSwing:
 
     def lengths(self, values: Mapping[str, Array]) -> Array:
         """Wire lengths, (n,)."""
-        found = self.lengths_m + values[self.wires]
+        found = self.lengths_m + values[self.wires] + values.get(COMMON, np.zeros(1))
         return found + values["wires_each"] if "wires_each" in values else found
 
     def simulated(self, values: Mapping[str, Array]) -> Motion:
@@ -223,27 +241,40 @@ class BenchSwing:
 
         By every block that moves them.
         """
+        state, pose = self._responses(motion, values)
+        return self._by_block(state, values), self._by_block(pose, values)
+
+    def _responses(
+        self, motion: Motion, values: Mapping[str, Array]
+    ) -> tuple[Responses, Responses]:
+        """How the start state, and the pose at the samples, answer to what moves them."""
         by_all = linearise(motion).at(self.times_s)[0]
         by_state, by_rest = by_all[:, :, :12], by_all[:, :, 12:]
         first = np.concatenate([motion.zetas[0], motion.rates[0]])
-        lengths = self.lengths(values)
         by_numbers, by_lengths, start_by_rest = self.chart.slopes(
-            first, lengths, self.span_s[0], motion.inertia, motion.values
+            first, self.lengths(values), self.span_s[0], motion.inertia, motion.values
         )
-        slope = specific_slope(self.total(values))
-        state = {"start": by_numbers, "effects": start_by_rest[:, 9:], self.wires: by_lengths}
-        total = start_by_rest[:, :9] @ slope
-        pose = {name: by_state @ part for name, part in state.items()}
-        pose["effects"] = pose["effects"] + by_rest[:, :, 9:]
-        pose_total = by_rest[:, :, :9] @ slope + by_state @ total
+        state = Responses(by_numbers, by_lengths, start_by_rest[:, 9:], start_by_rest[:, :9])
+        pose = Responses(
+            by_state @ by_numbers,
+            by_state @ by_lengths,
+            by_state @ state.effects + by_rest[:, :, 9:],
+            by_state @ state.inertia + by_rest[:, :, :9],
+        )
+        return state, pose
+
+    def _by_block(self, answer: Responses, values: Mapping[str, Array]) -> dict[str, Array]:
+        found = {"start": answer.start, "effects": answer.effects, self.wires: answer.lengths}
+        if COMMON in values:
+            found[COMMON] = answer.lengths.sum(axis=-1, keepdims=True)
         if "wires_each" in values:
-            state["wires_each"], pose["wires_each"] = state[self.wires], pose[self.wires]
+            found["wires_each"] = answer.lengths
+        total = answer.inertia @ specific_slope(self.total(values))
         for one in self.riding:
             part = moments_slope(values[one.block], one.turn, one.shift_m)
-            state[one.block] = state.get(one.block, 0.0) + total @ part
-            pose[one.block] = pose.get(one.block, 0.0) + pose_total @ part
+            found[one.block] = found.get(one.block, 0.0) + total @ part
         if "scatter" in values:
             only = np.zeros((10, len(values["scatter"])))
             only[IZZ, self.place] = 1.0
-            state["scatter"], pose["scatter"] = total @ only, pose_total @ only
-        return state, pose
+            found["scatter"] = total @ only
+        return found

@@ -34,6 +34,16 @@ class BenchPanel:
                 }
                 for one in found.channels or ()
             ],
+            "budgets": [
+                {
+                    "name": one.name,
+                    "rows": [
+                        {"from": share.what, "kg m²": number(share.std_kg_m2, 2)}
+                        for share in one.shares
+                    ],
+                }
+                for one in found.budgets or ()
+            ],
             "classic": [_classic(row) for row in found.classic],
         }
 

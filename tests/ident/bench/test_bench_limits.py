@@ -10,12 +10,12 @@ import pytest
 
 from freeswing.cdpr.files.documents import DataError
 from freeswing.ident.bench import noise, solve
-from freeswing.ident.bench.classic import BESIDE, ClassicRun, _period, leaning_sentence
 from freeswing.ident.bench.identify_bench import _check_moves
 from freeswing.ident.bench.noise import _colours, rescaled, scatter_std
-from freeswing.ident.bench.report_objects import told_object
-from freeswing.ident.bench.runs import BenchRun, Signal
-from freeswing.ident.bench.swing import Column
+from freeswing.ident.bench.runs import Bench, BenchRun, Signal
+from freeswing.ident.bench.swing import COMMON, Column
+from freeswing.ident.bench.told.classic import BESIDE, ClassicRun, _period, leaning_sentence
+from freeswing.ident.bench.told.report_objects import told_object
 from freeswing.ident.likelihood.unknowns import Gaussian, Unknown, Unknowns
 
 
@@ -45,15 +45,53 @@ def test_a_declared_mass_that_payload_runs_exclude(monkeypatch, declared_kg, con
 @pytest.mark.parametrize(("runs", "looked"), [(4, False), (5, True)])
 def test_scatter_is_looked_for_between_enough_runs(monkeypatch, runs, looked) -> None:
     asked = []
-    monkeypatch.setattr(solve, "fit", lambda *_: body(0.1))
+    none = SimpleNamespace(coordinates=(), signals=())
+    blocks = body(0.1).unknowns.joined(Unknown(COMMON, np.zeros(1), np.ones(1)))
+    fitted = {**vars(body(0.1)), "covariance": np.eye(11)}
+    monkeypatch.setattr(
+        solve, "fit", lambda _, unknowns, how: SimpleNamespace(**(fitted | {"unknowns": unknowns}))
+    )
     monkeypatch.setattr(solve, "_rough", lambda swings, unknowns: unknowns)
     monkeypatch.setattr(solve, "_fastest", lambda *_: 1.0)
-    monkeypatch.setattr(solve, "rescaled", lambda swings, *_: swings)
-    monkeypatch.setattr(solve, "_mass", lambda bench, model, swings, found, start: (found, None))
+    monkeypatch.setattr(solve, "rescaled", lambda swings, *_, **__: swings)
+    monkeypatch.setattr(solve, "_mass", lambda bench, model, swings, found, *_: (found, None))
+    monkeypatch.setattr(solve, "considered", lambda swings, found, held: found)
+    monkeypatch.setattr(solve, "replace", lambda found, **_: found)
     monkeypatch.setattr(solve, "scatter_std", lambda found: asked.append(1) or 0.0)
-    swings = tuple(range(runs))
-    solve.solved(None, None, SimpleNamespace(swings=swings, unknowns=body(0.1).unknowns))
+    start = SimpleNamespace(swings=tuple(range(runs)), unknowns=blocks, runs=[none] * runs)
+    solve.solved(None, Bench(()), start)
     assert bool(asked) == looked
+
+
+@pytest.mark.parametrize(("share", "counts"), [(0.048, True), (0.052, False)])
+def test_payload_runs_that_check_a_declared_mass(share, counts) -> None:
+    """5 kg declared, 4.9 by payload runs, known to that share of it; what answers twice as much."""
+    free = body(0.1)
+    covariance = 1e-4 * np.eye(10)
+    covariance[6, 0] = covariance[0, 6] = 2e-4
+    freed = SimpleNamespace(covariance=covariance, unknowns=free.unknowns)
+    verdict = solve.MassVerdict(5.0, 4.9, 5.0 * share, contradicted=False)
+    counted = solve._doubt(freed, verdict)
+    assert counted[6, 6] == pytest.approx(0.04 if counts else 0.0)
+    assert counted[0, 0] == 0.0
+
+
+@pytest.mark.parametrize(("shift_mm", "contradicted"), [(2.9, False), (3.1, True)])
+def test_wires_that_sway_contradicts(shift_mm, contradicted) -> None:
+    """Sway knows them to 1 mm; beyond three times that its lengths serve, and all is counted."""
+    value = np.array([1e-3 * shift_mm])
+    covariance = np.array([[1e-6, 2e-6], [2e-6, 1e-4]])  # of the wires, and of what answers
+    found = SimpleNamespace(
+        value=lambda name: value, std=lambda name: np.array([1e-3]),
+        covariance=covariance, place=lambda name: slice(0, 1),
+    )  # fmt: skip
+    run = SimpleNamespace(lengths_std_m=5e-4)
+    swing = SimpleNamespace(lengths_m=np.full(3, 1.0))
+    verdict = solve._wires(found, SimpleNamespace(swings=[swing], runs=[run]))
+    assert verdict.contradicted == contradicted, verdict
+    counted = solve._who_is_right(found, verdict)
+    expected = [value[0], 2.0 * value[0]] if contradicted else [0.0, 0.0]
+    np.testing.assert_allclose(counted, np.outer(expected, expected), rtol=1e-12)
 
 
 @pytest.mark.parametrize(("chi_square", "seen"), [(2.4, False), (3.0, True)])
@@ -100,7 +138,7 @@ def test_noise_near_the_swing_counts(over, counts) -> None:
 def test_a_number_that_rests_on_its_prior(share, told) -> None:
     """The share of the prior's variance that is left."""
     found = body(0.1 * np.sqrt(share))
-    solved = SimpleNamespace(solution=found, first=found.unknowns)
+    solved = SimpleNamespace(solution=found, first=found.unknowns, held={})
     rows = told_object(solved, "platform", np.zeros(10, bool), one_way=False)
     assert [row.identifiable for row in rows[1:]] == [told] * 9
 

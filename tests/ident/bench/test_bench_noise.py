@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from freeswing.ident.bench.averaged import averaged
-from freeswing.ident.bench.classic import BESIDE, ClassicRun, leaning_sentence
 from freeswing.ident.bench.noise import scatter_std
 from freeswing.ident.bench.runs import BenchRun, Signal
 from freeswing.ident.bench.solve import _without_prior
+from freeswing.ident.bench.told.classic import BESIDE, ClassicRun, leaning_sentence
 from freeswing.ident.likelihood.unknowns import Gaussian, Unknown, Unknowns
 
 WIDE = 0.01

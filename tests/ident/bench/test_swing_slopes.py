@@ -94,7 +94,11 @@ def small_bench() -> Bench:
 
 
 def test_every_slope_of_a_swing_is_that_of_differences() -> None:
-    bench = small_bench()
+    slopes_are_those_of_differences(small_bench())
+
+
+def slopes_are_those_of_differences(bench: Bench) -> None:
+    """Every block of every run of a bench."""
     start = assembled(build_model(trifilar(), EFFECTS), bench, bench.runs)
     for index, swing in enumerate(start.swings):
         values = {name: np.array(one) for name, one in start.unknowns.of_run(index).items()}

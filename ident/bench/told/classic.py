@@ -13,9 +13,11 @@ from typing import Any
 import numpy as np
 
 from freeswing.cdpr.robot import Array
+from freeswing.cdpr.simulation.parallel_wires import bending
+from freeswing.ident.bench.modal import SQUARE
 from freeswing.ident.bench.objects import moments
 from freeswing.ident.bench.solve import Solved
-from freeswing.ident.bench.swing import IZZ, BenchSwing, Column
+from freeswing.ident.bench.swing import COMMON, IZZ, BenchSwing, Column
 
 LEAST_PERIODS = 2.0  # in a record: a sine and a slow drift look alike on fewer
 BESIDE = "centre of mass beside the middle: yaw moves it along"
@@ -126,14 +128,16 @@ def _reasons(
     length = float(np.mean(swing.lengths_m))
     motion = swing.simulated(values)
     yaw = motion.at(swing.times_s)[0][:, 5]
-    amplitude = 0.5 * float(np.ptp(yaw))
+    square = float(values.get(SQUARE, np.ones(1))[0]) * (0.5 * float(np.ptp(yaw))) ** 2
+    top, bottom, _ = radii(swing)
+    bent = bending(top, bottom, length, float(total[IZZ] / total[0]))
     centre = total[1:3] / total[0] - swing.model.robot.attachments_m.mean(axis=0)[:2]
     fitted = float(np.mean(swing.lengths(values)))
     off_centre = float(total[0] * centre @ centre / total[IZZ])
     return (
         ("mass that payload runs contradict", 100.0 * (mass / total[0] - 1.0)),
         (BESIDE, -100.0 * off_centre),
-        ("amplitude: the period grows with it", 100.0 * amplitude**2 / 8.0),
+        ("amplitude: the period changes with it", -200.0 * bent * square),
         ("wire length", 100.0 * (fitted / length - 1.0)),
     )
 
@@ -173,6 +177,43 @@ def leaning_sentence(classic: Sequence[ClassicRun], sway_seen: bool) -> str:
         "uncalibrated signal or yaw alone answers to sway may look the same. Give com_m, measure x "
         "and y in one run, or hang the platform so that its wires share the weight alike"
     )
+
+
+def wires_sentence(solved: Solved) -> str:
+    """By what sway contradicts the stated wire lengths, and what that does to Izz."""
+    wires = solved.wires
+    if wires is None or not wires.contradicted:
+        return ""
+    found = solved.solution
+    answer = found.covariance_of("platform", COMMON)[IZZ, -1]
+    change = answer / found.covariance_of(COMMON)[0, 0] * wires.shift_m
+    share = 100.0 * change / float(found.value("platform")[IZZ])
+    longer = "longer" if wires.shift_m > 0.0 else "shorter"
+    rate = -50.0 * wires.shift_m / wires.stated_m
+    return (
+        f"the sway contradicts cable_lengths_m: its period is that of wires "
+        f"{1e3 * abs(wires.shift_m):.1f} +- {1e3 * wires.std_m:.1f} mm {longer} than the "
+        f"stated {wires.stated_m:.4g} m (+- {1e3 * wires.allowed_m:.2g} mm on the average), and "
+        f"sway's are used: Izz changes by {share:+.2f} % with them, all of which its deviation "
+        f"counts. Ends, knots and hooks that do not bend shorten wires; a frame rate off by "
+        f"{rate:+.2f} % would look the same. Measure the wires from bend to bend, and film a clock"
+    )
+
+
+def held_sentences(solved: Solved) -> list[str]:
+    """What no run tells, and how far it is believed to be off."""
+    found = []
+    for block, mask in solved.held.items():
+        spread = solved.solution.std(block)
+        if not block.startswith("channel.") and mask[1:3].any():
+            who = "the platform" if block == "platform" else block.removeprefix("load.")
+            value = np.round(solved.solution.value(block), 9) + 0.0
+            found.append(
+                f"{who}: no run shows its centre of mass, which is held at x {value[1]:.4g}, "
+                f"y {value[2]:.4g} m; that it may be {1e3 * float(spread[1:3].max()):.2g} mm off "
+                "(one deviation) is counted"
+            )
+    return found
 
 
 def own_izz(solved: Solved) -> float:

@@ -8,11 +8,15 @@ from typing import Any
 import numpy as np
 
 from freeswing.cdpr.robot import BODY_NAMES, Array
+from freeswing.ident.bench.channels import Channel
+from freeswing.ident.bench.modal import SQUARE
 from freeswing.ident.bench.objects import moments, moments_slope
 from freeswing.ident.bench.runs import Bench, BenchRun
 from freeswing.ident.bench.solve import Solved
 from freeswing.ident.bench.swing import IZZ
+from freeswing.ident.bench.told.budget import bent_std
 
+TELLS_NOTHING = 1.0  # deviation of the squared amplitude over itself: it may as well be zero
 RESTS_ON_PRIOR = 0.5  # of the prior's variance: with more left than that, more was known than seen
 
 
@@ -48,7 +52,9 @@ def told_object(solved: Solved, block: str, given: Array, one_way: bool) -> list
     value, covariance = found.value(block), found.covariance_of(block)
     prior = np.full(10, np.inf) if unknown.prior is None else np.array(unknown.prior.std)
     prior = np.where(unknown.mask, prior, 0.0)
+    hidden = bent_std(solved, block)
     variances = np.diag(covariance) + _of_second_order(value, covariance)
+    variances[IZZ] += hidden**2
     rows = []
     for k, name in enumerate(BODY_NAMES):
         seen = k == 0 or np.diag(covariance)[k] < RESTS_ON_PRIOR * prior[k] ** 2
@@ -62,7 +68,7 @@ def told_object(solved: Solved, block: str, given: Array, one_way: bool) -> list
             rows.append(Told(name, None, None, False))
     if one_way:
         slope = moments_slope(value)[IZZ]
-        std = float(np.sqrt(slope @ covariance @ slope))
+        std = float(np.sqrt(slope @ covariance @ slope + hidden**2))
         before = float(np.sqrt(np.sum((slope * prior) ** 2)))
         seen = std**2 < RESTS_ON_PRIOR * before**2
         izz = float(moments(value)[IZZ])
@@ -110,6 +116,28 @@ def objects_document(solved: Solved, bench: Bench, runs: tuple[BenchRun, ...]) -
     return found
 
 
+def _told(number: float) -> float | None:
+    return float(number) if np.isfinite(number) else None
+
+
+def _in_true_scale(
+    solved: Solved, channel: Channel, value: Array, std: Array
+) -> tuple[Array, Array]:
+    """Gains of the amplitudes that the period tells, not of those assumed; NaN: it tells none.
+
+    A term of degree d in yaw goes with the true scale to the power -d.
+    """
+    square = float(solved.solution.value(SQUARE)[0])
+    share = float(solved.solution.std(SQUARE)[0]) / square
+    place = channel.coordinates.index(channel.main_coordinate)
+    degrees = np.array([term.count(place) for term in channel.terms])
+    if share > TELLS_NOTHING and degrees.any():
+        nothing = np.where(degrees > 0, np.nan, 1.0)
+        return value * nothing, std * nothing
+    factor = square ** (-0.5 * degrees)
+    return value * factor, np.hypot(std, 0.5 * degrees * share * np.abs(value)) * factor
+
+
 def channels_document(solved: Solved, bench: Bench) -> list[dict[str, Any]]:
     """The entry `channels`: linear gains with their deviations, noise in the column's unit."""
     found = []
@@ -124,8 +152,10 @@ def channels_document(solved: Solved, bench: Bench) -> list[dict[str, Any]]:
             for column in swing.columns
             if column.channel == channel
         ]
+        if SQUARE in solved.solution.unknowns:
+            value, std = _in_true_scale(solved, channel, value, std)
         gains = [
-            {"name": term, "value": float(value[k]), "std": float(std[k])}
+            {"name": term, "value": _told(value[k]), "std": _told(std[k])}
             for k, term in enumerate(channel.term_names)
         ]
         found.append({"name": channel.name, "gains": gains, "noise": float(np.median(noise))})
