@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from unicodedata import category
 
 import numpy as np
 from numpy.typing import NDArray
@@ -203,6 +204,9 @@ class Reader:
     def _text(self, key: str, value: object, choices: Sequence[str]) -> str:
         if not isinstance(value, str) or not value.strip():
             self.add(key, f"{_shown(value)} is not a (non-empty) text")
+            return ""
+        if any(category(letter) == "Cc" for letter in value):
+            self.add(key, f"{value!r} holds a control character: leave it out")
             return ""
         if choices and value not in choices:
             self.add(key, f"{_shown(value)} must be one of {', '.join(choices)}")

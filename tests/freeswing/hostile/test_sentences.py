@@ -76,6 +76,17 @@ def test_runs_that_are_devices(session: Path, name: str, capsys) -> None:
     assert "which Windows keeps for a device" in refused(capsys, "check", session)
 
 
+@pytest.mark.parametrize("letter", ["\\u0007", "\\n", "\\u009b31m", "\\t", "\\u007f"])
+@pytest.mark.parametrize("file", ["session.toml", "robot.toml"])
+def test_control_characters_in_names(session: Path, file: str, letter: str, capsys) -> None:
+    path = session / file
+    text = path.read_text(encoding="utf-8").replace('\nname = "', f'\nname = "a{letter}', 1)
+    path.write_text(text, encoding="utf-8")
+    said = refused(capsys, "identify", session)
+    assert "holds a control character" in said
+    assert not set(said) & {"\x07", "\x9b", "\x7f"}
+
+
 @pytest.mark.parametrize("name", ["icon", "con1", "com", "console", "null", "swing.con"])
 def test_names_that_are_none(name: str) -> None:
     assert not is_device(name)
