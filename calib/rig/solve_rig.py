@@ -70,6 +70,12 @@ class Rig:
         """The calibrated cameras."""
         return self.adjustment.scene.cameras
 
+    @property
+    def is_tied_by_swings(self) -> bool:
+        """Whether the platform's tags take part beside the board."""
+        points = self.problem.board_points_m
+        return board_size(points) < len(points)
+
 
 def start_cameras(
     names: tuple[str, ...],

@@ -127,7 +127,7 @@ def _swings(session: Session) -> SwingFilms | None:
     runs = tuple(
         (run.name, run.video)
         for run in session.video_runs
-        if run.video is not None and run.video.is_dir()
+        if run.video is not None and run.video.is_dir() and any(run.video.iterdir())
     )
     target = load_target(session) if runs else None
     tags = None if target is None else platform_tags(target)
@@ -138,6 +138,11 @@ def _beside_colmap(found: CalibrationResult, console: Console) -> dict[str, Any]
     """What COLMAP's solution adds to the document; tells what came of it."""
     from freeswing.calib.verdict.colmap_check import beside_colmap, complaints, document
 
+    if found.rig.is_tied_by_swings:
+        console.complain(
+            "the swings tie these cameras, and COLMAP is shown the board alone: not compared"
+        )
+        return {}
     beside = beside_colmap(found.rig)
     for one in beside:
         console.say(

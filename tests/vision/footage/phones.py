@@ -76,6 +76,7 @@ def write_phone_video(
         stream = container.add_stream("libx264", rate=Fraction(30000, 1001))
         stream.options = {"preset": "medium", "crf": "18", "tune": "grain"}
         stream.pix_fmt = "yuv420p"
+        stream.codec_context.thread_count = 2  # x264's pictures depend on it: one a core by default
         stream.codec_context.time_base = stream.time_base = TICK
         if turn_deg:
             stream.set_display_rotation(-turn_deg)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import pytest
 
@@ -15,21 +16,46 @@ PHONES = {
 }
 
 
-@pytest.mark.slow
-@pytest.mark.xfail(reason="com y is 3.3 of its deviations off")
-def test_two_phones_started_by_hand_give_the_centre_of_mass(tmp_path) -> None:
-    body = write_session(tmp_path, PHONES, 6.0)
-    for command in ("track", "identify"):
-        assert main([command, str(tmp_path), "--quiet"]) == 0, command
-    tracking = json.loads((tmp_path / "results" / "tracking.json").read_text())
-    late = [
-        effect["parameters"][0]["value"]
-        for effect in tracking["effects"]
-        if (effect["effect"], effect["camera"]) == ("clock_offset", "right")
+@pytest.fixture(scope="module")
+def phones(tmp_path_factory) -> tuple[Path, dict, object]:
+    """Started by hand, tracked: the folder, tracking.json and the true body."""
+    folder = tmp_path_factory.mktemp("phones")
+    body = write_session(folder, PHONES, 6.0)
+    assert main(["track", str(folder), "--quiet"]) == 0
+    return folder, json.loads((folder / "results" / "tracking.json").read_text()), body
+
+
+def effects(tracking: dict, effect: str, camera: str) -> list[float]:
+    return [
+        found["parameters"][0]["value"]
+        for found in tracking["effects"]
+        if (found["effect"], found["camera"]) == (effect, camera)
     ]
+
+
+@pytest.mark.slow
+def test_two_phones_started_by_hand_are_placed_in_time(phones) -> None:
+    _, tracking, _ = phones
+    late = effects(tracking, "clock_offset", "right")
     assert len(late) == len(tracking["runs"])
     assert all(abs(offset - 3.2) < 4e-3 for offset in late), late
-    found = json.loads((tmp_path / "results" / "identification.json").read_text())
+    for camera, phone in PHONES.items():
+        lines = effects(tracking, "rolling_shutter", camera)
+        assert len(lines) == len(tracking["runs"]), camera
+        assert all(abs(line - phone.line_time_s) < 4e-6 for line in lines), (camera, lines)
+    for run in tracking["runs"]:
+        assert any("recorded by one camera alone" in text for text in run["problems"]), run
+
+
+@pytest.mark.slow
+@pytest.mark.xfail(
+    reason="com y is 2.5 to 4 of its deviations off: errors of a tag's corners are alike in H.264, "
+    "poses are claimed 1.3 to 1.7 times too well about the horizontal axes"
+)
+def test_two_phones_started_by_hand_give_the_centre_of_mass(phones) -> None:
+    folder, _, body = phones
+    assert main(["identify", str(folder), "--quiet"]) == 0
+    found = json.loads((folder / "results" / "identification.json").read_text())
     told = {p["name"]: p for p in found["estimates"]["ml_full"]["parameters"]}
     for axis, true in zip("xyz", body.com_m, strict=True):
         entry = told[f"com_{axis}_m"]
