@@ -103,6 +103,7 @@ def test_a_run_that_is_slack_at_once_is_refused(right):
     assert len(kept.record.times_s) == 500
 
 
+@pytest.mark.slow
 def test_a_motor_gives_no_more_than_its_limit(folder, capsys):
     references = np.full((301, 8), 0.5)
     references[50:150, 1] = 3.0
