@@ -25,6 +25,7 @@ mpl.use("svg")
 import matplotlib.pyplot as plt
 
 BINS = (0.0, 0.01, 0.1, 0.5, 0.9, 0.99, 1.0 + 1e-9)
+DRAWN = (0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 1.0 + 1e-9)
 NORMAL_95 = 1.96
 
 
@@ -147,7 +148,7 @@ def main(arguments: list[str] | None = None) -> int:
         if (one.probability >= 0.5) != one.there:
             print(f"{one.session}: {one.effect} told {one.probability:.3g}, there: {one.there}")
     if options.figure:
-        draw(bins, sessions, options.figure)
+        draw(binned(told, DRAWN), sessions, options.figure)
     return 0
 
 
