@@ -10,12 +10,14 @@ import pytest
 
 from freeswing.cdpr.files.documents import DataError
 from freeswing.ident.bench import noise, solve
+from freeswing.ident.bench.channels import Channel
 from freeswing.ident.bench.identify_bench import _check_moves
+from freeswing.ident.bench.modal import SQUARE
 from freeswing.ident.bench.noise import _colours, rescaled, scatter_std
 from freeswing.ident.bench.runs import Bench, BenchRun, Signal
 from freeswing.ident.bench.swing import COMMON, Column
 from freeswing.ident.bench.told.classic import BESIDE, ClassicRun, _period, leaning_sentence
-from freeswing.ident.bench.told.report_objects import told_object
+from freeswing.ident.bench.told.report_objects import _in_true_scale, told_object
 from freeswing.ident.likelihood.unknowns import Gaussian, Unknown, Unknowns
 
 
@@ -169,3 +171,20 @@ def test_a_channel_that_moves_above_its_noise(over, usable) -> None:
     run = BenchRun("a", "identify", times, (signal,), None, None, None, (), ())
     with nullcontext() if usable else pytest.raises(DataError, match="never moves above its noise"):
         _check_moves(run, signal)
+
+
+@pytest.mark.parametrize(("share", "told"), [(0.9, True), (1.1, False)])
+def test_a_gain_that_the_period_tells(share, told) -> None:
+    """Squared amplitudes four times those assumed: gains of half the size, if it is told."""
+    values = {SQUARE: np.array([4.0])}
+    found = SimpleNamespace(
+        value=lambda name: values[name], std=lambda name: np.array([4.0 * share])
+    )
+    channel = Channel("dot", "dot_px", ("chi", "x"), order=2)
+    value, std = np.array([100.0, 10.0, 8.0, 6.0, 4.0]), np.zeros(5)
+    gains, spread = _in_true_scale(SimpleNamespace(solution=found), channel, value, std)
+    expected = np.array([50.0, 10.0, 2.0, 3.0, 4.0])
+    seen = [True, True, True, True, True] if told else [False, True, False, False, True]
+    np.testing.assert_allclose(gains[seen], (expected if told else value)[seen])
+    assert np.isfinite(gains).tolist() == seen
+    assert spread[0] == pytest.approx(0.5 * share * 50.0) if told else not np.isfinite(spread[0])
