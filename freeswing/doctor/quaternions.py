@@ -6,11 +6,12 @@ that is stated, where the orientations are read as they were meant.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from freeswing.cdpr.files.problems import DataError
+from freeswing.cdpr.measured.quaternion_readings import LEFT_OVER, READINGS
 from freeswing.cdpr.measured.trajectory import Trajectory
 from freeswing.cdpr.model.batch import evaluate
 from freeswing.cdpr.model.equations import Model, build_model
@@ -20,32 +21,6 @@ from freeswing.ident.runs import SwingRun
 
 # Geometry known to a centimetre moves lengths by some mm along a swing: more is another matter.
 LENGTHS_OFF_M = 0.02
-# Of that, what the right reading leaves; a wrong one among all leaves as much as it found.
-LEFT_OVER = 0.2
-
-
-def _from_xyzw(q: Array) -> Array:
-    return q[:, [3, 0, 1, 2]]
-
-
-def _conjugate(q: Array) -> Array:
-    return q * np.array([1.0, -1.0, -1.0, -1.0])
-
-
-READINGS: dict[str, tuple[Callable[[Array], Array], str]] = {
-    "quaternions stand as x y z w": (
-        _from_xyzw,
-        "the columns are qw, qx, qy, qz: write w into qw, or exchange the names in the header",
-    ),
-    "orientations are those of the base in the platform": (
-        _conjugate,
-        "turn the signs of qx, qy, qz: T_base_platform takes platform to base coordinates",
-    ),
-    "quaternions stand as x y z w, of the base in the platform": (
-        lambda q: _conjugate(_from_xyzw(q)),
-        "write w into qw and turn the signs of qx, qy, qz",
-    ),
-}
 
 
 def mistaken_quaternions(run: SwingRun, robot: Robot) -> tuple[str, str]:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.cdpr.driven.slopes import length_slope, pose_map
+from freeswing.cdpr.measured.quaternion_readings import LEFT_OVER, READINGS
 from freeswing.cdpr.model.batch import evaluate
 from freeswing.ident.drive.identify import DriveSession
 from freeswing.ident.drive.inverse_dynamics import flowing
@@ -38,6 +39,9 @@ ODD_ROW = 60.0  # chi-square of 8 angles and 6 pose coordinates: 1e-8 by chance
 def findings(session: DriveSession) -> list[str]:
     """Everything that is wrong, one sentence each: what, where, what to do."""
     found = [text for run in session.runs for text in _times(run)]
+    if found:
+        return found
+    found = [text for run in session.runs for text in _orientations(session, run)]
     if found:
         return found
     found = _static_units(session)
@@ -135,6 +139,35 @@ def _told(session: DriveSession, run: DriveRun) -> _Told:
     by_pose = slope[0] @ pose_map(poses[0])
     noise = np.sqrt((by_pose * session.noise.pose_std) ** 2 @ np.ones(6))
     return _Told(read, -turns, speed, noise)
+
+
+def _orientations(session: DriveSession, run: DriveRun) -> list[str]:
+    """Quaternions in another order, or of the inverse turn: encoders agree with one reading."""
+    if len(run.record.seen) < 10:
+        return []
+    seen = _told(session, run)
+    found = _apart(seen)
+    if found <= CLEAR * float(np.sqrt(np.mean(seen.noise**2))):
+        return []
+    off = {}
+    for reading, (mend, _) in READINGS.items():
+        poses = run.record.poses.copy()
+        poses[:, 3:] = mend(poses[:, 3:])
+        other = replace(run, record=replace(run.record, poses=poses))
+        off[reading] = _apart(_told(session, other))
+    best = min(off, key=off.__getitem__)
+    if not off[best] <= LEFT_OVER * found:
+        return []
+    return [
+        f"run {run.name}: {best}: angles by poses and encoders are {found:.2g} rad apart as "
+        f"recorded, {off[best]:.2g} rad so; {READINGS[best][1]}"
+    ]
+
+
+def _apart(seen: _Told) -> float:
+    """Root mean square of what encoders and poses tell apart, their offset left out, rad."""
+    between = seen.read - seen.told
+    return float(np.sqrt(np.mean((between - between.mean(axis=0)) ** 2)))
 
 
 def _angles(session: DriveSession, run: DriveRun) -> list[str]:

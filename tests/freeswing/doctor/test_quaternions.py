@@ -11,8 +11,9 @@ import pytest
 
 from freeswing.cdpr.files.robot_file import read_robot
 from freeswing.cdpr.files.trajectory_files import read_trajectory
+from freeswing.cdpr.measured.quaternion_readings import READINGS
 from freeswing.cdpr.measured.trajectory import Trajectory
-from freeswing.doctor.quaternions import READINGS, mistaken_quaternions
+from freeswing.doctor.quaternions import mistaken_quaternions
 from freeswing.ident.runs import SwingRun
 from freeswing.main import main
 from tests.places import SAMPLES
@@ -70,3 +71,21 @@ def test_what_is_right_and_what_is_merely_wrong_is_not_named() -> None:
     moved = Trajectory.from_poses(seen.times_s, seen.positions() + 0.3, seen.rotations())
     far = replace(right, trajectory=moved, lengths_m=np.array([1.0, 1.0, 1.0]))
     assert mistaken_quaternions(far, ROBOT) == ("", "")
+
+
+def test_a_driven_session_is_told_so_too(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its pose latency was blamed."""
+    shutil.copytree(SAMPLES / "inca-6d", tmp_path / "driven")
+    for path in (tmp_path / "driven" / "runs").glob("*.csv"):
+        rows = [line.split(",") for line in path.read_text(encoding="utf-8").splitlines()]
+        first = rows[0].index("qw")
+        for row in rows[1:]:
+            row[first : first + 4] = [row[first + k] for k in (1, 2, 3, 0)]
+        path.write_text("\n".join(",".join(row) for row in rows) + "\n", encoding="utf-8")
+    assert main(["check", str(tmp_path / "driven")]) == 1
+    told = capsys.readouterr()
+    assert "run ident: quaternions stand as x y z w" in told.out + told.err
+    assert "write w into qw" in told.out + told.err
+    assert "latency" not in told.out + told.err
