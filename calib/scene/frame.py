@@ -156,6 +156,10 @@ def scale_of(
 
     Raises:
         DataError: two distances disagree.
+
+    Source:
+        JCGM 100:2008, Guide to the Expression of Uncertainty in Measurement, eq. (13); the
+        mean of correlated numbers: Press et al. 2007, Numerical Recipes, sec. 15.4.
     """
     spread = rows @ covariance @ rows.T + np.diag(relative_std**2)
     weights = np.linalg.solve(spread, np.ones(len(factors)))

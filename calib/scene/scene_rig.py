@@ -101,7 +101,12 @@ def _start(found: LabMap, stills: Sequence[Still], model: str) -> tuple[Scene, V
 
 
 def feature_variance(size_px: Array) -> Array:
-    """Variance of features by the size of their blobs, up to a common factor, (m,)."""
+    """Variance of features by the size of their blobs, up to a common factor, (m,).
+
+    Source:
+        Lowe 2004, Distinctive Image Features from Scale-Invariant Keypoints: places are as
+        good as their scale; a sum of independent variances.
+    """
     return LEAST_SIZE_PX**2 + size_px**2
 
 

@@ -166,8 +166,12 @@ class _Place:
     unknowns: Unknowns
     made: Sequence[Any]
 
-    @cached_property
+    @property
     def cost(self) -> float:
+        return self._cost
+
+    @cached_property
+    def _cost(self) -> float:
         return _cost(self.swings, self.unknowns, self.made)
 
     @cached_property

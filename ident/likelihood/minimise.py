@@ -52,8 +52,12 @@ class _Place:
     problem: Problem
     state: State
 
-    @cached_property
+    @property
     def cost(self) -> float:
+        return self._cost
+
+    @cached_property
+    def _cost(self) -> float:
         return self.problem.cost(self.state)
 
     @cached_property

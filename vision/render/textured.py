@@ -24,7 +24,11 @@ _FACES = (
 
 
 def texture(rows: int, columns: int, seed: int) -> Array:
-    """Reflectances 0.1 ... 0.9 of blotches of all sizes, no two places alike, (rows, columns)."""
+    """Reflectances 0.1 ... 0.9 of blotches of all sizes, no two places alike, (rows, columns).
+
+    Source:
+        Perlin 1985, An Image Synthesizer: noise of many octaves.
+    """
     random = np.random.default_rng(seed)
     total = np.zeros((rows, columns))
     for size in _OCTAVES:

@@ -73,6 +73,10 @@ def refined_points(
         watch: the points as they are.
         model: what was seen at rest.
         cameras: as calibrated.
+
+    Source:
+        Hartley, Zisserman 2004, Multiple View Geometry in Computer Vision, appendix 6:
+        points by least squares, poses in turn.
     """
     points = watch.marker_positions_m
     for _ in range(_STEPS):
@@ -110,7 +114,13 @@ def _add_run(sums: PointSums, views: Sequence[CameraViews], watch: Watch, poses:
 
 
 def at_home(points_m: Array, model: RestModel, cameras: Sequence[Camera]) -> tuple[Array, Array]:
-    """Points moved so that at rest they hang where the named points say, and its covariance."""
+    """Points moved so that at rest they hang where the named points say, and its covariance.
+
+    Source:
+        JCGM 100:2008, Guide to the Expression of Uncertainty in Measurement, eq. (13):
+        propagation; poses as by Murray, Li, Sastry 1994, A Mathematical Introduction to
+        Robotic Manipulation, ch. 2.
+    """
     seen = [camera for camera in cameras if camera.name in model.seen]
     which = [model.seen[camera.name][0] for camera in seen]
     pixels = np.concatenate([model.seen[camera.name][1].pixels for camera in seen])

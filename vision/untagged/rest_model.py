@@ -59,7 +59,12 @@ class RestModel:
 
 
 def moving_part(rest: Image, frames: Sequence[Image]) -> NDArray[np.bool_]:
-    """Where the platform hangs at rest: what differs from most frames of a swing, (h, w)."""
+    """Where the platform hangs at rest: what differs from most frames of a swing, (h, w).
+
+    Source:
+        Gonzalez, Woods 2008, Digital Image Processing, ch. 9: opening and closing of
+        differences.
+    """
     if not len(frames):
         return np.ones(rest.shape, dtype=bool)
     still = cv2.GaussianBlur(rest.astype(np.float32), (0, 0), _SMOOTH_PX)

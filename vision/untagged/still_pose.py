@@ -34,6 +34,10 @@ def still_pose(
         pixels: (n, 2).
         std_px: deviation of each, (n,).
         start: T_base_platform to start from, (4, 4).
+
+    Source:
+        Hartley, Zisserman 2004, Multiple View Geometry in Computer Vision, appendix 6:
+        Gauss-Newton on the reprojection error.
     """
     count = len(pixels)
     points, rays = np.zeros((count, 4, 3)), np.zeros((count, 8))
