@@ -76,6 +76,7 @@ def screen(
             linearise(replace(motion, model=model, values=mine), len(values) - len(fit.values)),
             samples,
             noise_scales,
+            prior_weight=float(np.sqrt(colour)),
         )
         triangles.append(reduced.rows)
         counts.append(_count(samples, model))

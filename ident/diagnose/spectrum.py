@@ -9,6 +9,7 @@ import numpy as np
 from freeswing.cdpr.robot import Array
 from freeswing.ident.likelihood.fit_swings import LikelihoodFit
 from freeswing.ident.likelihood.run_residuals import residuals
+from freeswing.ident.signals import band
 
 LOWEST_HZ = 0.15
 # No calibration or survey can be trusted below this: nothing is sought in such a residual.
@@ -36,12 +37,8 @@ def independent_numbers(fit: LikelihoodFit, noise_scales: Array) -> Array:
         Blackman, Tukey 1958, The Measurement of Power Spectra: equivalent degrees of
         freedom.
     """
-    found = []
-    for motion, run in zip(fit.motions, fit.samples, strict=True):
-        power = np.abs(np.fft.rfft(residuals(motion, run, noise_scales), axis=0)) ** 2
-        # The periodogram of white noise scatters by its own mean: hence twice the number.
-        found.append(2.0 * power.sum() ** 2 / np.sum(power**2))
-    return np.array(found)
+    pairs = zip(fit.motions, fit.samples, strict=True)
+    return np.array([band.independent_numbers(residuals(m, run, noise_scales)) for m, run in pairs])
 
 
 def mean_log_spectrum(fit: LikelihoodFit, noise_scales: Array) -> tuple[Array, Array]:

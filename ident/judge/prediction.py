@@ -12,8 +12,9 @@ from freeswing.cdpr.rotation import pose_differences
 from freeswing.ident.likelihood.blocks import first_unknowns, none_free, state_of
 from freeswing.ident.likelihood.fit_swings import LikelihoodFit, fit
 from freeswing.ident.likelihood.joint_problem import State
-from freeswing.ident.likelihood.run_residuals import Samples, predicted
+from freeswing.ident.likelihood.run_residuals import Samples, predicted, residuals
 from freeswing.ident.likelihood.session_estimates import started
+from freeswing.ident.signals.band import independent_numbers
 from freeswing.ident.signals.prepare import PreparedRun
 
 PREDICTED_HZ = 50.0
@@ -84,7 +85,7 @@ def predict(
     samples = _thinned(samples)
     unknowns = first_unknowns(model, inertia, [samples.payload], values)
     state = state_of(unknowns, model, first[None], np.ones(2))
-    found = _followed(model, samples, state)
+    found = _weighed(_followed(model, samples, state))
     seen = _seen(found)
     return Prediction(
         run.name,
@@ -123,6 +124,22 @@ def _followed(model: Model, samples: Samples, state: State) -> LikelihoodFit:
         return quick
     careful = _fitted(model, samples, state, grow=True)
     return min(quick, careful, key=lambda one: one.deviance)
+
+
+def _weighed(found: LikelihoodFit) -> LikelihoodFit:
+    """The fit again where a run has unknowns of its own beside its start, weighed honestly.
+
+    What a model misses follows the swing: of thousands of samples a few dozen are independent, and
+    counted one by one they turn a platform's frame by many times what markers can be off.
+    """
+    if not len(found.model.own_values):
+        return found
+    (samples,), (motion,) = found.samples, found.motions
+    white = residuals(motion, samples, found.scales)
+    coloured = max(1.0, white.size / independent_numbers(white))
+    state = replace(found.state, scales=found.scales * np.sqrt(coloured))
+    free = none_free(found.model)
+    return fit(found.model, [samples], state, free, estimate_scales=False, grow=False)
 
 
 def _fitted(model: Model, samples: Samples, state: State, grow: bool) -> LikelihoodFit:

@@ -155,7 +155,11 @@ def lengths_residual(motion: Motion, samples: Samples) -> Array:
 
 
 def reduce_run(
-    linear: Linearised, samples: Samples, scales: Array, shifts: Array | None = None
+    linear: Linearised,
+    samples: Samples,
+    scales: Array,
+    shifts: Array | None = None,
+    prior_weight: float = 1.0,
 ) -> Reduced:
     """Linearise one run's residuals at a motion and eliminate its own unknowns.
 
@@ -165,6 +169,9 @@ def reduce_run(
         scales: noise scale of metres and of radians, (2,).
         shifts: what further shared unknowns, which come after the others, add to the measured
             pose, (n, 6, r).
+        prior_weight: of what is known of the run's own effect values; above 1 where the samples
+            count for more than they are worth, as they do in units of a noise far below what the
+            model leaves.
     """
     motion = linear.motion
     seen = predicted(motion, samples.times_s)
@@ -193,7 +200,8 @@ def reduce_run(
     shared[:, mine] = 0.0
     n_own = own.shape[1]
     together = np.column_stack([own, shared, beside, right + body[:, -1]])
-    together = np.vstack([together, _own_priors(motion, directions, together.shape[1])])
+    known = prior_weight * _own_priors(motion, directions, together.shape[1])
+    together = np.vstack([together, known])
     triangle = np.linalg.qr(together, mode="r")
     size = together.shape[1]
     full = np.zeros((size, size))

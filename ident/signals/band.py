@@ -14,6 +14,21 @@ _CLEAR = 2.0  # times the noise floor from which a line counts as motion
 _LEAST_SAMPLES = 64
 
 
+def independent_numbers(series: Array) -> float:
+    """How many numbers of a series (n, c) move independently.
+
+    Participation number of the power over frequencies and coordinates: all of them for white
+    noise, a few where one mode of the swing holds it.
+
+    Source:
+        Blackman, Tukey 1958, The Measurement of Power Spectra: equivalent degrees of
+        freedom.
+    """
+    power = np.abs(np.fft.rfft(series, axis=0)) ** 2
+    # The periodogram of white noise scatters by its own mean: hence twice the number.
+    return float(2.0 * power.sum() ** 2 / np.sum(power**2))
+
+
 def best_pass_hz(samples: Array, period_s: float, scale: Array) -> float:
     """Pass band that minimises acceleration cut off above it plus noise let through below it.
 

@@ -9,7 +9,7 @@ import pytest
 
 import freeswing.ident.judge.prediction
 from freeswing.cdpr.measured.trajectory import Trajectory
-from freeswing.cdpr.model.equations import Model
+from freeswing.cdpr.model.equations import Model, build_model
 from freeswing.cdpr.model.statics import modes
 from freeswing.cdpr.robot import POSE_COORDINATES
 from freeswing.ident.judge.prediction import predict
@@ -82,3 +82,15 @@ def fastest_hz(equilibrium: int) -> float:
     model = paper_model()
     rest = taut_equilibrium(model, PAPER_LENGTHS_M[equilibrium], LIGHT, "light")
     return float(modes(model, rest, LIGHT).frequencies_hz.max())
+
+
+def test_a_run_s_frame_stays_within_what_markers_can_be_off() -> None:
+    """The inertia is 2 % off: the frame may not make up for it by many times its tolerance."""
+    run = filmed(7, 40, POSE_COORDINATES, seed=0)
+    model = build_model(paper_model().robot, ("platform_frame",))
+    found = predict(model, run, None, LIGHT * 1.02)
+    tolerances = np.array([one.prior_std for one in model.parameters])
+    assert np.abs(found.values / tolerances).max() < 1.0, found.values
+    right = predict(model, run, None, LIGHT)
+    assert right.rmse_m == pytest.approx(NOISE_M, rel=0.1)
+    assert np.abs(right.values / tolerances).max() < 1.0, right.values
