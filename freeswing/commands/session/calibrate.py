@@ -105,7 +105,7 @@ def _made(
         explained = Calibration.from_json(found.document)
         return Made((("calibration.json", explained),), refused=found.refused)
     document = Calibration.from_json({**found.document, **beside})
-    seen = "points of the laboratory" if document.board.get("kind") == "scene" else "views"
+    seen = "points of the laboratory" if document.board.kind == "scene" else "views"
     for entry in document.cameras:
         console.say(f"camera {entry.name}: {entry.views} {seen}, {entry.reprojection_px:.3f} px")
     vertical = document.vertical
