@@ -60,12 +60,11 @@ class ChessboardFinder:
         """Its inner corners row by row, (columns * rows, 2)."""
         size = (self.columns, self.rows)
         hard = cv2.CALIB_CB_EXHAUSTIVE if self._in_vain < MOST_HARD else 0
-        for more in dict.fromkeys((0, hard)):
-            flags = cv2.CALIB_CB_ACCURACY + more
-            found, corners = cv2.findChessboardCornersSB(image, size, flags=flags)
-            if found and corners is not None:
-                self._in_vain, self._ever = 0, True
-                return _oriented(image, np.reshape(corners, (*size[::-1], 2)).astype(np.float64))
+        flags = cv2.CALIB_CB_ACCURACY + hard
+        found, corners = cv2.findChessboardCornersSB(image, size, flags=flags)
+        if found and corners is not None:
+            self._in_vain, self._ever = 0, True
+            return _oriented(image, np.reshape(corners, (*size[::-1], 2)).astype(np.float64))
         self._in_vain += 1
         if not self._ever and self._in_vain <= _LOOKED_FOR_OTHERS:
             other = _counts(image)
