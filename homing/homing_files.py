@@ -156,7 +156,11 @@ def read_readings(path: Path, n_cables: int) -> Readings:
         InputError: for unknown or missing columns, text that is not a number, a first row that is
             not zero.
     """
-    rows = list(csv.reader(io.StringIO(comma_separated(read_text(path, _MOST_CSV_BYTES)))))
+    text = comma_separated(read_text(path, _MOST_CSV_BYTES))
+    try:
+        rows = list(csv.reader(io.StringIO(text)))
+    except csv.Error as error:  # a carriage return inside a row
+        raise InputError(f"{path}: {error}: save it again as CSV") from error
     rows = [(line, row) for line, row in enumerate(rows, start=1) if any(c.strip() for c in row)]
     if not rows:
         raise InputError(f"{path}: empty; give a header and one static pose a row")

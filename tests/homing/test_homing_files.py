@@ -5,7 +5,14 @@ import pytest
 
 from freeswing.cdpr.files.documents import InputError
 from freeswing.cdpr.files.robot_file import write_robot
-from freeswing.homing.homing_files import Homing, ReadingNoise, Readings, read_homing, write_homing
+from freeswing.homing.homing_files import (
+    Homing,
+    ReadingNoise,
+    Readings,
+    read_homing,
+    read_readings,
+    write_homing,
+)
 from tests.paper_robots import bologna_3
 
 HEADER = "dsigma1_rad,dsigma2_rad,dsigma3_rad,dl1_m,dl2_m,dl3_m"
@@ -80,3 +87,10 @@ def test_a_wrong_document_is_named(tmp_path, toml, message):
 def test_a_wrong_table_is_named(tmp_path, table, message):
     with pytest.raises(InputError, match=message):
         read_homing(folder(tmp_path, table=table))
+
+
+def test_a_carriage_return_inside_a_row_is_refused(tmp_path) -> None:
+    path = tmp_path / "readings.csv"
+    path.write_bytes(b"dsigma1_rad,dl1_m\n0,0\n0.1\r,0.2\n")
+    with pytest.raises(InputError, match=r"save it again as CSV"):
+        read_readings(path, 1)
