@@ -47,7 +47,7 @@ def group_warnings(rig: Rig) -> list[str]:
     """Says which cameras no board joins, and what does."""
     n_board = board_size(rig.problem.board_points_m)
     views = rig.problem.views
-    on_board = views.seen[:, :n_board].any(axis=1)
+    on_board = np.asarray(views.seen[:, :n_board].any(axis=1))
     groups = board_groups(len(rig.cameras), views.select(on_board))
     if not groups.any():
         return []

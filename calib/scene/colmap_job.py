@@ -159,8 +159,9 @@ def _arrays(model: Any, names: list[str], database: Path) -> dict[str, np.ndarra
     for k, values in enumerate(lens):
         params[k, : len(values)] = values
     places = np.zeros((len(points), 3))
-    for number, row in points.items():
-        places[row] = model.points3D[number].xyz
+    if model is not None:
+        for number, row in points.items():
+            places[row] = model.points3D[number].xyz
     shared = np.zeros((len(names), len(names)))
     with pycolmap.Database.open(database) as kept:
         ids = {int(i.image_id): order[i.name] for i in kept.read_all_images()}

@@ -49,10 +49,10 @@ def _point(reader: Reader) -> SurveyedPoint:
 
 def _distance(reader: Reader) -> Distance:
     ends = reader.raw("between")
-    good = isinstance(ends, list) and len(ends) == 2 and all(isinstance(e, str) for e in ends)
-    if not good or ends[0] == ends[1]:
+    names = [end for end in ends if isinstance(end, str)] if isinstance(ends, list) else []
+    if len(names) != 2 or ends != names or names[0] == names[1]:
         reader.add("between", 'must be the names of two points, such as ["A", "B"]')
-        ends = ["", " "]
+        names = ["", " "]
     length, std = reader.number("distance_m", above=0.0), _std(reader)
     reader.finish()
-    return Distance((ends[0], ends[1]), length, std)
+    return Distance((names[0], names[1]), length, std)

@@ -83,7 +83,7 @@ def _start(found: LabMap, stills: Sequence[Still], model: str) -> tuple[Scene, V
     _, once = np.unique(np.stack([found.image, found.point]), axis=1, return_index=True)
     camera, point, pixels = number[found.image[once]], found.point[once], found.pixels[once]
     variance = feature_variance(found.size_px[once])
-    keep = chosen_points(camera, point, np.array([stills[k].walk for k in tied]))
+    keep = chosen_points(camera, point, np.array([stills[k].walk for k in tied.tolist()]))
     chosen = np.isin(point, keep)
     views, kept = make_views(
         camera[chosen],

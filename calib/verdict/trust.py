@@ -89,7 +89,7 @@ def camera_numbers(rig: Rig, index: int, truth: TruthChecks, alone_px: np.ndarra
     """What is known of one camera of a solution."""
     camera = rig.cameras[index]
     scene, views = rig.adjustment.scene, rig.problem.views
-    board = views.seen[:, : board_size(rig.problem.board_points_m)].any(axis=1)
+    board = np.asarray(views.seen[:, : board_size(rig.problem.board_points_m)].any(axis=1))
     views = views.select(board)
     coverage = coverage_of(camera, index, views, scene.T_base_boards)
     labels = (f"{camera.name}/", f"{camera.name}.")

@@ -189,8 +189,8 @@ def reduce_run(
     if shifts is not None:
         everything[: white.size, size:-1] = (maps @ shifts).reshape(white.size, -1)
     # What follows combines columns: a triangle of them serves as well, and is a hundredth as long.
-    everything = np.linalg.qr(everything, mode="r")
-    rows, beside, right = everything[:, :size], everything[:, size:-1], everything[:, -1]
+    triangle = np.asarray(np.linalg.qr(everything, mode="r"))
+    rows, beside, right = triangle[:, :size], triangle[:, size:-1], triangle[:, -1]
     basis = _allowed_states(motion)
     directions = STATE - motion.model.robot.n_cables
     body = rows[:, :STATE] @ basis

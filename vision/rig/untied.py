@@ -68,7 +68,7 @@ def untied_shifts(
     step = iterated(current, watch, poses, fit, free, total, survey_std_m)
     sure = [
         k
-        for k in np.flatnonzero(free[:, POSE])
+        for k in np.flatnonzero(free[:, POSE]).tolist()
         if is_sure(total[k, POSE:], step.covariance[_pose_of(k), _pose_of(k)])
     ]
     if not sure:

@@ -59,6 +59,6 @@ def still_pose(
     )
     begun = MovingPose(start[:3, :3].copy(), start[:3, 3].copy(), np.zeros(12))
     solved = solve_instant(
-        seen, whitening(covariance), np.int64(0), begun, 6, _ROBUST_LIMIT, np.int64(MOST_PASSES)
+        seen, whitening(covariance), 0, begun, 6, _ROBUST_LIMIT, np.int64(MOST_PASSES)
     )
     return transform(solved.rotation, solved.position), solved.covariance
