@@ -54,8 +54,12 @@ def test_the_centre_of_mass_is_known_to_micrometres(session) -> None:
 
 
 @pytest.mark.slow
-def test_without_the_calibrations_modes_the_claim_would_be_false(session) -> None:
-    """The negative control: the same tracks where nothing is known of the calibration."""
+def test_without_the_calibrations_modes_the_claim_would_be_false_or_wide(session) -> None:
+    """The negative control: the same tracks where nothing is known of the calibration.
+
+    Where runs contradict each other for it, they widen a deviation by much (seed 2: 14 times).
+    """
+    _, known = errors(session, "ml_full")
     path = session / "results" / "tracking.json"
     whole = path.read_text()
     document = json.loads(whole)
@@ -68,4 +72,5 @@ def test_without_the_calibrations_modes_the_claim_would_be_false(session) -> Non
         error, std = errors(session, "ml_full")
     finally:
         path.write_text(whole)
-    assert np.abs(error / std).max() > 4.0, f"z = {np.round(error / std, 2)}"
+    z, wider = np.abs(error / std), std / known
+    assert z.max() > 4.0 or wider.max() > 4.0, f"z = {np.round(z, 2)}, wider {np.round(wider, 2)}"
