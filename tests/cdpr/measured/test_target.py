@@ -49,14 +49,14 @@ def test_what_is_written_reads_back(tmp_path_factory, seed):
     rng = np.random.default_rng(seed)
     poses = transform(exp_rotation(rng.normal(size=(3, 3))), rng.normal(size=(3, 3)))
     tags = tuple(Tag("tag36h11", i, 0.1 * (i + 1), T) for i, T in enumerate(poses))
-    markers = (Marker("P", np.zeros(3)), Marker("a \"b\" é", rng.normal(size=3), 0.02))
+    markers = (Marker("P", np.zeros(3)), Marker('a "b" é', rng.normal(size=3), 0.02))
     path = tmp_path_factory.mktemp("target") / "target.toml"
     write_target(path, Target(tags, markers))
     found = read_target(path)
     for a, b in zip(tags, found.tags, strict=True):
         assert (a.family, a.id, a.size_m) == (b.family, b.id, b.size_m)
         assert np.allclose(a.T_platform_tag, b.T_platform_tag, atol=1e-14)
-    assert found.marker_names == ("P", "a \"b\" é")
+    assert found.marker_names == ("P", 'a "b" é')
     assert np.array_equal(found.marker_positions_m[1], markers[1].position_m)
 
 
