@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-_SMALL_SINE = 1e-9
-_NEWTON_STEPS = 30
-_CONVERGED = 1e-12
+SMALL_SINE = 1e-9
+NEWTON_STEPS = 30
+CONVERGED = 1e-12
 _LEAST_DETERMINANT = 1e-6
-_SOLVED = 1e-9
+SOLVED = 1e-9
 
 
 @numba.njit(cache=True, nogil=True)
@@ -73,7 +73,7 @@ def fisheye(
     rho = math.sqrt(rho2)
     theta = math.atan2(rho, z)
     t2 = theta * theta
-    near_axis = rho < _SMALL_SINE * abs(z)
+    near_axis = rho < SMALL_SINE * abs(z)
     if near_axis:
         scale = 1.0 / z if z > 0.0 else math.nan
         safe2 = 1.0
@@ -165,7 +165,7 @@ def perspective_rays(distorted: Array, full: Array, limit: float) -> Array:
         xd, yd = distorted[k, 0], distorted[k, 1]
         shorter = min(1.0, 0.9 * limit / max(math.hypot(xd, yd), 1e-12))
         point[0], point[1] = shorter * xd, shorter * yd
-        for _ in range(_NEWTON_STEPS):
+        for _ in range(NEWTON_STEPS):
             perspective(full, point, True, value, slope, d_full)
             a, b, c, d = slope[0, 0], slope[0, 1], slope[1, 0], slope[1, 1]
             determinant = a * d - b * c
@@ -176,10 +176,10 @@ def perspective_rays(distorted: Array, full: Array, limit: float) -> Array:
             x, y = point[0] + sx, point[1] + sy
             shorter = min(1.0, limit / max(math.hypot(x, y), 1e-12))
             point[0], point[1] = shorter * x, shorter * y
-            if abs(sx) <= _CONVERGED and abs(sy) <= _CONVERGED:
+            if abs(sx) <= CONVERGED and abs(sy) <= CONVERGED:
                 break
         perspective(full, point, False, value, slope, d_full)
-        solved = math.hypot(xd - value[0], yd - value[1]) < _SOLVED
+        solved = math.hypot(xd - value[0], yd - value[1]) < SOLVED
         if solved and math.hypot(point[0], point[1]) < limit:
             rays[k] = point[:2]
         else:

@@ -19,7 +19,15 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from freeswing.calib.camera.lens_kernels import lens_jacobians, lens_pixels, perspective_rays
+from freeswing.calib.camera.lens_kernels import (
+    CONVERGED,
+    NEWTON_STEPS,
+    SMALL_SINE,
+    SOLVED,
+    lens_jacobians,
+    lens_pixels,
+    perspective_rays,
+)
 
 Array = NDArray[np.float64]
 
@@ -34,9 +42,6 @@ PARAMETER_NAMES: dict[str, tuple[str, ...]] = {
     "OPENCV_FISHEYE": ("fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4"),
 }
 FISHEYE = "OPENCV_FISHEYE"
-_SMALL_SINE = 1e-9
-_NEWTON_STEPS = 30
-_CONVERGED = 1e-12
 
 
 @lru_cache(maxsize=64)
@@ -172,17 +177,17 @@ def _fisheye_undistort(distorted: Array, params: Array) -> Array:
     limit = radius_limit(FISHEYE, params)
     theta_d = np.linalg.norm(distorted, axis=-1)
     theta = np.minimum(theta_d, limit)
-    for _ in range(_NEWTON_STEPS):
+    for _ in range(NEWTON_STEPS):
         t2 = theta * theta
         value = theta * (1.0 + t2 * (k[0] + t2 * (k[1] + t2 * (k[2] + t2 * k[3]))))
         slope = 1.0 + t2 * (3 * k[0] + t2 * (5 * k[1] + t2 * (7 * k[2] + t2 * 9 * k[3])))
         step = (theta_d - value) / np.where(np.abs(slope) < 1e-6, 1e-6, slope)
         theta = np.clip(theta + step, 0.0, limit)
-        if not np.any(np.abs(step) > _CONVERGED):
+        if not np.any(np.abs(step) > CONVERGED):
             break
     t2 = theta * theta
     value = theta * (1.0 + t2 * (k[0] + t2 * (k[1] + t2 * (k[2] + t2 * k[3]))))
-    solved = (np.abs(value - theta_d) < 1e-9) & (theta < min(limit, np.pi / 2))
-    on_axis = theta_d < _SMALL_SINE
+    solved = (np.abs(value - theta_d) < SOLVED) & (theta < min(limit, np.pi / 2))
+    on_axis = theta_d < SMALL_SINE
     scale = np.where(on_axis, 1.0, np.tan(theta) / np.where(on_axis, 1.0, theta_d))
     return np.where(solved[..., None], distorted * scale[..., None], np.nan)

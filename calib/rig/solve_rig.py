@@ -22,7 +22,7 @@ from freeswing.calib.rig.normal_equations import Problem, length_with_share
 from freeswing.calib.rig.reprojection import Scene, board_size, camera_slices, shape_modes
 from freeswing.calib.rig.reprojection_kernels import CLOCK, POSE, WARP
 from freeswing.calib.rig.rig_start import BaseTie, board_groups, place_in_base, start_rig
-from freeswing.calib.rig.views import FixedPoints, Views
+from freeswing.calib.rig.views import FixedPoints, Views, joined_views
 
 Progress = Callable[[str, float], None]
 
@@ -115,7 +115,7 @@ def solve_rig(
     Raises:
         DataError: when the cameras do not share enough views.
     """
-    views = _joined([start.views for start in starts])
+    views = joined_views([start.views for start in starts])
     poses = np.concatenate([start.T_camera_boards for start in starts])
     offsets = np.zeros(len(starts)) if offsets_s is None else offsets_s
     cameras = tuple(
@@ -334,15 +334,3 @@ def _survey_std(result: Adjustment, fixed: FixedPoints) -> float:
     redundancy = max(float(correction.size - left.sum()), 0.0)
     total = float(np.sum(correction**2)) + _SURVEY_PRIOR * given**2
     return max(np.sqrt(total / (redundancy + _SURVEY_PRIOR)), LEAST_SURVEY_STD_M)
-
-
-def _joined(parts: list[Views]) -> Views:
-    return Views(
-        np.concatenate([part.camera for part in parts]),
-        np.concatenate([part.moment for part in parts]),
-        np.concatenate([part.piece for part in parts]),
-        np.concatenate([part.pixels for part in parts]),
-        np.concatenate([part.lag_s for part in parts]),
-        np.concatenate([part.whitening for part in parts]),
-        tuple(label for part in parts for label in part.label),
-    )

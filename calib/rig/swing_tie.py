@@ -22,7 +22,7 @@ from freeswing.calib.camera.intrinsics import CameraStart
 from freeswing.calib.camera.lens_models import Array
 from freeswing.calib.rig.coarse_clocks import coarse_clocks
 from freeswing.calib.rig.rig_start import board_groups, pose_from_points
-from freeswing.calib.rig.views import Views
+from freeswing.calib.rig.views import Views, joined_views
 
 _GAP_S = 100.0  # between recordings on the common timeline
 _MOST_MISS_PX = 3.0
@@ -115,7 +115,7 @@ def joined(
     times = np.zeros(n_moments) if line is None else line.times_s
     piece = np.full(n_moments, REST) if line is None else line.piece
     offsets, unknown = before.offsets_s.copy(), set(before.unknown)
-    groups = board_groups(len(starts), _all(parts))
+    groups = board_groups(len(starts), joined_views(parts))
     for swing in swings:
         stamps = tuple(seen.stamps_s for seen in swing.sightings)
         told = coarse_clocks(_tracks(cameras, swing, body), stamps)
@@ -134,7 +134,7 @@ def joined(
             T, good = _poses(camera, body, views.pixels)
             views = _widened(_grouped(views.select(good), size), first, 0)
             moment = views.moment + len(times)
-            parts[index] = _all([parts[index], replace(views, moment=moment, piece=moment)])
+            parts[index] = joined_views([parts[index], replace(views, moment=moment, piece=moment)])
             poses[index] = np.concatenate([poses[index], T[good]])
         times = np.concatenate([times, seen.line.times_s + shift])
         piece = np.concatenate([piece, own])
@@ -206,15 +206,3 @@ def _widened(views: Views, before: int, after: int) -> Views:
         axis=1,
     )
     return replace(views, pixels=pixels, whitening=np.ascontiguousarray(whitening))
-
-
-def _all(parts: list[Views]) -> Views:
-    return Views(
-        np.concatenate([part.camera for part in parts]),
-        np.concatenate([part.moment for part in parts]),
-        np.concatenate([part.piece for part in parts]),
-        np.concatenate([part.pixels for part in parts]),
-        np.concatenate([part.lag_s for part in parts]),
-        np.concatenate([part.whitening for part in parts]),
-        tuple(label for part in parts for label in part.label),
-    )

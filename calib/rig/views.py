@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -73,6 +74,19 @@ class Views:
         """Residuals (n, n_points, 2) in units of the typical corner's, (n, n_groups, 2 c)."""
         grouped = residuals.reshape(*self.whitening.shape[:-1])
         return (self.whitening @ grouped[..., None])[..., 0]
+
+
+def joined_views(parts: Sequence[Views]) -> Views:
+    """The views of all parts, one after the other; moments and pieces keep their numbers."""
+    return Views(
+        np.concatenate([part.camera for part in parts]),
+        np.concatenate([part.moment for part in parts]),
+        np.concatenate([part.piece for part in parts]),
+        np.concatenate([part.pixels for part in parts]),
+        np.concatenate([part.lag_s for part in parts]),
+        np.concatenate([part.whitening for part in parts]),
+        tuple(label for part in parts for label in part.label),
+    )
 
 
 def make_views(
