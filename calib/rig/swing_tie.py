@@ -195,14 +195,8 @@ def _widened(views: Views, before: int, after: int) -> Views:
     """The views with so many unseen points before and after."""
     pixels = np.pad(views.pixels, ((0, 0), (before, after), (0, 0)), constant_values=np.nan)
     size = views.group_size
-    blank = np.eye(2 * size)
-    shape = (len(views), 1, 1, 1)
-    whitening = np.concatenate(
-        [
-            np.tile(blank, (shape[0], before // size, 1, 1)),
-            views.whitening,
-            np.tile(blank, (shape[0], after // size, 1, 1)),
-        ],
-        axis=1,
+    head, tail = (
+        np.tile(np.eye(2 * size), (len(views), points // size, 1, 1)) for points in (before, after)
     )
+    whitening = np.concatenate([head, views.whitening, tail], axis=1)
     return replace(views, pixels=pixels, whitening=np.ascontiguousarray(whitening))
