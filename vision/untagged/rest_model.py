@@ -15,6 +15,7 @@ from freeswing.calib.camera.camera import Camera
 from freeswing.calib.rig.triangulation import triangulate
 from freeswing.cdpr.files.documents import DataError, InputError, read_text
 from freeswing.cdpr.files.number_table import comma_separated
+from freeswing.cdpr.measured.rigid_fit import fit_rigid
 from freeswing.cdpr.measured.target import Untagged
 from freeswing.cdpr.rotation import transform
 from freeswing.vision.untagged.features import FeatureFinder, Features, matched
@@ -189,22 +190,22 @@ def rigid(stated: Array, places: Array, where: str, names: Sequence[str]) -> Arr
     """T (4, 4) with places = T stated of least squares.
 
     Raises:
-        DataError: the points do not fit, with the one that is off most.
+        DataError: the points do not fit, with the one that is off most, or lie on a line.
 
     Source:
         Kabsch 1976, A solution for the best rotation to relate two sets of vectors.
     """
-    a, b = stated - stated.mean(axis=0), places - places.mean(axis=0)
-    left, _, right = np.linalg.svd(b.T @ a)
-    turn = left @ np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))]) @ right
-    off = np.linalg.norm(b - a @ turn.T, axis=1)
+    turn, shift = (found[0] for found in fit_rigid(stated, places[None]))
+    off = np.linalg.norm(places - stated @ turn.T - shift, axis=1)
+    if np.isnan(off).any():
+        raise DataError(f"{where}: points {', '.join(names)} lie on a line: they fix no frame")
     if off.max() > WORST_NAMED_M:
         raise DataError(
             f"{where}: point {names[int(off.argmax())]} lies {1e3 * off.max():.1f} mm from where "
             f"target.toml has it beside the others, limit {1e3 * WORST_NAMED_M:.0f} mm: a wrong "
             "mark, a wrong position_m, or millimetres for metres"
         )
-    return transform(turn, places.mean(axis=0) - turn @ stated.mean(axis=0))
+    return transform(turn, shift)
 
 
 def _clicks(untagged: Untagged, cameras: Sequence[str]) -> dict[tuple[str, str], Array]:

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 
 from freeswing.report.figures import INK, MARKS, SERIES, Draw, figure, figures, interval_axes, key
 from freeswing.report.material import Material
+from freeswing.report.panels.sure import draw_correlation
 from freeswing.report.words import HALF_WIDTH_95, number, parameter_row, plain, unit_of
 from freeswing.results.common import Parameter
 from freeswing.results.diagnosis import Diagnosis
@@ -134,21 +135,13 @@ def _changed(diagnosis: Diagnosis | None) -> list[dict[str, str]]:
 
 
 def _correlation(joint: Table) -> Markup:
-    names = [plain(unit_of(one["name"])[0]) for one in joint["parameters"]]
-    matrix = np.array(joint["correlation"], dtype=float)
-
-    def draw(sheet: Figure) -> None:
-        axes = sheet.subplots()
-        axes.imshow(matrix, vmin=-1.0, vmax=1.0, cmap="RdBu_r")
-        axes.set_xticks(range(len(names)), names, rotation=90, fontsize=6.5)
-        axes.set_yticks(range(len(names)), names, fontsize=6.5)
-        axes.grid(visible=False)
-        for (i, k), value in np.ndenumerate(matrix):
-            if i != k and abs(value) >= 0.5:
-                axes.text(k, i, f"{value:.1f}", ha="center", va="center", fontsize=5.5)
-
-    caption = "Correlations of the joint estimate, red together, blue against each other."
-    return figure(draw, 5.2, 4.8, caption)
+    names = [one["name"] for one in joint["parameters"]]
+    rows = np.array(joint["correlation"], dtype=float)
+    caption = (
+        "Correlations of the joint estimate: two that err together are blue, against each other "
+        "orange and hatched."
+    )
+    return figure(lambda sheet: draw_correlation(sheet.subplots(), rows, names), 5.2, 4.8, caption)
 
 
 def _fits(found: Table) -> list[dict[str, str]]:

@@ -132,21 +132,25 @@ def _correlation(best: Estimate) -> Markup:
     return figures([lambda sheet: draw_correlation(sheet.subplots(), rows)], 4.4, caption, 4.6)
 
 
-def draw_correlation(axes: Axes, rows: Array) -> None:
-    """A square a pair, its size and its number the correlation."""
-    names = [plain(unit_of(name)[0]) for name in INERTIA_NAMES]
+def draw_correlation(axes: Axes, rows: Array, of: Sequence[str] = INERTIA_NAMES) -> None:
+    """A square a pair, its size the correlation; its number where there is room or it is large."""
+    names = [plain(unit_of(name)[0]) for name in of]
+    crowded = len(names) > len(INERTIA_NAMES)
+    least, digits, size = (0.5, 1, 5.5) if crowded else (0.0, 2, 6.5)
     for (i, k), value in np.ndenumerate(rows):
         side = 0.94 * np.sqrt(abs(value))
         colour, hatch = (SERIES[0], "") if value >= 0.0 else (SERIES[1], "////")
         corner = (k - side / 2.0, i - side / 2.0)
         drawn = {"facecolor": "none" if hatch else colour, "alpha": 0.45, "edgecolor": colour}
         axes.add_patch(Rectangle(corner, side, side, hatch=hatch, lw=0.5, **drawn))
-        if i != k:
-            axes.text(k, i, f"{value:.2f}", ha="center", va="center", fontsize=6.5)
+        if i != k and abs(value) >= least:
+            axes.text(k, i, f"{value:.{digits}f}", ha="center", va="center", fontsize=size)
     axes.set_xlim(-0.6, len(names) - 0.4)
     axes.set_ylim(len(names) - 0.4, -0.6)
     axes.set_xticks(range(len(names)), names, rotation=60, ha="right")
     axes.set_yticks(range(len(names)), names)
+    if crowded:
+        axes.tick_params(labelsize=6.5)
     axes.set_aspect("equal")
     axes.grid(visible=False)
 
