@@ -50,7 +50,7 @@ class Panel(Protocol):
     title: str
 
     def values(self, material: Material) -> dict[str, Any] | None:
-        """What the template `<name>.html` shows, or None where nothing is there to show."""
+        """What the template `panels/<name>.html` shows, or None where nothing is there to show."""
         ...
 
 
@@ -128,7 +128,7 @@ def _section(environment: Environment, panel: Panel, material: Material) -> dict
         values = panel.values(material)
         body = None
         if values is not None:
-            body = Markup(environment.get_template(f"{panel.name}.html").render(values))
+            body = Markup(environment.get_template(f"panels/{panel.name}.html").render(values))
     except (*ODD_VALUES, UndefinedError) as failure:
         kind = type(failure).__name__
         raise InputError(

@@ -16,8 +16,8 @@ from freeswing.cdpr.model.free_motion import (
 from freeswing.cdpr.model.statics import equilibrium_at_lengths
 from freeswing.cdpr.robot import Cable, Platform, Robot
 from freeswing.cdpr.rotation import matrix_from_angles, quaternion_from_matrix
-from tests.oracle.robots import declared_robot, with_eyelets
-from tests.oracle.world import Body
+from tests.oracle.mechanics.world import Body
+from tests.oracle.scenes.robots import declared_robot, with_eyelets
 
 TABLE_2 = np.array(
     [

@@ -7,7 +7,7 @@ import pytest
 from freeswing.cdpr.files.documents import InputError
 from freeswing.cdpr.files.robot_file import read_robot, write_robot
 from freeswing.cdpr.tolerances import Tolerances
-from tests.oracle.robots import declared_robot
+from tests.oracle.scenes.robots import declared_robot
 
 
 @pytest.mark.parametrize("field", [one.name for one in dataclasses.fields(Tolerances)])

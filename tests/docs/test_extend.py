@@ -22,7 +22,7 @@ from freeswing.main import main
 from freeswing.session.load_swings import load_robot, load_swings, load_target
 from freeswing.session.session_file import read_session
 from tests.calib.rigs import rig
-from tests.oracle.sessions import make_session
+from tests.oracle.recorded.sessions import make_session
 from tests.places import ROOT, SAMPLES
 
 NAME = "spinning_rotor"

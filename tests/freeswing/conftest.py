@@ -10,7 +10,7 @@ import pytest
 from freeswing.cdpr.files.robot_file import write_robot
 from freeswing.cdpr.files.trajectory_files import write_csv
 from freeswing.cdpr.measured.trajectory import Trajectory
-from tests.oracle.robots import declared_robot
+from tests.oracle.scenes.robots import declared_robot
 
 SESSION = """format = "freeswing-session/1"
 name = "two swings"

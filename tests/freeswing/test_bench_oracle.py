@@ -10,7 +10,7 @@ from freeswing.ident.bench.identify_bench import identify_bench
 from freeswing.session.load_bench import load_bench
 from freeswing.session.load_swings import load_robot
 from freeswing.session.session_file import read_session
-from tests.oracle.benches import DECLARED_KG, make_bench
+from tests.oracle.recorded.benches import DECLARED_KG, make_bench
 
 
 @pytest.mark.slow

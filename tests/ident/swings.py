@@ -13,7 +13,7 @@ from freeswing.cdpr.robot import POSE_COORDINATES, Array
 from freeswing.cdpr.simulation.free_swing import Motion, simulate
 from freeswing.ident.likelihood.rest_pose import taut_equilibrium
 from freeswing.ident.runs import Payload, SwingRun
-from tests.oracle.robots import declared_robot
+from tests.oracle.scenes.robots import declared_robot
 
 # FIDIM 2022, Table 2: optimised cable lengths in metres, a column an equilibrium.
 PAPER_LENGTHS_M = np.array(

@@ -11,12 +11,12 @@ import pytest
 from freeswing.session.load_swings import load_target
 from freeswing.session.marker_runs import read_marker_runs
 from freeswing.session.session_file import read_session
-from tests.oracle.cases import TIERS, manifest
-from tests.oracle.effects import EFFECTS, SIZES
-from tests.oracle.lab_days import make_lab_day
-from tests.oracle.outside import OUTSIDE
-from tests.oracle.sessions import SessionTruth, make_session
-from tests.oracle.visibility import visibility
+from tests.oracle.recorded.cases import TIERS, manifest
+from tests.oracle.recorded.lab_days import make_lab_day
+from tests.oracle.recorded.sessions import SessionTruth, make_session
+from tests.oracle.recorded.visibility import visibility
+from tests.oracle.scenes.effects import EFFECTS, SIZES
+from tests.oracle.scenes.outside import OUTSIDE
 
 
 def test_every_effect_at_every_size_and_forty_clean_sessions() -> None:

@@ -12,13 +12,13 @@ from freeswing.cdpr.model.free_motion import admissible_rates
 from freeswing.cdpr.robot import Robot
 from freeswing.cdpr.rotation import angle_rate_matrix, matrix_from_angles
 from freeswing.cdpr.simulation.free_swing import simulate as product_simulate
-from tests.oracle.equilibrium import displaced, lengths_at, settle, tensions_at_rest
-from tests.oracle.geometry import turn
-from tests.oracle.mujoco_swing import mujoco_swing
-from tests.oracle.newton_euler import Motion, project, simulate, start_state
-from tests.oracle.robots import declared_robot, true_body, with_eyelets
-from tests.oracle.sessions import tait_bryan
-from tests.oracle.world import Array, World, plain_world
+from tests.oracle.mechanics.equilibrium import displaced, lengths_at, settle, tensions_at_rest
+from tests.oracle.mechanics.geometry import turn
+from tests.oracle.mechanics.newton_euler import Motion, project, simulate, start_state
+from tests.oracle.mechanics.world import Array, World, plain_world
+from tests.oracle.recorded.sessions import tait_bryan
+from tests.oracle.scenes.robots import declared_robot, true_body, with_eyelets
+from tests.oracle.witnesses.mujoco_swing import mujoco_swing
 
 START = {"bologna-4": ((1.15, -0.18, -0.4), 0.05), "three-cable": ((-1.36, 0.97, -0.46), -0.55)}
 MASS_KG = 8.0

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from freeswing.cdpr.robot import Cable, Robot
-from tests.oracle.dynamics import derivative
-from tests.oracle.effects import Scene, add_effect
-from tests.oracle.equilibrium import Rest, displaced, lengths_at, settle
-from tests.oracle.geometry import cable, length_acceleration, turn
-from tests.oracle.mujoco_swing import mujoco_swing
-from tests.oracle.newton_euler import Motion, energy, simulate, start_state
-from tests.oracle.robots import declared_robot, nominal_body, true_body, with_eyelets
-from tests.oracle.world import Array, Body, World, plain_world
+from tests.oracle.mechanics.dynamics import derivative
+from tests.oracle.mechanics.equilibrium import Rest, displaced, lengths_at, settle
+from tests.oracle.mechanics.geometry import cable, length_acceleration, turn
+from tests.oracle.mechanics.newton_euler import Motion, energy, simulate, start_state
+from tests.oracle.mechanics.world import Array, Body, World, plain_world
+from tests.oracle.scenes.effects import Scene, add_effect
+from tests.oracle.scenes.robots import declared_robot, nominal_body, true_body, with_eyelets
+from tests.oracle.witnesses.mujoco_swing import mujoco_swing
 
 START = {"bologna-4": ((1.15, -0.18, -0.4), 0.05), "three-cable": ((-1.36, 0.97, -0.46), -0.55)}
 

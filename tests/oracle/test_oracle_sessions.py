@@ -12,11 +12,11 @@ from freeswing.cdpr.files.robot_file import read_robot
 from freeswing.cdpr.files.trajectory_files import read_trajectory
 from freeswing.cdpr.measured.target import read_target
 from freeswing.session.session_file import read_session
-from tests.oracle.effects import EFFECTS, MAGNITUDES, SIZES
-from tests.oracle.outside import OUTSIDE, OUTSIDE_MAGNITUDES
-from tests.oracle.robots import declared_robot, true_body
-from tests.oracle.runs import LEAST_TENSION_N, draw_run
-from tests.oracle.sessions import SessionTruth, make_scene, make_session
+from tests.oracle.recorded.sessions import SessionTruth, make_scene, make_session
+from tests.oracle.scenes.effects import EFFECTS, MAGNITUDES, SIZES
+from tests.oracle.scenes.outside import OUTSIDE, OUTSIDE_MAGNITUDES
+from tests.oracle.scenes.robots import declared_robot, true_body
+from tests.oracle.scenes.runs import LEAST_TENSION_N, draw_run
 
 
 @pytest.fixture(scope="module")

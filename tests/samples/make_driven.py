@@ -15,8 +15,8 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import fsolve
 from scipy.spatial.transform import Rotation
 
-from tests.oracle.driven_plant import Plant
-from tests.oracle.world import Array
+from tests.oracle.mechanics.world import Array
+from tests.oracle.witnesses.driven_plant import Plant
 from tests.places import SAMPLES
 
 SHAPE = {

@@ -26,10 +26,10 @@ from freeswing.demo.rig import base_tags, demo_target
 from freeswing.vision.look.video import write_stamps
 from freeswing.vision.render.patterns import Patch, charuco_patch, tag_patch
 from freeswing.vision.render.render_scene import Look, Renderer, Scene, motion_of
-from tests.oracle import session_files as files
-from tests.oracle.robots import declared_robot, true_body
-from tests.oracle.runs import TrueRun, draw_run
-from tests.oracle.sessions import make_scene, tait_bryan
+from tests.oracle.recorded import session_files as files
+from tests.oracle.recorded.sessions import make_scene, tait_bryan
+from tests.oracle.scenes.robots import declared_robot, true_body
+from tests.oracle.scenes.runs import TrueRun, draw_run
 from tests.places import SAMPLES
 from tests.vision.scenes import look_at
 

@@ -14,15 +14,15 @@ from freeswing.cdpr.files.trajectory_files import write_trc
 from freeswing.cdpr.measured.marker_recording import MarkerRecording
 from freeswing.cdpr.measured.target import Marker, Target, write_target
 from freeswing.cdpr.robot import Cable, Platform, Robot
-from tests.oracle import session_files as files
-from tests.oracle.benches import make_bench
-from tests.oracle.equilibrium import displaced, lengths_at, settle, tensions_at_rest
-from tests.oracle.geometry import turn
-from tests.oracle.newton_euler import Motion, simulate
-from tests.oracle.robots import about_p, declared_robot, true_body
-from tests.oracle.runs import draw_run
-from tests.oracle.sessions import make_scene, make_session
-from tests.oracle.world import Body, plain_world
+from tests.oracle.mechanics.equilibrium import displaced, lengths_at, settle, tensions_at_rest
+from tests.oracle.mechanics.geometry import turn
+from tests.oracle.mechanics.newton_euler import Motion, simulate
+from tests.oracle.mechanics.world import Body, plain_world
+from tests.oracle.recorded import session_files as files
+from tests.oracle.recorded.benches import make_bench
+from tests.oracle.recorded.sessions import make_scene, make_session
+from tests.oracle.scenes.robots import about_p, declared_robot, true_body
+from tests.oracle.scenes.runs import draw_run
 from tests.places import SAMPLES
 
 ROLES = ("identify",) * 5 + ("validate",) * 2

@@ -29,7 +29,7 @@ def test_the_object_of_a_bench_sample(seen: str, share: float, tmp_path: Path) -
     assert abs(platform["value"] - truth["platform_Izz_P_kg_m2"]) < 3.0 * platform["std"], platform
     assert told["budgets"][0]["shares"], "no error budget"
     for channel in told.get("channels", []):
-        # tests/oracle/benches.py: 1100 tan(2 chi + 0.3) pixels, told by no calibration.
+        # tests/oracle/recorded/benches.py: 1100 tan(2 chi + 0.3) pixels, told by no calibration.
         gain, slope = channel["gains"][0], 2200.0 / np.cos(0.3) ** 2
         assert gain["std"] < 0.15 * slope, gain
         assert abs(gain["value"] - slope) < 3.0 * gain["std"], gain

@@ -15,7 +15,7 @@ from freeswing.cdpr.measured.target import Target, write_target
 from freeswing.cdpr.rotation import exp_rotation
 from freeswing.vision.look.video import write_video
 from freeswing.vision.render.render_scene import Look, Renderer
-from tests.oracle.robots import declared_robot
+from tests.oracle.scenes.robots import declared_robot
 from tests.vision.scenes import arc_of_cameras, platform_tags, scene_of
 
 RATE_HZ = 50.0

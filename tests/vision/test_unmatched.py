@@ -12,7 +12,7 @@ from freeswing.cdpr.measured.target import write_target
 from freeswing.main import main
 from freeswing.vision.look.video import write_video
 from freeswing.vision.track_session import unmatched
-from tests.oracle.robots import declared_robot
+from tests.oracle.scenes.robots import declared_robot
 from tests.vision.loops import TARGET, small_cameras, write_looped_session
 
 

@@ -7,7 +7,7 @@ from freeswing.cdpr.driven.slopes import motion_slope, moved, pose_map
 from freeswing.cdpr.driven.statics import CENTRE, holding_currents, static_pose
 from freeswing.cdpr.model.batch import evaluate
 from tests.cdpr.driven_robots import inca, odd_robot, random_states
-from tests.oracle.mujoco_driven import DrivenBody, mujoco_driven
+from tests.oracle.witnesses.mujoco_driven import DrivenBody, mujoco_driven
 
 ONES = np.ones(8)
 TABLE_1 = DrivenBody(

@@ -6,7 +6,7 @@ import pytest
 from freeswing.cdpr.driven.motion import simulate_driven
 from freeswing.cdpr.model.batch import evaluate
 from tests.cdpr.driven_robots import inca
-from tests.oracle.driven_plant import Plant
+from tests.oracle.witnesses.driven_plant import Plant
 
 ONES = np.ones(8)
 

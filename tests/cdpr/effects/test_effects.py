@@ -22,9 +22,9 @@ from tests.cdpr.model_cases import (
     true_inertia,
     twist_of,
 )
-from tests.oracle.dynamics import derivative
-from tests.oracle.newton_euler import start_state
-from tests.oracle.world import plain_world
+from tests.oracle.mechanics.dynamics import derivative
+from tests.oracle.mechanics.newton_euler import start_state
+from tests.oracle.mechanics.world import plain_world
 
 MASS = 8.0
 TIME_S = 0.37

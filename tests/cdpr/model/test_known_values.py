@@ -10,7 +10,7 @@ from freeswing.cdpr.model.known_values import (
     with_known,
     without_effect,
 )
-from tests.oracle.robots import declared_robot
+from tests.oracle.scenes.robots import declared_robot
 
 PLACES = np.array([3, 4, 5])
 

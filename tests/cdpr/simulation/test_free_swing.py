@@ -21,9 +21,9 @@ from tests.cdpr.model_cases import (
     true_inertia,
     twist_of,
 )
-from tests.oracle.mujoco_swing import mujoco_swing
-from tests.oracle.newton_euler import simulate as independent_swing
-from tests.oracle.world import plain_world
+from tests.oracle.mechanics.newton_euler import simulate as independent_swing
+from tests.oracle.mechanics.world import plain_world
+from tests.oracle.witnesses.mujoco_swing import mujoco_swing
 
 TIMES_S = np.arange(1001) / 100.0
 

@@ -19,7 +19,7 @@ from freeswing.doctor.recordings import calibration_findings
 from freeswing.doctor.split import split_findings
 from freeswing.ident.runs import SwingRun
 from freeswing.session.session_file import read_session
-from tests.oracle.robots import declared_robot
+from tests.oracle.scenes.robots import declared_robot
 from tests.places import SAMPLES
 
 ROBOT = declared_robot("bologna-4")

@@ -14,7 +14,7 @@ from freeswing.results.diagnosis import Diagnosis
 from freeswing.results.identification import Identification
 from freeswing.results.motion import Motion
 from freeswing.results.tracking import Tracking
-from tests.oracle.robots import declared_robot
+from tests.oracle.scenes.robots import declared_robot
 
 VALUES = (0.0016, -0.0025, 0.2, 0.0563, 0.0627, 0.0322, 1e-4, -3e-4, 2e-4)
 HOSTILE = "<script>alert('x')</script> & \"quotes\""

@@ -24,7 +24,7 @@ from freeswing.session.exchanged_lengths import (
 )
 from freeswing.session.load_swings import load_swings
 from freeswing.session.session_file import read_session
-from tests.oracle.robots import declared_robot
+from tests.oracle.scenes.robots import declared_robot
 from tests.places import SAMPLES
 
 ROBOT = declared_robot("bologna-4")

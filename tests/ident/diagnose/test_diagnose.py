@@ -11,7 +11,7 @@ from freeswing.ident.diagnose.diagnose import diagnose
 from freeswing.ident.diagnose.experiments import separating_experiment
 from freeswing.session.load_swings import load_robot, load_swings, load_target
 from freeswing.session.session_file import read_session
-from tests.oracle.sessions import make_session
+from tests.oracle.recorded.sessions import make_session
 
 # Ten rules loosened at once: whoever loosens them claims what is not there.
 LOOSENED = {

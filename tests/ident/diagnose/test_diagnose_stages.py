@@ -14,7 +14,7 @@ from freeswing.ident.diagnose.variants import variants
 from freeswing.ident.likelihood.run_residuals import residuals
 from freeswing.session.load_swings import load_robot, load_swings, load_target
 from freeswing.session.session_file import read_session
-from tests.oracle.sessions import make_session
+from tests.oracle.recorded.sessions import make_session
 
 POINTS = ("attachment_offset", "anchor_offset", "clock_offset")
 WHITE = np.ones(2)

@@ -6,7 +6,7 @@ import numpy as np
 
 from freeswing.ident.diagnose.decision import LEAST_GAIN, Decision, promising, settles
 from freeswing.ident.diagnose.leave_one_out import Score
-from tests.oracle.robots import declared_robot
+from tests.oracle.scenes.robots import declared_robot
 
 NAMES = (
     "translational_drag", "rotational_drag", "quadratic_drag", "swivel_viscous", "torsion_spring",

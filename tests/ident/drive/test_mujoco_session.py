@@ -11,7 +11,7 @@ from freeswing.cdpr.files.drive_csv import write_drive_run
 from freeswing.main import main
 from tests.cdpr.driven_robots import inca
 from tests.ident.drive.made_sessions import STD, STEP_RAD, TOML
-from tests.oracle.mujoco_driven import DrivenBody, mujoco_driven
+from tests.oracle.witnesses.mujoco_driven import DrivenBody, mujoco_driven
 from tests.places import SAMPLES
 from tests.samples import make_driven
 

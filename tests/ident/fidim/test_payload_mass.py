@@ -18,10 +18,10 @@ from freeswing.ident.likelihood.payload_runs import Loads, mass_of, point_inerti
 from freeswing.ident.runs import Payload
 from freeswing.main import main
 from tests.ident.swings import TRUE_INERTIA
-from tests.oracle.robots import declared_robot, true_body
-from tests.oracle.runs import TrueRun, draw_run
-from tests.oracle.sessions import make_scene
-from tests.oracle.world import Body
+from tests.oracle.mechanics.world import Body
+from tests.oracle.recorded.sessions import make_scene
+from tests.oracle.scenes.robots import declared_robot, true_body
+from tests.oracle.scenes.runs import TrueRun, draw_run
 
 ROBOT = declared_robot("bologna-4")
 PAYLOAD = Payload(1.5, np.array([0.15, -0.1, 0.05]))

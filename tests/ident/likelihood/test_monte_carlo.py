@@ -1,4 +1,4 @@
-"""A small copy of benchmarks/identify_monte_carlo.py: estimates against the Cramer-Rao bound."""
+"""A small benchmarks/identify/identify_monte_carlo.py: estimates and the Cramer-Rao bound."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from benchmarks.identify_monte_carlo import (
+from benchmarks.identify.identify_monte_carlo import (
     NOISE_M,
     covariance_bound_of,
     likelihood,

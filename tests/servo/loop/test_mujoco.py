@@ -12,7 +12,7 @@ from freeswing.servo.loop.closed_loop import Loop, run_loop
 from freeswing.servo.loop.regulator import LinearRegulator
 from freeswing.servo.loop.trials import without_coulomb
 from freeswing.servo.robot_now import pose7
-from tests.oracle import mujoco_driven
+from tests.oracle.witnesses import mujoco_driven
 from tests.places import SAMPLES
 
 

@@ -20,10 +20,10 @@ from freeswing.cdpr.files.documents import dump_toml
 from freeswing.cdpr.measured.target import write_target
 from freeswing.demo.rig import base_tags, demo_target
 from freeswing.vision.render.render_scene import Renderer, Scene, motion_of
-from tests.oracle import session_files as files
-from tests.oracle.robots import declared_robot, true_body
-from tests.oracle.runs import draw_run
-from tests.oracle.sessions import make_scene
+from tests.oracle.recorded import session_files as files
+from tests.oracle.recorded.sessions import make_scene
+from tests.oracle.scenes.robots import declared_robot, true_body
+from tests.oracle.scenes.runs import draw_run
 from tests.samples import make_filmed as filmed
 
 RATE_HZ = 30000 / 1001

@@ -9,7 +9,7 @@ from freeswing.cdpr.model.equations import build_model
 from freeswing.cdpr.model.known_values import with_known
 from freeswing.ident.diagnose.answer import cut as module
 from freeswing.ident.diagnose.answer.cut import cut, settled_places, with_settled
-from tests.oracle.robots import declared_robot
+from tests.oracle.scenes.robots import declared_robot
 
 PLACES = np.arange(3, 6)
 KNOWN = np.array([[4.0, 1.0, 0.0], [1.0, 9.0, 0.0], [0.0, 0.0, 1.0]]) * 1e-6

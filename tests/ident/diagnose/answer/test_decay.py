@@ -7,7 +7,7 @@ import pytest
 
 from freeswing.cdpr.model.equations import build_model
 from freeswing.ident.diagnose.answer.decay import PARTS, swing_decay
-from tests.oracle.robots import declared_robot
+from tests.oracle.scenes.robots import declared_robot
 
 RATE = 0.2
 

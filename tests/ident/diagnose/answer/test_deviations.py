@@ -7,7 +7,7 @@ import pytest
 
 from freeswing.cdpr.model.equations import build_model
 from freeswing.ident.diagnose.answer.deviations import directions, honest_covariance
-from tests.oracle.robots import declared_robot
+from tests.oracle.scenes.robots import declared_robot
 
 
 def test_a_point_known_along_one_line_alone_says_so():

@@ -26,7 +26,7 @@ from freeswing.ident.diagnose.lengths.length_rows import LengthRows, length_rows
 from freeswing.ident.likelihood.raw_samples import prepare
 from freeswing.session.load_swings import load_robot, load_swings, load_target
 from freeswing.session.session_file import read_session
-from tests.oracle.sessions import make_session
+from tests.oracle.recorded.sessions import make_session
 
 KEY = "attachment_offset:2"
 CHANCES = {(KEY,): 1.0}

@@ -1,0 +1,187 @@
+"""Benches of two or three wires with an object on them, as a user would have recorded them.
+
+What the files do not say: drag, one wire 2 mm longer than told, a platform 5 % heavier than told.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tests.oracle.mechanics.equilibrium import settle
+from tests.oracle.mechanics.newton_euler import simulate
+from tests.oracle.mechanics.world import Array, Body, World, plain_world
+from tests.oracle.recorded.session_files import write_samples
+from tests.oracle.recorded.sessions import tait_bryan
+
+GRAVITY = 9.80665
+DECLARED_KG, HEAVIER = 1.2, 1.05
+WIRE_M, LONGER_M = 1.2, 0.002
+RADIUS_M = {3: 0.25, 2: 0.2}
+DRAG_N_M_S, QUADRATIC = 6e-4, 0.02
+PLATFORM_COM_M = np.array([0.003, -0.002, -0.05])
+PLATFORM_KG_M2 = np.array([0.021, 0.024, 0.040])  # about its centre
+LOAD_KG, LOAD_KG_M2 = 0.8, np.array([0.0062, 0.0071, 0.0093])
+LOAD_COM_M = np.array([0.004, -0.006, 0.01])
+WEIGHT_KG, WEIGHT_M = 0.4, np.array([0.12, 0.0, -0.02])
+RATE_HZ = 50.0
+
+
+@dataclass(frozen=True, slots=True)
+class BenchTruth:
+    """What really hung there: masses and tensors about each body's own centre, kg and kg m2."""
+
+    folder: Path
+    platform_kg: float
+    platform_izz_p: float
+    load_izz: float
+    load_com_m: Array
+
+
+def make_bench(
+    folder: Path,
+    seed: int,
+    wires: int = 3,
+    seen: str = "poses",
+    duration_s: float = 10.0,
+    counts: tuple[int, int, int] = (3, 3, 4),
+) -> BenchTruth:
+    """Write a bench session.
+
+    Args:
+        folder: made when not there.
+        seed: of noise and releases.
+        wires: 2 or 3.
+        seen: `poses`, `chi`, or `track`: one curved pixel track of a laser dot.
+        duration_s: of each run.
+        counts: tare, known-weight and loaded runs.
+    """
+    rng = np.random.default_rng(seed)
+    (folder / "runs").mkdir(parents=True, exist_ok=True)
+    ends = _ends(wires)
+    kinds = ["tare"] * counts[0] + ["weight"] * counts[1] + ["loaded"] * counts[2]
+    lines = [
+        'format = "freeswing-session/1"',
+        f'name = "bench-{wires}-{seen}"',
+        'robot = "robot.toml"',
+        f"frame_rate_hz = {RATE_HZ}",
+    ]
+    if seen == "track":
+        lines += ["", "[[channels]]", 'name = "dot"', 'column = "dot_px"']
+        lines += ['coordinates = ["chi", "x", "y"]', "order = 3"]
+    lines += ["", "[[loads]]", 'name = "object"', f"mass_kg = {LOAD_KG}", "mass_std_kg = 0.0005"]
+    told = LOAD_COM_M + rng.normal(0.0, 0.001, 3)
+    lines += [f"com_m = {told.tolist()}", "com_std_m = 0.001"]
+    for k, kind in enumerate(kinds):
+        world = _world(wires, kind)
+        name = f"{kind}-{k + 1:02d}"
+        _record(folder / "runs" / f"{name}.csv", world, rng, seen, duration_s)
+        lines += ["", "[[runs]]", f'name = "{name}"', 'role = "identify"']
+        lines += [f"cable_lengths_m = {[WIRE_M] * wires}", "cable_lengths_std_m = 0.001"]
+        lines += [f'trajectory = "runs/{name}.csv"']
+        if kind == "weight":
+            lines.append(f"payload = {{ mass_kg = {WEIGHT_KG}, position_m = {WEIGHT_M.tolist()} }}")
+        if kind == "loaded":
+            lines.append('loads = ["object"]')
+    (folder / "session.toml").write_text("\n".join([*lines, ""]))
+    _write_robot(folder / "robot.toml", wires, ends)
+    mass = DECLARED_KG * HEAVIER
+    izz = PLATFORM_KG_M2[2] + mass * float(np.sum(PLATFORM_COM_M[:2] ** 2))
+    truth = BenchTruth(folder, mass, izz, float(LOAD_KG_M2[2]), LOAD_COM_M)
+    (folder / "truth").mkdir(exist_ok=True)
+    numbers = {
+        "platform_kg": mass,
+        "platform_Izz_P_kg_m2": izz,
+        "object_Izz_kg_m2": truth.load_izz,
+        "object_com_m": LOAD_COM_M.tolist(),
+    }
+    (folder / "truth" / "truth.json").write_text(json.dumps(numbers, indent=1) + "\n")
+    return truth
+
+
+def _ends(wires: int) -> Array:
+    angles = 2.0 * np.pi * np.arange(wires) / wires
+    return RADIUS_M[wires] * np.stack([np.cos(angles), np.sin(angles), 0.0 * angles], axis=1)
+
+
+def _write_robot(path: Path, wires: int, ends: Array) -> None:
+    free = ["x", "y", "chi"] if wires == 3 else ["x", "y", "phi", "chi"]
+    lines = ['format = "freeswing-robot/1"', f'name = "bench-{wires}"']
+    lines += [f"gravity_m_s2 = [0.0, 0.0, {-GRAVITY}]", f"free_coordinates = {json.dumps(free)}"]
+    lines += ["", "[platform]", f"mass_kg = {DECLARED_KG}"]
+    for k, end in enumerate(ends):
+        lines += ["", "[[cables]]", f'name = "{k + 1}"', "pulley_radius_m = 0.0"]
+        lines += [f"entry_m = {[*end[:2].tolist(), WIRE_M]}", f"attachment_m = {end.tolist()}"]
+    path.write_text("\n".join([*lines, ""]))
+
+
+def _moment(mass: float, com: Array, principal: Array) -> tuple[float, Array, Array]:
+    spread = com @ com * np.eye(3) - np.outer(com, com)
+    return mass, mass * com, np.diag(principal) + mass * spread
+
+
+def _world(wires: int, kind: str) -> World:
+    from freeswing.cdpr.robot import Cable, Robot
+
+    ends = _ends(wires)
+    cables = tuple(
+        Cable(str(k), end + np.array([0.0, 0.0, WIRE_M]), 0.0, end) for k, end in enumerate(ends)
+    )
+    robot = Robot("bench", cables, np.array([0.0, 0.0, -GRAVITY]))
+    parts = [_moment(DECLARED_KG * HEAVIER, PLATFORM_COM_M, PLATFORM_KG_M2)]
+    if kind == "weight":
+        parts.append(_moment(WEIGHT_KG, WEIGHT_M, np.zeros(3)))
+    if kind == "loaded":
+        parts.append(_moment(LOAD_KG, LOAD_COM_M, LOAD_KG_M2))
+    mass = sum(part[0] for part in parts)
+    first, second = sum(part[1] for part in parts), sum(part[2] for part in parts)
+    entries = (second / mass)[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+    lengths = np.full(wires, WIRE_M)
+    lengths[0] += LONGER_M
+    world = plain_world(robot, Body(mass, first / mass, entries), lengths)
+    return world._replace(drag_angular=DRAG_N_M_S, drag_quadratic=QUADRATIC)
+
+
+def _record(path: Path, world: World, rng: np.random.Generator, seen: str, span_s: float) -> None:
+    rest = settle(world, np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
+    twist = np.zeros(6)
+    # A twist by hand: about 8 degrees of yaw, and a centimetre of sway that nobody wanted.
+    twist[5] = rng.choice([-1.0, 1.0]) * rng.uniform(0.5, 0.7)
+    twist[:2] = rng.normal(0.0, 0.02, 2)
+    start = rest.position_m, rest.quaternion, span_s, _allowed(rest, twist)
+    motion = simulate(world, *start, RATE_HZ)
+    angles = tait_bryan(motion.quaternions)
+    chi = angles[:, 2]
+    times = motion.times_s[:, None]
+    if seen == "poses":
+        turned = angles + rng.normal(0.0, 5e-4, angles.shape)
+        place = motion.positions_m + rng.normal(0.0, 1e-4, motion.positions_m.shape)
+        columns = np.hstack([times, place, turned])
+        header = ("x_m", "y_m", "z_m", "phi_rad", "theta_rad", "chi_rad")
+        write_samples(path, header, columns)
+    elif seen == "chi":
+        noisy = chi + rng.normal(0.0, 5e-4, len(chi))
+        write_samples(path, ("chi_rad",), np.hstack([times, noisy[:, None]]))
+    else:
+        wall = 1100.0 * np.tan(2.0 * chi + 0.3)
+        dot = wall + 900.0 * motion.positions_m[:, 0] + 150.0 * motion.positions_m[:, 1]
+        noise = rng.normal(0.0, 0.4, len(chi)) + _slow(rng, len(chi), 0.3)
+        write_samples(path, ("dot_px",), np.hstack([times, (400.0 + dot + noise)[:, None]]))
+
+
+def _slow(rng: np.random.Generator, count: int, size: float) -> Array:
+    """Noise that is correlated over ten samples."""
+    found = np.zeros(count)
+    for k in range(1, count):
+        found[k] = 0.9 * found[k - 1] + rng.normal(0.0, size * np.sqrt(1.0 - 0.81))
+    return found
+
+
+def _allowed(rest: object, twist: Array) -> Array:
+    """The part of a twist that the wires allow at rest."""
+    scale = np.array([1.0, 1.0, 1.0, 0.25, 0.25, 0.25])
+    freedom = rest.freedom  # type: ignore[attr-defined]
+    return np.asarray(freedom @ (freedom.T @ (scale * twist)) / scale)
