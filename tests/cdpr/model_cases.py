@@ -50,7 +50,7 @@ def ring(n, radius=0.03):
         attachment = 0.2 * out + [0.0, 0.0, 0.15] + rng.normal(0, 0.03, 3)
         down, inward = np.array([0.0, 0.0, -1.0]), -out
         cables.append(Cable(str(k + 1), entry, radius, attachment, inward, -side, down))
-    platform = Platform(8.0, [0.0, 0.01, 0.1], [0.05, 0.06, 0.04, 0.001, -0.002, 0.0015])
+    platform = Platform(8.0, [0.0, 0.01, 0.1], [0.05, 0.06, 0.04, 0.001, -0.002, 0.0015])  # pyright: ignore[reportArgumentType]
     return Robot(f"ring-{n}", tuple(cables), platform=platform)
 
 

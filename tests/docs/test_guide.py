@@ -17,7 +17,7 @@ DOCS = ROOT / "docs"
 GUIDE = sorted((DOCS / "guide").glob("*.md"))
 sys.path.insert(0, str(DOCS / "scripts"))
 
-import make_guide  # noqa: E402  pyright: ignore[reportMissingImports]
+import make_guide  # noqa: E402  # pyright: ignore[reportMissingImports]
 
 
 @pytest.mark.parametrize("name", make_guide.QUICK)

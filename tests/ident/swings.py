@@ -72,7 +72,7 @@ def recorded(
     trajectory = Trajectory(times, coordinates, zetas[:, columns], None, "simulated")
     lengths = lengths_of(motion) + length_error_m
     window = (0.0, float(times[-1]))
-    return SwingRun(name, role, trajectory, lengths, 5e-4, window, payload)
+    return SwingRun(name, role, trajectory, lengths, 5e-4, window, payload)  # pyright: ignore[reportArgumentType]
 
 
 def lengths_of(motion: Motion) -> Array:

@@ -38,7 +38,7 @@ def hanging(name: str, eyelets: bool = False, **fields: object) -> tuple[Robot, 
 
 def swing(world: World, rest: Rest, duration_s: float = 10.0, **options: float) -> Motion:
     p, q = displaced(world, rest, np.array([0.8, 0.6, 0.5])[: rest.freedom.shape[1]], 0.04, 0.15)
-    return simulate(world, p, q, duration_s, **options)
+    return simulate(world, p, q, duration_s, **options)  # pyright: ignore[reportArgumentType]
 
 
 def energies(world: World, motion: Motion) -> Array:

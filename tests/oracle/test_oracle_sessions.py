@@ -28,14 +28,14 @@ def poses(tmp_path_factory: pytest.TempPathFactory) -> SessionTruth:
 def test_product_reads_poses(poses: SessionTruth) -> None:
     session = read_session(poses.folder)
     robot = read_robot(session.robot)
-    read_target(session.target)
+    read_target(session.target)  # pyright: ignore[reportArgumentType]
     declared = declared_robot("three-cable")
     assert [run.role for run in session.runs] == ["identify", "identify", "validate"]
     assert robot.entries_m == pytest.approx(declared.entries_m)
     assert robot.swivel_axes == pytest.approx(declared.swivel_axes)
     assert robot.inertia == pytest.approx(declared.inertia)
     for run, true in zip(session.runs, poses.runs, strict=True):
-        trajectory = read_trajectory(run.trajectory, robot)
+        trajectory = read_trajectory(run.trajectory, robot)  # pyright: ignore[reportArgumentType]
         offset = true.motion.rotations @ poses.scene.marker_offset_m
         errors = trajectory.positions() - true.motion.positions_m - offset
         std = float(np.std(errors))
@@ -44,7 +44,7 @@ def test_product_reads_poses(poses: SessionTruth) -> None:
         small = between[:, [2, 0, 1], [1, 2, 0]] - between[:, [1, 2, 0], [2, 0, 1]]
         std = float(np.std(0.5 * small))
         assert std == pytest.approx(5e-4, rel=0.05), f"{std:.3g} rad of noise"
-        wrong = run.cable_lengths_m - true.world.length
+        wrong = run.cable_lengths_m - true.world.length  # pyright: ignore[reportOptionalOperand]
         assert np.max(np.abs(wrong)) < 5 * 5e-4, f"lengths told wrong by {wrong} m"
 
 
@@ -53,7 +53,7 @@ def test_product_reads_free_coordinates_with_gaps(tmp_path: Path) -> None:
         tmp_path, 12, "three-cable", pose=False, n_runs=2, missing_share=0.1, std_columns=True
     )
     session = read_session(tmp_path)
-    trajectory = read_trajectory(session.runs[0].trajectory, read_robot(session.robot))
+    trajectory = read_trajectory(session.runs[0].trajectory, read_robot(session.robot))  # pyright: ignore[reportArgumentType]
     assert trajectory.coordinates == ("x", "y", "chi")
     missing = float(np.mean(np.isnan(trajectory.values[:, 0])))
     assert 0.1 <= missing < 0.13, f"{missing:.3f} missing"
@@ -89,7 +89,7 @@ def test_truth_tells_everything(poses: SessionTruth) -> None:
 def test_held_before_release_without_a_window(tmp_path: Path) -> None:
     make_session(tmp_path, 6, n_runs=2, duration_s=1.0, window=False)
     run = read_session(tmp_path).runs[0]
-    moved = read_trajectory(run.trajectory).positions()
+    moved = read_trajectory(run.trajectory).positions()  # pyright: ignore[reportArgumentType]
     still = float(np.max(np.std(moved[:100], axis=0)))
     assert run.window_s is None
     assert len(moved) == 201

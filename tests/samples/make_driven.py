@@ -88,7 +88,7 @@ def main() -> None:
         hold = round(RATE_HZ / (2.0 * run.band_hz))
         count = round(run.seconds * RATE_HZ) + 1
         bits = generator.integers(0, 2, (-(-count // hold), 8))
-        _record(folder, plant, run.name, np.repeat(bits, hold, axis=0)[:count] * 1.0, generator)
+        _record(folder, plant, run.name, np.repeat(bits, hold, axis=0)[:count] * 1.0, generator)  # pyright: ignore[reportArgumentType]
         text += _table(run.name, run.role)
     for motor in (1, RUBBING):
         references = np.zeros((round(RAMP_S * RATE_HZ) + 1, 8))
@@ -136,7 +136,7 @@ def robot() -> Plant:
 def rest(plant: Plant, currents: Array) -> Array:
     """The pose at rest under held currents, (6,)."""
     hanging = np.array([0.0, 0.0, -0.2, 0.0, 0.0, 0.0])
-    return fsolve(lambda x: plant.second_rates(x, np.zeros(6), currents), hanging, xtol=1e-12)
+    return fsolve(lambda x: plant.second_rates(x, np.zeros(6), currents), hanging, xtol=1e-12)  # pyright: ignore[reportReturnType]
 
 
 def _angles(plant: Plant, poses: Array) -> Array:

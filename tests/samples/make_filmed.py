@@ -159,7 +159,7 @@ def _platform() -> list[Patch]:
 
 
 def _patch(tag: Tag, parent: str) -> Patch:
-    return tag_patch(tag.family, tag.id, tag.size_m, tag.T_platform_tag, parent)
+    return tag_patch(tag.family, tag.id, tag.size_m, tag.T_platform_tag, parent)  # pyright: ignore[reportArgumentType]
 
 
 def _run_table(name: str, role: str, told: np.ndarray) -> dict[str, object]:

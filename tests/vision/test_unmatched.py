@@ -70,7 +70,7 @@ def test_no_camera_left_is_refused_with_both_names(
     write_robot(tmp_path / "robot.toml", declared_robot("bologna-4"))
     told = {"format": "freeswing-session/1", "name": "a", "robot": "robot.toml"}
     told |= {"target": "target.toml", "cameras": "cameras.toml", "frame_rate_hz": 50.0}
-    told["runs"] = [{"name": "a", "role": "identify", "video": "runs/a"}]
+    told["runs"] = [{"name": "a", "role": "identify", "video": "runs/a"}]  # pyright: ignore[reportArgumentType]
     dump_toml(tmp_path / "session.toml", told)
     assert main(["track", str(tmp_path)]) == 2
     said = capsys.readouterr().err

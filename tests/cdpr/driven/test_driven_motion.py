@@ -78,15 +78,15 @@ def test_tensions_do_the_work_of_the_motion():
     rates = (lengths[0] - lengths[1]) / (2 * shift)
     power = -np.sum(tensions * rates, axis=1)
     mass, com, inertia = model.robot.platform.mass_kg, model.robot.platform.com_m, None
-    xx, yy, zz, xy, xz, yz = mass * model.robot.platform.specific_inertia_m2
+    xx, yy, zz, xy, xz, yz = mass * model.robot.platform.specific_inertia_m2  # pyright: ignore[reportOperatorIssue]
     inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     gained = []
     for state, second in zip(states, acceleration, strict=True):
         turn = _matrix(state[3:7])
         v, w, a, alpha = state[7:10], state[10:], second[:3], second[3:]
-        centre = v + turn @ np.cross(w, com)
-        fall = a + turn @ (np.cross(alpha, com) + np.cross(w, np.cross(w, com)))
-        central = inertia - mass * (com @ com * np.eye(3) - np.outer(com, com))
+        centre = v + turn @ np.cross(w, com)  # pyright: ignore[reportArgumentType, reportCallIssue]
+        fall = a + turn @ (np.cross(alpha, com) + np.cross(w, np.cross(w, com)))  # pyright: ignore[reportArgumentType, reportCallIssue]
+        central = inertia - mass * (com @ com * np.eye(3) - np.outer(com, com))  # pyright: ignore[reportArgumentType, reportCallIssue, reportOptionalOperand]
         force = mass * (fall - model.robot.gravity_m_s2)
         gained.append(force @ centre + w @ (central @ alpha))
     worst = np.abs(power - gained).max() / np.abs(gained).max()

@@ -78,8 +78,8 @@ def test_a_motion_with_dry_friction_is_the_papers():
     references = np.repeat(np.random.default_rng(9).integers(0, 2, (2, 8)), 50, axis=0) * 1.0
     paper, x = plant(model), np.array([0.02, -0.03, -0.15, 0.1, -0.05, 0.08])
     state = np.concatenate([x[:3], paper.quaternion(x), np.zeros(6)])
-    found = simulate_driven(model, state, references, 1000.0, currents_A=np.zeros(8))
-    expected = paper.motion(x, references, 1000.0, np.zeros(8))
+    found = simulate_driven(model, state, references, 1000.0, currents_A=np.zeros(8))  # pyright: ignore[reportArgumentType]
+    expected = paper.motion(x, references, 1000.0, np.zeros(8))  # pyright: ignore[reportArgumentType]
     travel = np.ptp(expected[:, :3], axis=0).max()
     gap = np.abs(found.states[:, :3] - expected[:, :3]).max()
     assert gap < 2e-7, f"{gap * 1e3:.6f} mm apart after {travel * 1e3:.0f} mm of travel"

@@ -39,4 +39,4 @@ def test_what_is_known_stays_known_in_larger_and_smaller_models(known):
         whitener = prior_whitener(one)
         precision = (whitener.T @ whitener)[np.ix_(PLACES, PLACES)]
         assert np.linalg.inv(precision) == pytest.approx(covariance, rel=1e-9)
-    assert without_effect(larger, "attachment_offset").correlations.shape == (2, 2)
+    assert without_effect(larger, "attachment_offset").correlations.shape == (2, 2)  # pyright: ignore[reportOptionalMemberAccess]

@@ -180,7 +180,7 @@ def test_eight_elastic_cables_carry_a_platform():
     model = elastic_model(robot)
     lengths = evaluate(model.lengths, np.zeros(6), model.start_values)[0]
     values = elastic_values(model, 1e-4, lengths - 1e-3, 5e-3)
-    motion = simulate(model, np.zeros(6), np.zeros(6), (0.0, 3.0), robot.inertia, values)
+    motion = simulate(model, np.zeros(6), np.zeros(6), (0.0, 3.0), robot.inertia, values)  # pyright: ignore[reportArgumentType]
     states = motion.at(TIMES_S[:301])[:2]
     energy = np.add(*evaluate(model.energy, *states, robot.inertia, values))
     moved = np.abs(states[0][:, :3]).max()

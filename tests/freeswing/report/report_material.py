@@ -105,7 +105,7 @@ def _estimate(spread: float, rng: np.random.Generator) -> dict[str, Any]:
 
 def _correlation(rng: np.random.Generator) -> list[list[float]]:
     rows = rng.normal(size=(40, 9)) @ rng.normal(size=(9, 9))
-    return np.corrcoef(rows, rowvar=False).tolist()
+    return np.corrcoef(rows, rowvar=False).tolist()  # pyright: ignore[reportReturnType]
 
 
 def _fitted(k: int, rng: np.random.Generator) -> dict[str, Any]:

@@ -141,7 +141,7 @@ def test_every_run_where_lengths_stand_in_other_places(
     read = read_session(tmp_path / "session")
     robot = read_robot(read.robot)
     swings = load_swings(read, robot, None)
-    apart = [np.abs(np.subtract(s.lengths_m, s.lengths_m[list(order)])).max() for s in swings]
+    apart = [np.abs(np.subtract(s.lengths_m, s.lengths_m[list(order)])).max() for s in swings]  # pyright: ignore[reportArgumentType, reportCallIssue, reportOptionalSubscript]
     named = [bool(exchanged_at_rest(swing, robot)[1]) for swing in swings]
     assert named == [bool(one > 0.02) for one in apart]
     with pytest.raises(DataError, match="put each cable's length in its place"):

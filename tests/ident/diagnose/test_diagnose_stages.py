@@ -62,7 +62,7 @@ def test_lengths_say_nothing_where_only_gravity_is_tilted(tmp_path):
     _, found = diagnosed(tmp_path, {"gravity_tilt": "large"}, 23, ())
     robot = found.final.model.robot
     keys = [key for name in POINTS for key in variants(robot, name)]
-    assert kinematics(found.final, keys, WHITE).wrong == ()
+    assert kinematics(found.final, keys, WHITE).wrong == ()  # pyright: ignore[reportOptionalMemberAccess]
 
 
 @pytest.mark.slow

@@ -35,11 +35,11 @@ def ranking(gains):
 def test_first_those_near_the_best_then_all_that_promise_anything():
     gains = (9000.0, 8000.0, 7000.0, 6000.0, 5000.0, 2000.0, LEAST_GAIN / 2.0)
     linear, current = ranking(gains), current_fit()
-    first = promising(current, linear, 1.0)
+    first = promising(current, linear, 1.0)  # pyright: ignore[reportArgumentType]
     assert first == list(NAMES[:4]), first
-    second = promising(current, linear, 1.0, first)
+    second = promising(current, linear, 1.0, first)  # pyright: ignore[reportArgumentType]
     assert second == list(NAMES[4:6]), second
-    assert promising(current, linear, 1.0, [*first, *second]) == []
+    assert promising(current, linear, 1.0, [*first, *second]) == []  # pyright: ignore[reportArgumentType]
 
 
 def test_a_winner_that_leaves_much_unexplained_does_not_end_the_search():
@@ -48,6 +48,6 @@ def test_a_winner_that_leaves_much_unexplained_does_not_end_the_search():
         winner = SimpleNamespace(
             held_out=left, evidence=current.evidence, fit=current.fit, score=scored(left)
         )
-        decision = Decision((), winner, NAMES[0], (NAMES[0],))
-        assert settles(decision, current) is enough, left
-    assert not settles(Decision(()), current)
+        decision = Decision((), winner, NAMES[0], (NAMES[0],))  # pyright: ignore[reportArgumentType]
+        assert settles(decision, current) is enough, left  # pyright: ignore[reportArgumentType]
+    assert not settles(Decision(()), current)  # pyright: ignore[reportArgumentType]

@@ -63,7 +63,7 @@ def weighed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Body, dict]:
         row |= {"cable_lengths_m": run.world.length, "cable_lengths_std_m": 5e-4}
         row |= {"window_s": [0.0, DURATION_S]}
         if loaded:
-            row["payload"] = {"mass_kg": PAYLOAD.mass_kg, "position_m": PAYLOAD.position_m}
+            row["payload"] = {"mass_kg": PAYLOAD.mass_kg, "position_m": PAYLOAD.position_m}  # pyright: ignore[reportArgumentType]
         runs.append(row)
     write_robot(folder / "robot.toml", replace(ROBOT, platform=Platform()))
     session = {"format": "freeswing-session/1", "name": "p", "robot": "robot.toml", "runs": runs}

@@ -28,9 +28,9 @@ class MujocoBody:
             np.full(n, 0.0603), 0.0013,
         )  # fmt: skip
         self._body = body
-        self._model = mujoco.MjModel.from_xml_string(mujoco_driven._xml(robot, body, pose7(start)))
-        self._data = mujoco.MjData(self._model)
-        mujoco.mj_forward(self._model, self._data)
+        self._model = mujoco.MjModel.from_xml_string(mujoco_driven._xml(robot, body, pose7(start)))  # pyright: ignore[reportAttributeAccessIssue]
+        self._data = mujoco.MjData(self._model)  # pyright: ignore[reportAttributeAccessIssue]
+        mujoco.mj_forward(self._model, self._data)  # pyright: ignore[reportAttributeAccessIssue]
         self._data.act[:] = OwnBody(loop, start).currents
         self._zero = self._data.ten_length.copy()
 
@@ -40,7 +40,7 @@ class MujocoBody:
         return np.concatenate([self._data.qpos, self._data.qvel])
 
     def angles(self):
-        mujoco.mj_fwdPosition(self._model, self._data)
+        mujoco.mj_fwdPosition(self._model, self._data)  # pyright: ignore[reportAttributeAccessIssue]
         return (self._zero - self._data.ten_length) / self._body.drum_m
 
     @property
@@ -50,7 +50,7 @@ class MujocoBody:
     def move(self, references):
         self._data.ctrl[:] = references
         for _ in range(round(1e-3 / mujoco_driven.TIME_STEP_S)):
-            mujoco.mj_step(self._model, self._data)
+            mujoco.mj_step(self._model, self._data)  # pyright: ignore[reportAttributeAccessIssue]
 
 
 OwnBody = closed_loop._Body

@@ -54,7 +54,7 @@ def test_the_fit_goes_on_with_the_geometry_at_what_lengths_say(monkeypatch):
     monkeypatch.setattr(module, "fit", fitted)
     monkeypatch.setattr(module, "rescored", lambda *_: "scored")
     monkeypatch.setattr(module, "colour_of", lambda *_: 1.0)
-    assert cut(one, np.ones(2)) == "scored"
+    assert cut(one, np.ones(2)) == "scored"  # pyright: ignore[reportArgumentType]
     assert seen["values"][PLACES] == pytest.approx([2e-3, -5e-3, -4e-3])
     assert np.delete(seen["values"], PLACES) == pytest.approx(1.0)
     assert not seen["free"][9 + PLACES].any()
@@ -65,7 +65,7 @@ def test_the_fit_goes_on_with_the_geometry_at_what_lengths_say(monkeypatch):
 def test_what_lengths_leave_open_is_told_and_widens_the_rest():
     one = held(False)
     exact = np.diag(np.where(one.fit.free, 1e-8, 0.0))
-    wider = with_settled(exact, one)
+    wider = with_settled(exact, one)  # pyright: ignore[reportArgumentType]
     assert wider[np.ix_(9 + PLACES, 9 + PLACES)] == pytest.approx(KNOWN)
     rows = one.evidence.triangles.reshape(-1, one.evidence.triangles.shape[-1])
     rng = np.random.default_rng(1)

@@ -28,7 +28,7 @@ class Motion:
 
 def fit(rate, samples):
     robot = declared_robot("bologna-4")
-    inertia = np.concatenate([robot.platform.com_m, robot.platform.specific_inertia_m2])
+    inertia = np.concatenate([robot.platform.com_m, robot.platform.specific_inertia_m2])  # pyright: ignore[reportArgumentType, reportCallIssue]
     model = build_model(robot)
     return SimpleNamespace(
         model=model, inertia=inertia, motions=(Motion(rate),), samples=(samples,)
@@ -40,7 +40,7 @@ def test_speeds_fall_as_the_swing_does_and_a_model_without_losses_keeps_them():
     samples = SimpleNamespace(
         name="a", is_pose=True, times_s=times, values=Motion(RATE).at(times)[0]
     )
-    (run,) = swing_decay(fit(0.0, samples), fit(RATE, samples))
+    (run,) = swing_decay(fit(0.0, samples), fit(RATE, samples))  # pyright: ignore[reportArgumentType]
     measured = np.array(run["measured_m_s"])
     assert len(measured) == PARTS
     assert measured[0] == pytest.approx(0.1 * 2 * np.pi / np.sqrt(2) * np.exp(-RATE), rel=0.02)
@@ -49,4 +49,4 @@ def test_speeds_fall_as_the_swing_does_and_a_model_without_losses_keeps_them():
     assert run["after_m_s"] == pytest.approx(run["measured_m_s"], rel=2e-3)
     assert np.ptp(run["before_m_s"]) < 0.01 * run["before_m_s"][0]
     samples.is_pose = False
-    assert swing_decay(fit(0.0, samples), fit(RATE, samples)) == []
+    assert swing_decay(fit(0.0, samples), fit(RATE, samples)) == []  # pyright: ignore[reportArgumentType]

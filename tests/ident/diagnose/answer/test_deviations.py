@@ -33,6 +33,6 @@ def test_the_larger_of_posterior_and_jackknife_is_told():
     scored = SimpleNamespace(
         fit=SimpleNamespace(free=free), score=SimpleNamespace(jackknife_std=np.array([1.0, 3.0]))
     )
-    told = honest_covariance(found, scored)
+    told = honest_covariance(found, scored)  # pyright: ignore[reportArgumentType]
     assert np.sqrt(np.diag(told)) == pytest.approx([2.0, 3.0, 0.0])
     assert told[0, 1] / 6.0 == pytest.approx(0.5)

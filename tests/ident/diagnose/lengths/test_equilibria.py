@@ -40,9 +40,9 @@ def session(folder, effects):
     model = build_model(robot, ("attachment_offset", "anchor_offset"))
     moved = truth.scene.world.attach - np.array(robot.attachments_m)
     cable = int(np.argmax(np.linalg.norm(moved, axis=1)))
-    inertia = np.append(robot.platform.com_m, robot.platform.specific_inertia_m2)
+    inertia = np.append(robot.platform.com_m, robot.platform.specific_inertia_m2)  # pyright: ignore[reportArgumentType, reportCallIssue]
     nothing = np.zeros(len(model.parameters))
-    samples = [prepare(run, run.window_s) for run in load_swings(read, robot, load_target(read))]
+    samples = [prepare(run, run.window_s) for run in load_swings(read, robot, load_target(read))]  # pyright: ignore[reportArgumentType]
     rows = [length_rows(model, inertia, one, np.ones(2), nothing, {}) for one in samples]
     tolerance = np.repeat([5e-4, 1e-3], 12)
     places = 3 * cable + np.arange(3)
