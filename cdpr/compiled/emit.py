@@ -60,7 +60,7 @@ def intermediate(function: Any, name: str, lanes: int = 1) -> str:
     Raises:
         ValueError: for an operation that is not one of scalars.
     """
-    text = _Text(lanes)
+    text = Text(lanes)
     starts_in = _starts(function.nnz_in, function.n_in())
     starts_out = _starts(function.nnz_out, function.n_out())
     registers: dict[int, str] = {}
@@ -84,7 +84,7 @@ def _starts(size: Callable[[int], int], count: int) -> list[int]:
 
 
 @dataclass(slots=True)
-class _Text:
+class Text:
     """Lines of one function body under way."""
 
     lanes: int
@@ -94,24 +94,38 @@ class _Text:
 
     @property
     def kind(self) -> str:
+        """The type of a value."""
         return self._of("double")
 
-    def whole(self, name: str) -> str:
+    def whole(self, name: str, arguments: str = "ptr noalias %in, ptr noalias %out") -> str:
+        """The module with the lines as the body of one function."""
         head = "\n".join(sorted(self.declared))
         body = "\n".join(self.lines)
-        signature = f"define void @{name}(ptr noalias %in, ptr noalias %out)"
+        signature = f"define void @{name}({arguments})"
         return f"{head}\n{signature} {{\n{body}\nret void\n}}\n"
 
     def constant(self, value: float) -> str:
+        """A number as it stands in the text."""
         bits = f"0x{np.float64(value).view(np.uint64):016X}"
         return bits if self.lanes == 1 else f"<{', '.join([f'double {bits}'] * self.lanes)}>"
 
     def load(self, place: int) -> str:
+        """An input."""
         return self._new(f"load {self.kind}, ptr {self._at('%in', place)}, align 8")
 
     def store(self, value: str, place: int) -> None:
+        """Write an output."""
         pointer = self._at("%out", place)
         self.lines.append(f"store {self.kind} {value}, ptr {pointer}, align 8")
+
+    def vector_at(self, base: str, place: int) -> str:
+        """A vector of memory on a line of the cache, counted in vectors."""
+        return self._new(f"load {self.kind}, ptr {self._at(base, place)}, align {8 * self.lanes}")
+
+    def put_vector(self, value: str, base: str, place: int) -> None:
+        """Store one there."""
+        pointer = self._at(base, place)
+        self.lines.append(f"store {self.kind} {value}, ptr {pointer}, align {8 * self.lanes}")
 
     def operation(self, operation: int, values: list[str]) -> str:
         """The value of one operation."""

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import lru_cache
 from typing import Any
 
-import llvmlite.binding as llvm
 import numpy as np
 from llvmlite import ir
 from numba.core import types
@@ -14,6 +13,7 @@ from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from freeswing.cdpr.compiled.emit import intermediate
+from freeswing.cdpr.compiled.processor import engine_of
 
 Array = NDArray[np.float64]
 
@@ -51,29 +51,12 @@ def native(function: Any, lanes: int = 1) -> Native:
     Raises:
         ValueError: for an operation that is not one of scalars.
     """
-    module = llvm.parse_assembly(intermediate(function, "compiled", lanes))
-    engine = llvm.create_mcjit_compiler(module, _machine())
-    engine.finalize_object()
+    engine = engine_of(intermediate(function, "compiled", lanes), OPTIMISED)
     sizes = (
         sum(function.nnz_in(i) for i in range(function.n_in())),
         sum(function.nnz_out(i) for i in range(function.n_out())),
     )
     return Native(engine.get_function_address("compiled"), *sizes, lanes, engine)
-
-
-@cache
-def _initialised() -> None:
-    llvm.initialize_native_target()
-    llvm.initialize_native_asmprinter()
-
-
-def _machine() -> Any:
-    """A description of this processor; an engine owns its own, and frees it."""
-    _initialised()
-    features = llvm.get_host_cpu_features().flatten()
-    cpu = llvm.get_host_cpu_name()
-    target = llvm.Target.from_default_triple()
-    return target.create_target_machine(cpu=cpu, features=features, opt=OPTIMISED)
 
 
 def _call_at(typing_context, address, inputs, outputs):

@@ -1,6 +1,6 @@
 """CasADi functions evaluated over leading batch axes, straight from and into numpy memory.
 
-Several points go through the function's tape, all at once (`cdpr.model.tape_kernels`); a single
+Several points go through the function's tape, all at once (`cdpr.compiled.interpreter`); a single
 one, and a function that has no tape, through CasADi's interpreter, to the same bits.
 """
 
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache, lru_cache, partial
+from functools import lru_cache, partial
 from itertools import accumulate
 from math import prod
 from typing import Any
@@ -16,55 +16,11 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from freeswing.cdpr.compiled.interpreter import KNOWN, interpreter, lanes_for
 from freeswing.cdpr.robot import Array
 
 LARGEST_CHUNK = 1024
-
-
-@cache
-def operations() -> dict[int, int]:
-    """The operations of tapes by CasADi's numbers for them."""
-    from freeswing.cdpr.model import tape_kernels as kernels  # numba takes a while to import
-
-    return {
-        ca.OP_MUL: kernels.MUL,
-        ca.OP_ADD: kernels.ADD,
-        ca.OP_SUB: kernels.SUB,
-        ca.OP_DIV: kernels.DIV,
-        ca.OP_NEG: kernels.NEG,
-        ca.OP_SQ: kernels.SQUARE,
-        ca.OP_TWICE: kernels.TWICE,
-        ca.OP_INV: kernels.INVERSE,
-        ca.OP_CONST: kernels.CONSTANT,
-        ca.OP_INPUT: kernels.INPUT,
-        ca.OP_OUTPUT: kernels.OUTPUT,
-        ca.OP_SQRT: kernels.ROOT,
-        ca.OP_SIN: kernels.SINE,
-        ca.OP_COS: kernels.COSINE,
-        ca.OP_TAN: kernels.TANGENT,
-        ca.OP_ASIN: kernels.ARC_SINE,
-        ca.OP_ACOS: kernels.ARC_COSINE,
-        ca.OP_ATAN: kernels.ARC_TANGENT,
-        ca.OP_TANH: kernels.TANH,
-        ca.OP_EXP: kernels.EXP,
-        ca.OP_LOG: kernels.LOG,
-        ca.OP_FABS: kernels.ABSOLUTE,
-        ca.OP_SIGN: kernels.SIGN,
-        ca.OP_ASSIGN: kernels.COPY,
-        ca.OP_NOT: kernels.NOT,
-        ca.OP_ATAN2: kernels.ARC_TANGENT_2,
-        ca.OP_POW: kernels.POWER,
-        ca.OP_CONSTPOW: kernels.POWER,
-        ca.OP_FMIN: kernels.LEAST,
-        ca.OP_FMAX: kernels.LARGEST,
-        ca.OP_LT: kernels.LESS,
-        ca.OP_LE: kernels.LESS_EQUAL,
-        ca.OP_EQ: kernels.EQUAL,
-        ca.OP_NE: kernels.UNEQUAL,
-        ca.OP_AND: kernels.AND,
-        ca.OP_OR: kernels.OR,
-        ca.OP_IF_ELSE_ZERO: kernels.IF_ELSE_ZERO,
-    }
+CACHE_LINE = 8  # numbers
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +29,7 @@ class Tape:
 
     Attributes:
         code: (k, 4) and
-        constants: (k,), as `tape_kernels.run_tape` takes them.
+        constants: (k,), as `cdpr.compiled.interpreter.Interpreter` takes them.
         slots: of scratch memory.
         inputs: numbers a point.
         outputs: numbers a result; matrices by columns.
@@ -93,10 +49,28 @@ class Tape:
 
     def bound(self, points: Array, results: Array) -> Callable[[], None]:
         """What runs the tape over the same memory each time, for tight loops."""
-        from freeswing.cdpr.model import tape_kernels as kernels
+        n = len(points)
+        fitting = interpreter(lanes_for(n))
+        work = _on_a_line(self.slots * fitting.lanes)
+        arrays = (self.code, self.constants, points, results, work)
+        code, constants, first, into, scratch = (array.ctypes.data for array in arrays)
+        call = partial(
+            fitting.run,
+            *(code, len(self.code), constants, first, n, self.inputs),
+            *(into, self.outputs, scratch),
+        )
 
-        work = np.empty((self.slots, kernels.LANES))
-        return partial(kernels.run_tape, self.code, self.constants, points, results, work)
+        def run(keep: object = arrays) -> None:
+            call()
+
+        return run
+
+
+def _on_a_line(count: int) -> Array:
+    """Memory that begins on a line of the cache, (count,)."""
+    more = np.empty(count + CACHE_LINE)
+    first = (-more.ctypes.data // more.itemsize) % CACHE_LINE
+    return more[first : first + count]
 
 
 @lru_cache(maxsize=256)
@@ -108,28 +82,25 @@ def tape_of(function: Any) -> Tape | None:
     """
     if not function.is_a("SXFunction"):
         return None
-    from freeswing.cdpr.model import tape_kernels as kernels
-
-    known = operations()
     sizes_in = [function.numel_in(i) for i in range(function.n_in())]
     sizes_out = [function.numel_out(i) for i in range(function.n_out())]
     first_in, first_out = (list(accumulate(sizes, initial=0)) for sizes in (sizes_in, sizes_out))
     count = function.n_instructions()
     code, constants = np.zeros((count, 4), dtype=np.uint32), np.zeros(count)
     for k in range(count):
-        operation = known.get(function.instruction_id(k))
-        if operation is None:
-            return None
+        operation = function.instruction_id(k)
         to, sources = function.instruction_output(k), function.instruction_input(k)
-        if operation == kernels.CONSTANT:
+        if operation == ca.OP_CONST:
             constants[k] = function.instruction_constant(k)
             code[k] = operation, to[0], 0, 0
-        elif operation == kernels.INPUT:
+        elif operation == ca.OP_INPUT:
             code[k] = operation, to[0], first_in[sources[0]] + sources[1], 0
-        elif operation == kernels.OUTPUT:
+        elif operation == ca.OP_OUTPUT:
             code[k] = operation, first_out[to[0]] + to[1], sources[0], 0
-        else:
+        elif operation in KNOWN:
             code[k] = operation, to[0], sources[0], sources[-1]
+        else:
+            return None
     return Tape(code, constants, function.sz_w(), first_in[-1], first_out[-1])
 
 

@@ -38,7 +38,7 @@ class Surroundings:
         states: derivatives of the segments' starts by [zeta_0; rates_0; inertia; values],
             (s, 12, c).
         accelerations: of the node accelerations, (s, 6 m, c).
-        inverses: of the collocation matrices, (s, 6 m, 6 m).
+        inverses: of the collocation matrices there or nearby, (s, 6 m, 6 m).
         by_start: of a segment's accelerations by its own start, (s, 6 m, 12).
         ends: of a segment's end by its start, (s, 12, 12).
     """
@@ -51,12 +51,22 @@ class Surroundings:
     ends: Array
 
     @classmethod
-    def of(cls, linear: Linearised) -> Surroundings:
-        """What is worth keeping of a linearised motion."""
+    def of(cls, linear: Linearised, before: Surroundings | None = None) -> Surroundings:
+        """What is worth keeping of a linearised motion.
+
+        Args:
+            linear: the motion to first order.
+            before: of a motion that it came from: where its segments are the same ones their
+                inverse matrices serve on, which saves half the time.
+        """
         s = len(linear.states)
         flat = linear.accelerations.reshape(s, -1, linear.accelerations.shape[-1])
-        parts = (linear.states, flat, linear.inverses, linear.by_start, linear.ends)
-        return cls(linear.motion, *(part.astype(np.float32) for part in parts))
+        if before is not None and _on_same_segments(linear.motion, before.motion):
+            inverses = before.inverses
+        else:
+            inverses = np.linalg.inv(linear.matrices)
+        parts = (linear.states, flat, inverses, linear.by_start, linear.ends)
+        return cls(linear.motion, *(part.astype(np.float32, copy=False) for part in parts))
 
     def motion_at(
         self, zeta: Array, rates: Array, inertia: Array, values: Array, tolerance_m: float
@@ -130,6 +140,12 @@ class Surroundings:
         for k in range(len(local) - 1):
             states[k + 1] = self.ends[k] @ states[k] + kicks[k]
         return local + (self.by_start @ states[..., None])[..., 0]
+
+
+def _on_same_segments(one: Motion, other: Motion) -> bool:
+    return np.array_equal(one.starts_s, other.starts_s) and np.array_equal(
+        one.steps_s, other.steps_s
+    )
 
 
 def obeys(motion: Motion, tolerance_m: float) -> bool:

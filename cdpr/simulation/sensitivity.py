@@ -25,7 +25,7 @@ class Linearised:
         motion: the motion.
         states: of [zeta; rates] at the segment starts, (s, 12, 21 + k).
         accelerations: of the node accelerations, (s, m, 6, 21 + k).
-        inverses: of the collocation equations' matrices, one a segment, (s, 6 m, 6 m).
+        matrices: of the collocation equations, one a segment, (s, 6 m, 6 m).
         by_start: derivatives of a segment's node accelerations by its own start, (s, 6 m, 12).
         ends: of the state at a segment's end by that at its start, (s, 12, 12).
     """
@@ -33,7 +33,7 @@ class Linearised:
     motion: Motion
     states: Array
     accelerations: Array
-    inverses: Array
+    matrices: Array
     by_start: Array
     ends: Array
 
@@ -87,13 +87,13 @@ def linearise(motion: Motion, still: int = 0) -> Linearised:
     rates = motion.rates[:, None] + step * (t.once @ motion.accelerations)
     times = motion.starts_s[:, None] + motion.steps_s[:, None] * t.nodes
     slopes = _slopes(motion, still, times, zetas, rates)
-    inverses, changes = _segment_changes(motion, slopes)
+    matrices, changes = _segment_changes(motion, slopes)
     states, ends = _chained(motion, changes)
     flat = changes.reshape(len(states), -1, changes.shape[-1])
     total = flat[..., :12] @ states
     total[..., 12:] += flat[..., 12:]
     accelerations = total.reshape(changes.shape)
-    return Linearised(motion, states, accelerations, inverses, flat[..., :12], ends[..., :12])
+    return Linearised(motion, states, accelerations, matrices, flat[..., :12], ends[..., :12])
 
 
 def _slopes(motion: Motion, still: int, *instants: Array) -> Array:
@@ -112,7 +112,7 @@ def _slopes(motion: Motion, still: int, *instants: Array) -> Array:
 
 
 def _segment_changes(motion: Motion, slopes: Array) -> tuple[Array, Array]:
-    """Inverse matrices (s, 6 m, 6 m) and what they make of all that a segment depends on.
+    """Matrices (s, 6 m, 6 m), and what their inverses make of all that a segment depends on.
 
     That is the node accelerations' derivatives by [zeta_s; rates_s; inertia; values], (s, m, 6, c).
     """
@@ -127,8 +127,7 @@ def _segment_changes(motion: Motion, slopes: Array) -> tuple[Array, Array]:
     matrix -= step * (t.once[:, None, :, None] * by_rates[:, :, :, None, :])
     matrix = matrix.reshape(s, 6 * m, 6 * m)
     matrix[:, np.arange(6 * m), np.arange(6 * m)] += 1.0
-    inverses = np.linalg.inv(matrix)
-    return inverses, (inverses @ right.reshape(s, 6 * m, -1)).reshape(s, m, 6, -1)
+    return matrix, np.linalg.solve(matrix, right.reshape(s, 6 * m, -1)).reshape(s, m, 6, -1)
 
 
 def _chained(motion: Motion, changes: Array) -> tuple[Array, Array]:

@@ -246,13 +246,18 @@ class Problem:
         """Independent distances of unit deviation from what is known of the values, (k,)."""
         return self.prior_whitener @ (values - self.prior_centre)
 
-    def linear(self, state: State) -> Linear:
-        """The motions of a state to first order."""
+    def linear(self, state: State, before: Sequence[Surroundings] = ()) -> Linear:
+        """The motions of a state to first order.
+
+        Args:
+            state: with its motions.
+            before: of the state that it came from, or none.
+        """
         reduced, surroundings = [], []
-        for motion, samples in zip(state.motions, self.samples, strict=True):
+        for run, (motion, samples) in enumerate(zip(state.motions, self.samples, strict=True)):
             linear = linearise(motion)
             reduced.append(reduce_run(linear, samples, state.scales))
-            surroundings.append(Surroundings.of(linear))
+            surroundings.append(Surroundings.of(linear, before[run] if before else None))
         return Linear(tuple(reduced), tuple(surroundings))
 
     def step(self, state: State, linear: Linear, damping: float) -> Step:

@@ -7,10 +7,11 @@ of `cdpr.descent`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 from freeswing.cdpr.descent import Stop, Undamped, Watchdog
+from freeswing.cdpr.simulation.nearby import Surroundings
 from freeswing.ident.likelihood.joint_problem import Linear, Problem, State, Step
 
 FIRST_DAMPING = 1e-7  # of the largest curvature: below, a damped step is the full one
@@ -47,10 +48,14 @@ def minimised(
 
 @dataclass(frozen=True)
 class _Place:
-    """A state; its cost and all runs to first order once they are asked for."""
+    """A state; its cost and all runs to first order once they are asked for.
+
+    `before` are the surroundings of the state that it came from.
+    """
 
     problem: Problem
     state: State
+    before: tuple[Surroundings, ...] = ()
 
     @property
     def cost(self) -> float:
@@ -62,7 +67,7 @@ class _Place:
 
     @cached_property
     def linear(self) -> Linear:
-        return self.problem.linear(self.state)
+        return self.problem.linear(self.state, self.before)
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,8 +83,10 @@ class _Runs:
         return self.problem.step(place.state, place.linear, damping)
 
     def moved(self, place: _Place, step: Step) -> _Place | None:
-        state = self.problem.moved(place.state, step, place.linear.surroundings)
-        return None if state is None else self.at(state)
+        around = place.linear.surroundings
+        state = self.problem.moved(place.state, step, around)
+        return None if state is None else _Place(self.problem, state, around)
 
     def settled(self, place: _Place) -> _Place:
-        return self.at(self.problem.rescaled(place.state))
+        state = self.problem.rescaled(place.state)
+        return place if state is place.state else replace(place, state=state)

@@ -22,6 +22,7 @@ from freeswing.cdpr.simulation.sensitivity import Linearised
 from freeswing.ident.runs import Payload
 
 STATE = 12
+BLOCK_OF_COLUMNS = 12  # rows a column: 0.2 MB for fifty
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,7 +190,7 @@ def reduce_run(
     if shifts is not None:
         everything[: white.size, size:-1] = (maps @ shifts).reshape(white.size, -1)
     # What follows combines columns: a triangle of them serves as well, and is a hundredth as long.
-    triangle = np.asarray(np.linalg.qr(everything, mode="r"))
+    triangle = _triangle(everything)
     rows, beside, right = triangle[:, :size], triangle[:, size:-1], triangle[:, -1]
     basis = _allowed_states(motion)
     directions = STATE - motion.model.robot.n_cables
@@ -207,6 +208,22 @@ def reduce_run(
     full = np.zeros((size, size))
     full[: len(triangle)] = triangle
     return Reduced(full[n_own:, n_own:], full[:n_own], basis, mine)
+
+
+def _triangle(rows: Array) -> Array:
+    """R of tall rows, (n, c), from those of blocks that the near cache holds: in half the time.
+
+    Source:
+        Demmel, Grigori, Hoemmen, Langou 2012, Communication-optimal parallel and sequential QR
+        and LU factorizations.
+    """
+    count, columns = rows.shape
+    blocks = count // (BLOCK_OF_COLUMNS * columns)
+    if blocks < 2:
+        return np.asarray(np.linalg.qr(rows, mode="r"))
+    whole = count // blocks * blocks
+    parts = np.linalg.qr(rows[:whole].reshape(blocks, -1, columns), mode="r")
+    return np.asarray(np.linalg.qr(np.vstack([*parts, rows[whole:]]), mode="r"))
 
 
 def own_prior(motion: Motion) -> Array:

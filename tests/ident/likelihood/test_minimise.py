@@ -30,7 +30,7 @@ class Valley:
     def cost(self, state: State) -> float:
         return float(np.sum(self.residuals(*state.values) ** 2))
 
-    def linear(self, state: State) -> Any:
+    def linear(self, state: State, before: object = ()) -> Any:
         self.linearised += 1
         return Known(self.residuals(*state.values), self.slopes(*state.values))
 
@@ -125,7 +125,7 @@ class Told:
     def cost(self, state: State) -> float:
         return self.costs[int(state.values[0])]
 
-    def linear(self, state: State) -> Any:
+    def linear(self, state: State, before: object = ()) -> Any:
         return Known(None, None)
 
     def step(self, state: State, linear: Any, damping: float) -> Step:
