@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from freeswing.report.words import number
+from freeswing.report.panels.answer import verdict
+from freeswing.report.words import millimetres, number, parameter_row, plain
+from freeswing.results.diagnosis import Diagnosis, HeldOut
 from freeswing.results.identification import BodyParameter, BudgetShare, ClassicRow, Identification
 
 HALF_WIDTH_95 = 1.959964
@@ -53,3 +55,45 @@ def classic_row(row: ClassicRow) -> str:
         f"{number(row.Izz_kg_m2, 5)} kg m2 against {number(row.fitted_Izz_kg_m2, 5)} "
         f"({row.off_percent:+.2f} %; {'; '.join(told)})"
     )
+
+
+def diagnosis_lines(document: Diagnosis) -> list[str]:
+    """What `diagnose` says of a bench: effects with their numbers, bodies and errors, notes."""
+    lines = []
+    for found in document.accepted:
+        name = plain(found.effect) + (f" ({found.part})" if found.part else "")
+        rows = [parameter_row(one, found.effect) for one in found.parameters]
+        values = [f"{r['name']} {r['value']} ± {r['half_width']} {r['unit']}".strip() for r in rows]
+        lines.append(f"accepted: {name}: {', '.join(values)}")
+        advice = [one.experiment for one in document.candidates if one.effect == found.effect]
+        if found.confounded_with:
+            others = ", ".join(plain(one) for one in found.confounded_with)
+            lines.append(f"  not told from {others}: {'; '.join(filter(None, advice))}")
+    lines += verdict(document)
+    lines += [f"{name}: {change}" for name, change in changed_objects(document)]
+    before, after = document.before, document.after
+    if before is not None and after is not None:
+        errors = [f"{_error(one)}" for one in (before, after)]
+        lines.append(f"runs that were not fitted are off by {errors[0]} before, {errors[1]} after")
+    return [*lines, *(f"note: {note}" for note in document.notes)]
+
+
+def _error(one: HeldOut) -> str:
+    metres, radians = one.prediction_rmse_m, one.prediction_rmse_rad
+    told = [] if metres is None else [millimetres(metres)]
+    told += [] if radians is None else [f"{number(1e3 * radians)} mrad"]
+    return " and ".join(told) or "nothing that has a unit"
+
+
+def changed_objects(document: Diagnosis) -> list[tuple[str, str]]:
+    """Every body's Izz about its own centre without and with the effects that were found."""
+    found = []
+    pairs = zip(document.objects_before or (), document.objects_after or (), strict=True)
+    for before, after in pairs if document.accepted else ():
+        rows = [
+            next((row for row in one.parameters if row.name == "Izz_kg_m2"), None)
+            for one in (before, after)
+        ]
+        told = [object_row(row).removeprefix("Izz_kg_m2").strip() for row in rows if row]
+        found.append((after.name, f"Izz {told[0]} kg m2 before, {told[-1]} after"))
+    return found

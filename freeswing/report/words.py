@@ -70,6 +70,8 @@ def unit_of(name: str, effect: str = "") -> tuple[str, float, str]:
         name: of the parameter.
         effect: that it is of, if of one: of springs N_m means N/m, of friction N m.
     """
+    if name.startswith("bias_") and name.endswith("_m"):  # bias_1_m is cable 1's, in metres
+        return name.removesuffix("_m"), *_UNITS["m"]
     if name.endswith("_N_m") and "spring" in f"{effect} {name}":
         return name.removesuffix("_N_m"), 1.0, "N/m"
     for suffix, (scale, unit) in _UNITS.items():

@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 from freeswing.results.codec import Document, Entry, Numbers, absent, empty, entry
 from freeswing.results.common import FoundEffect, Parameter
+from freeswing.results.identification import Body
 
 
 @entry
@@ -209,6 +210,8 @@ class Diagnosis(Document):
         unexplained: what remains.
         decay: how each fitted swing dies away.
         lengths: what the constancy of cable lengths says without any dynamics.
+        objects_before: of a bench, its bodies without the effects.
+        objects_after: likewise with them.
         notes: sentences about the session.
     """
 
@@ -226,4 +229,6 @@ class Diagnosis(Document):
     unexplained: Unexplained | None = None
     decay: tuple[Decay, ...] = absent(default=())
     lengths: Lengths | None = absent(default=None)
+    objects_before: tuple[Body, ...] | None = absent(default=None)
+    objects_after: tuple[Body, ...] | None = absent(default=None)
     notes: tuple[str, ...] = ()

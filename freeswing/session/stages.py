@@ -147,11 +147,13 @@ def _has_its_cameras(session: Session) -> bool:
     return made is not None and {camera.name for camera in made.cameras} <= known
 
 
-def _is_bench(session: Session) -> bool:
-    """Whether all runs go into one fit, which says itself what they contradict."""
+def _is_diagnosed(session: Session) -> bool:
+    """Where runs are held out, or where a bench leaves each out in turn."""
     from freeswing.session.load_bench import is_bench
     from freeswing.session.load_swings import load_robot
 
+    if any(run.role == "validate" for run in session.runs):
+        return True
     return is_bench(session, load_robot(session))
 
 
@@ -193,7 +195,7 @@ DIAGNOSE = Stage(
     "diagnose",
     "diagnosis.json",
     _motion_files,
-    lambda session: any(run.role == "validate" for run in session.runs) and not _is_bench(session),
+    _is_diagnosed,
     {"only": None},
     lambda session: [session.results / "diagnosis_motion.json"],
 )

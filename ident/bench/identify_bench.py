@@ -10,12 +10,11 @@ import numpy as np
 from freeswing.cdpr.files.problems import DataError
 from freeswing.cdpr.model.batch import evaluate
 from freeswing.cdpr.model.equations import Model, build_model
-from freeswing.cdpr.robot import INERTIA_NAMES, POSE_COORDINATES, Array, Robot
+from freeswing.cdpr.robot import POSE_COORDINATES, Array, Robot
 from freeswing.ident.bench.assemble import EFFECTS, assembled
-from freeswing.ident.bench.objects import moments, moments_slope, specific, specific_slope
 from freeswing.ident.bench.runs import Bench, BenchRun, Signal
 from freeswing.ident.bench.solve import Solved, solved
-from freeswing.ident.bench.told.budget import bent_std, budget
+from freeswing.ident.bench.told.budget import budget
 from freeswing.ident.bench.told.classic import (
     ClassicRun,
     classic_runs,
@@ -26,9 +25,9 @@ from freeswing.ident.bench.told.classic import (
 )
 from freeswing.ident.bench.told.held_out import HeldOut, held_out
 from freeswing.ident.bench.told.report_objects import (
-    RESTS_ON_PRIOR,
     channels_document,
     objects_document,
+    platform_rows,
 )
 
 LEAST_OVER_NOISE = 5.0  # a channel's spread over the noise between its neighbours
@@ -87,49 +86,13 @@ class BenchResult:
 
     def _platform(self) -> dict[str, Any]:
         """The nine specific numbers of the platform; those that only a prior holds are null."""
-        found, body = self.solved.solution, self.solved.solution.value("platform")
-        slope = specific_slope(moments(body)) @ moments_slope(body)
-        covariance = slope @ found.covariance_of("platform") @ slope.T
-        block = self.solved.first.block("platform")
-        spread = np.zeros(10) if block.prior is None else np.array(block.prior.std)
-        spread = np.where(block.mask, spread, 0.0)
-        before = np.sum((slope * spread) ** 2, axis=1)
-        values, variances = specific(moments(body)), np.array(np.diag(covariance))
-        izz = INERTIA_NAMES.index("Izz_m2")
-        variances[izz] += (bent_std(self.solved, "platform") / body[0]) ** 2
-        rows = []
-        for k, name in enumerate(INERTIA_NAMES):
-            seen = bool(variances[k] < RESTS_ON_PRIOR * before[k])
-            std = float(np.sqrt(variances[k]))
-            rows.append(
-                {
-                    "name": name,
-                    "value": float(values[k]) if seen else None,
-                    "std": std if seen else None,
-                    "std_percent": 100.0 * std / abs(float(values[k])) if seen else None,
-                    "essential": seen,
-                    "identifiable": seen,
-                }
-            )
-        if self.solved.mass is not None:
-            std = float(found.std("platform")[0])
-            rows.append(
-                {
-                    "name": "mass_kg",
-                    "value": float(body[0]),
-                    "std": std,
-                    "std_percent": 100.0 * std / float(body[0]),
-                    "essential": True,
-                    "identifiable": True,
-                }
-            )
         samples = sum(len(swing.times_s) for swing in self.solved.swings)
         return {
-            "parameters": rows,
+            "parameters": platform_rows(self.solved),
             "samples": samples,
             "dropped_runs": [],
             "notes": list(self.notes),
-            "stop_reason": found.reason,
+            "stop_reason": self.solved.solution.reason,
         }
 
 

@@ -73,6 +73,7 @@ class Solved:
         mass: what payload runs say of the mass, or None without one.
         wires: what sway says of the wires, or None where no column shows sway.
         held: what no run tells, by block.
+        fastest_hz: highest frequency of the first run's small oscillations.
     """
 
     solution: Solution
@@ -82,6 +83,7 @@ class Solved:
     mass: MassVerdict | None
     wires: WiresVerdict | None = None
     held: Held = field(default_factory=dict)
+    fastest_hz: float = 1.0
 
 
 def solved(model: Model, bench: Bench, start: Assembled) -> Solved:
@@ -102,10 +104,10 @@ def solved(model: Model, bench: Bench, start: Assembled) -> Solved:
     if scattering:  # from the start, or the noise would be taken for as large as the scatter
         unknowns = unknowns.joined(scatter_block(len(swings), izz, WIDE_SCATTER * izz))
     found = fit(swings, unknowns, ROUGH)
-    fastest = _fastest(model, found, swings[0])
-    swings = rescaled(swings, found, fastest, coloured=True)
+    fastest_hz = _fastest(model, found, swings[0])
+    swings = rescaled(swings, found, fastest_hz, coloured=True)
     found = fit(swings, found.unknowns, FINE)
-    swings = rescaled(swings, found, fastest, coloured=True)
+    swings = rescaled(swings, found, fastest_hz, coloured=True)
     tau, kept = 0.0, found.unknowns
     if scattering:
         tau = scatter_std(found)
@@ -121,7 +123,7 @@ def solved(model: Model, bench: Bench, start: Assembled) -> Solved:
     right = _who_is_right(found, wires) + doubt
     found = considered(swings, found, held)
     found = replace(found, covariance=found.covariance + right)
-    return Solved(found, swings, start.unknowns, tau, mass, wires, held)
+    return Solved(found, swings, start.unknowns, tau, mass, wires, held, fastest_hz)
 
 
 def _wires(found: Solution, start: Assembled) -> WiresVerdict:

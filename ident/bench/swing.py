@@ -65,6 +65,19 @@ class Riding:
     shift_m: Array
 
 
+@dataclass(frozen=True, slots=True)
+class Acting:
+    """An effect that all runs share: its block of unknowns, and what it is in this run.
+
+    Attributes:
+        block: name of the unknowns.
+        matrix: from them to the model's values after those of drag, (k, size).
+    """
+
+    block: str
+    matrix: Array
+
+
 class Responses(NamedTuple):
     """Derivatives (.., size) of a state or of poses by what moves them.
 
@@ -98,6 +111,7 @@ class BenchSwing:
         known: moments (10,) of known payloads.
         loose: how far from rest each coordinate may start, (6,); infinite where it is measured.
         place: of the run among those of the fit.
+        acting: effects beside drag, in a model that has them.
     """
 
     name: str
@@ -112,6 +126,7 @@ class BenchSwing:
     known: Array
     loose: Array
     place: int = 0
+    acting: tuple[Acting, ...] = ()
 
     @property
     def span_s(self) -> tuple[float, float]:
@@ -132,6 +147,16 @@ class BenchSwing:
         found = self.lengths_m + values[self.wires] + values.get(COMMON, np.zeros(1))
         return found + values["wires_each"] if "wires_each" in values else found
 
+    def effects(self, values: Mapping[str, Array]) -> Array:
+        """The model's values: the run's own drag, then what all runs share, (k,)."""
+        own = values["effects"]
+        if not self.acting:
+            return own
+        shared = self.model.start_values[len(own) :]
+        for one in self.acting:
+            shared = shared + one.matrix @ values[one.block]
+        return np.concatenate([own, shared])
+
     def simulated(self, values: Mapping[str, Array]) -> Motion:
         """The simulated swing.
 
@@ -141,7 +166,7 @@ class BenchSwing:
         total = self.total(values)
         if not total[0] > 0.0:
             raise ValueError(f"run {self.name}: a mass of {total[0]:.3g} kg")
-        inertia, effects = specific(total), values["effects"]
+        inertia, effects = specific(total), self.effects(values)
         start_s = self.span_s[0]
         lengths = self.lengths(values)
         try:
@@ -264,7 +289,11 @@ class BenchSwing:
         return state, pose
 
     def _by_block(self, answer: Responses, values: Mapping[str, Array]) -> dict[str, Array]:
-        found = {"start": answer.start, "effects": answer.effects, self.wires: answer.lengths}
+        own = len(values["effects"])
+        found = {"start": answer.start, self.wires: answer.lengths}
+        found["effects"] = answer.effects[..., :own]
+        for one in self.acting:
+            found[one.block] = answer.effects[..., own:] @ one.matrix
         if COMMON in values:
             found[COMMON] = answer.lengths.sum(axis=-1, keepdims=True)
         if "wires_each" in values:

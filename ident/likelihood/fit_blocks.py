@@ -212,6 +212,52 @@ class _Blocks:
         return step.is_full and step.promised < self.how.tolerance
 
 
+@dataclass(frozen=True, slots=True)
+class Linear:
+    """A fit's linear problem about some unknowns, run by run, in units of their scales.
+
+    Attributes:
+        parts: of each run residuals (m,), slopes by its own unknowns and by the shared ones that
+            are estimated, (m, ..) each.
+        triangles: of each run over [shared estimated unknowns; residual], its own eliminated,
+            (r, p + 1, p + 1).
+        prior_rows: what is known of the shared ones, (q, p + 1).
+    """
+
+    parts: tuple[Part, ...]
+    triangles: Array
+    prior_rows: Array
+
+    def left_over(self, run: int, change: Array) -> Array:
+        """Residuals (m,) of a run once the shared unknowns change and its own follow best."""
+        residuals, own, shared = self.parts[run]
+        moved = residuals + shared @ change
+        return np.asarray(moved - own @ np.linalg.lstsq(own, moved, rcond=RANK_LIMIT)[0])
+
+
+def linear_problem(swings: Sequence[Swing], unknowns: Unknowns) -> Linear:
+    """Linearise a fit about some unknowns.
+
+    Raises:
+        ValueError: where a run has no motion there, naming it.
+
+    Source:
+        Bjoerck 1996, Numerical Methods for Least Squares Problems, sec. 6.3.
+    """
+    free = _joined([block.mask for block in unknowns.shared]).astype(bool)
+    own_free = _joined([block.mask for block in unknowns.own]).astype(bool)
+    parts, triangles = [], []
+    size = int(free.sum()) + 1
+    for residuals, own, shared in _linearised(swings, unknowns, _simulated(swings, unknowns)):
+        own, shared = own[:, own_free], shared[:, free]
+        rows = np.column_stack([own, shared, residuals])
+        rows = np.vstack([rows, np.zeros((rows.shape[1], rows.shape[1]))])
+        parts.append((residuals, own, shared))
+        triangles.append(_triangle(rows)[own.shape[1] :, own.shape[1] :][:size])
+    priors = _shared_priors(unknowns)[:, np.append(free, True)]
+    return Linear(tuple(parts), np.array(triangles), priors)
+
+
 def _simulated(swings: Sequence[Swing], unknowns: Unknowns) -> list[Any]:
     return [swing.simulated(unknowns.of_run(run)) for run, swing in enumerate(swings)]
 

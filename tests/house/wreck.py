@@ -50,6 +50,7 @@ HOMING = "tests/homing/test_limits.py"
 DECISION = "tests/ident/diagnose/test_decision_limits.py"
 INCLUSION = "tests/ident/diagnose/lengths/test_inclusion.py"
 BENCH = "tests/ident/bench/test_bench_limits.py"
+BENCH_DIAGNOSE = "tests/ident/bench/test_bench_diagnose.py"
 
 DRIVE = "tests/ident/drive/test_drive_limits.py"
 CHOICE = "tests/ident/drive/test_drive_decisions.py"
@@ -269,6 +270,9 @@ HELD = (
     Held("ident/bench/told/classic.py", ("LEAST_PERIODS", "LEANING_PERCENT"), BENCH),
     Held("ident/bench/told/report_objects.py", ("RESTS_ON_PRIOR", "TELLS_NOTHING"), BENCH),
     Held("ident/bench/identify_bench.py", ("LEAST_OVER_NOISE",), BENCH),
+    Held("ident/bench/diagnose/removal.py", ("SURE",), BENCH_DIAGNOSE),
+    Held("ident/bench/diagnose/diagnose.py", ("LEAST_RUNS",), BENCH_DIAGNOSE),
+    Held("ident/bench/diagnose/left.py", ("COLOURED",), BENCH_DIAGNOSE),
     Held(
         "ident/signals/prepare.py",
         ("LARGEST_AMPLIFICATION", "LEAST_SIGNAL"),

@@ -9,6 +9,7 @@ from freeswing.commands.arguments import add_session, add_workers, crew_of, open
 from freeswing.console import Console
 
 if TYPE_CHECKING:
+    from freeswing.cdpr.robot import Robot
     from freeswing.results.diagnosis import Diagnosis
     from freeswing.session.made import Made
     from freeswing.session.session_file import Session
@@ -49,7 +50,7 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
     import os
 
     from freeswing.cdpr.effects import catalogue
-    from freeswing.cdpr.files.documents import DataError, InputError
+    from freeswing.cdpr.files.documents import InputError
     from freeswing.doctor.quaternions import refuse_mistaken_quaternions
     from freeswing.ident.diagnose.diagnose import diagnose
     from freeswing.results.diagnosis import Diagnosis
@@ -66,11 +67,7 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
             raise InputError(f"--only {name}: not one of {', '.join(sorted(catalogue()))}")
     robot = load_robot(session)
     if is_bench(session, robot):
-        raise DataError(
-            f"{session.path}: a bench (channels, loads, partial runs or parallel wires): diagnose "
-            "looks for effects in sessions of poses or free coordinates alone; what a bench's runs "
-            "contradict is said by identify"
-        )
+        return _make_bench(session, console, robot, only)
     swings = list(load_swings(session, robot, load_target(session)))
     refuse_repeated(swings)
     refuse_mistaken_quaternions(swings, robot)
@@ -82,6 +79,25 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
     _summarise(document, console)
     motions = ladder_motions(found.ladder)
     return Made((("diagnosis.json", document), ("diagnosis_motion.json", motions)))
+
+
+def _make_bench(session: Session, console: Console, robot: Robot, only: list[str] | None) -> Made:
+    """The same of a bench: all its runs in one fit."""
+    from freeswing.ident.bench.diagnose.diagnose import diagnose_bench
+    from freeswing.ident.bench.diagnose.document import bench_document
+    from freeswing.report.bench_words import diagnosis_lines
+    from freeswing.results.diagnosis import Diagnosis
+    from freeswing.results.motion import Motion
+    from freeswing.session.load_bench import load_bench
+    from freeswing.session.load_swings import load_target
+    from freeswing.session.made import Made
+
+    bench = load_bench(session, robot, load_target(session))
+    found = diagnose_bench(bench, robot, console.progress, only)
+    document = Diagnosis.from_json(bench_document(found))
+    for line in diagnosis_lines(document):
+        console.say(f"  {line}")
+    return Made((("diagnosis.json", document), ("diagnosis_motion.json", Motion())))
 
 
 def _summarise(document: Diagnosis, console: Console) -> None:

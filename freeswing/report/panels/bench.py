@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from freeswing.report.bench_words import HALF_WIDTH_95
+from freeswing.report.bench_words import HALF_WIDTH_95, changed_objects
 from freeswing.report.material import Material
 from freeswing.report.words import number
 from freeswing.results.identification import BodyParameter, ChannelGain, ClassicRow
@@ -21,7 +21,9 @@ class BenchPanel:
         found = material.identification
         if found is None or not found.objects or not found.classic:
             return None
+        changed = changed_objects(material.diagnosis) if material.diagnosis else []
         return {
+            "changed": [{"body": name, "Izz without and with": text} for name, text in changed],
             "objects": [
                 {"name": one.name, "rows": [_row(row) for row in one.parameters]}
                 for one in found.objects

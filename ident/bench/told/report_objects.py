@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from freeswing.cdpr.robot import BODY_NAMES, Array
+from freeswing.cdpr.robot import BODY_NAMES, INERTIA_NAMES, Array
 from freeswing.ident.bench.channels import Channel
 from freeswing.ident.bench.modal import SQUARE
-from freeswing.ident.bench.objects import moments, moments_slope
+from freeswing.ident.bench.objects import moments, moments_slope, specific, specific_slope
 from freeswing.ident.bench.runs import Bench, BenchRun
 from freeswing.ident.bench.solve import Solved
 from freeswing.ident.bench.swing import IZZ
@@ -87,6 +87,47 @@ def _of_second_order(body: Array, covariance: Array) -> Array:
     found = np.zeros(10)
     found[4:7] = [body[0] ** 2 * 2.0 * float(np.sum(spread[list(p)] ** 2)) for p in pairs]
     return found
+
+
+def platform_rows(solved: Solved) -> list[dict[str, Any]]:
+    """The nine specific numbers of the platform, null where only a prior holds them; its mass."""
+    found, body = solved.solution, solved.solution.value("platform")
+    slope = specific_slope(moments(body)) @ moments_slope(body)
+    covariance = slope @ found.covariance_of("platform") @ slope.T
+    block = solved.first.block("platform")
+    spread = np.zeros(10) if block.prior is None else np.array(block.prior.std)
+    spread = np.where(block.mask, spread, 0.0)
+    before = np.sum((slope * spread) ** 2, axis=1)
+    values, variances = specific(moments(body)), np.array(np.diag(covariance))
+    izz = INERTIA_NAMES.index("Izz_m2")
+    variances[izz] += (bent_std(solved, "platform") / body[0]) ** 2
+    rows = []
+    for k, name in enumerate(INERTIA_NAMES):
+        seen = bool(variances[k] < RESTS_ON_PRIOR * before[k])
+        std = float(np.sqrt(variances[k]))
+        rows.append(
+            {
+                "name": name,
+                "value": float(values[k]) if seen else None,
+                "std": std if seen else None,
+                "std_percent": 100.0 * std / abs(float(values[k])) if seen else None,
+                "essential": seen,
+                "identifiable": seen,
+            }
+        )
+    if solved.mass is not None:
+        std = float(found.std("platform")[0])
+        rows.append(
+            {
+                "name": "mass_kg",
+                "value": float(body[0]),
+                "std": std,
+                "std_percent": 100.0 * std / float(body[0]),
+                "essential": True,
+                "identifiable": True,
+            }
+        )
+    return rows
 
 
 def objects_document(solved: Solved, bench: Bench, runs: tuple[BenchRun, ...]) -> list[dict]:

@@ -31,6 +31,31 @@ RATE_HZ = 50.0
 
 
 @dataclass(frozen=True, slots=True)
+class Hidden:
+    """What is true and not told, beside which loads lie how on the platform.
+
+    Attributes:
+        longer_m: the first wire over what is told.
+        heavier: the platform over what is told.
+        drag_n_m_s: against turning.
+        quadratic: drag against moving, N s2/m2.
+        tilt_rad: of the base frame about its x and y, (2,).
+        stiffness_ea_n: of the wires, whose told lengths are unstretched; 0: rigid.
+    """
+
+    longer_m: float = LONGER_M
+    heavier: float = HEAVIER
+    drag_n_m_s: float = DRAG_N_M_S
+    quadratic: float = QUADRATIC
+    tilt_rad: tuple[float, float] = (0.0, 0.0)
+    stiffness_ea_n: float = 0.0
+
+
+USUAL = Hidden()
+CLEAN = Hidden(0.0, 1.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
 class BenchTruth:
     """What really hung there: masses and tensors about each body's own centre, kg and kg m2."""
 
@@ -48,6 +73,7 @@ def make_bench(
     seen: str = "poses",
     duration_s: float = 10.0,
     counts: tuple[int, int, int] = (3, 3, 4),
+    hidden: Hidden = USUAL,
 ) -> BenchTruth:
     """Write a bench session.
 
@@ -58,6 +84,7 @@ def make_bench(
         seen: `poses`, `chi`, or `track`: one curved pixel track of a laser dot.
         duration_s: of each run.
         counts: tare, known-weight and loaded runs.
+        hidden: what the files do not say.
     """
     rng = np.random.default_rng(seed)
     (folder / "runs").mkdir(parents=True, exist_ok=True)
@@ -76,7 +103,7 @@ def make_bench(
     told = LOAD_COM_M + rng.normal(0.0, 0.001, 3)
     lines += [f"com_m = {told.tolist()}", "com_std_m = 0.001"]
     for k, kind in enumerate(kinds):
-        world = _world(wires, kind)
+        world = _world(wires, kind, hidden)
         name = f"{kind}-{k + 1:02d}"
         _record(folder / "runs" / f"{name}.csv", world, rng, seen, duration_s)
         lines += ["", "[[runs]]", f'name = "{name}"', 'role = "identify"']
@@ -88,7 +115,7 @@ def make_bench(
             lines.append('loads = ["object"]')
     (folder / "session.toml").write_text("\n".join([*lines, ""]))
     _write_robot(folder / "robot.toml", wires, ends)
-    mass = DECLARED_KG * HEAVIER
+    mass = DECLARED_KG * hidden.heavier
     izz = PLATFORM_KG_M2[2] + mass * float(np.sum(PLATFORM_COM_M[:2] ** 2))
     truth = BenchTruth(folder, mass, izz, float(LOAD_KG_M2[2]), LOAD_COM_M)
     (folder / "truth").mkdir(exist_ok=True)
@@ -123,7 +150,7 @@ def _moment(mass: float, com: Array, principal: Array) -> tuple[float, Array, Ar
     return mass, mass * com, np.diag(principal) + mass * spread
 
 
-def _world(wires: int, kind: str) -> World:
+def _world(wires: int, kind: str, hidden: Hidden) -> World:
     from freeswing.cdpr.robot import Cable, Robot
 
     ends = _ends(wires)
@@ -131,18 +158,27 @@ def _world(wires: int, kind: str) -> World:
         Cable(str(k), end + np.array([0.0, 0.0, WIRE_M]), 0.0, end) for k, end in enumerate(ends)
     )
     robot = Robot("bench", cables, np.array([0.0, 0.0, -GRAVITY]))
-    parts = [_moment(DECLARED_KG * HEAVIER, PLATFORM_COM_M, PLATFORM_KG_M2)]
+    parts = [_moment(DECLARED_KG * hidden.heavier, PLATFORM_COM_M, PLATFORM_KG_M2)]
     if kind == "weight":
         parts.append(_moment(WEIGHT_KG, WEIGHT_M, np.zeros(3)))
     if kind == "loaded":
         parts.append(_moment(LOAD_KG, LOAD_COM_M, LOAD_KG_M2))
     mass = sum(part[0] for part in parts)
-    first, second = sum(part[1] for part in parts), sum(part[2] for part in parts)
+    first = np.sum([part[1] for part in parts], axis=0)
+    second = np.sum([part[2] for part in parts], axis=0)
     entries = (second / mass)[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
     lengths = np.full(wires, WIRE_M)
-    lengths[0] += LONGER_M
+    lengths[0] += hidden.longer_m
     world = plain_world(robot, Body(mass, first / mass, entries), lengths)
-    return world._replace(drag_angular=DRAG_N_M_S, drag_quadratic=QUADRATIC)
+    ahead, aside = hidden.tilt_rad
+    down = np.array([-np.sin(aside), np.sin(ahead), -np.cos(np.hypot(ahead, aside))])
+    return world._replace(
+        drag_angular=hidden.drag_n_m_s,
+        drag_quadratic=hidden.quadratic,
+        gravity=GRAVITY * down,
+        stiffness_ea=hidden.stiffness_ea_n,
+        relaxation=1e-3,
+    )
 
 
 def _record(path: Path, world: World, rng: np.random.Generator, seen: str, span_s: float) -> None:

@@ -1,0 +1,203 @@
+"""`diagnose` for benches: what the model of a bench lacks, and what its bodies are with it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from freeswing.cdpr.files.problems import DataError
+from freeswing.cdpr.robot import Array, Robot
+from freeswing.ident.bench.considered import considered
+from freeswing.ident.bench.diagnose.causes import Cause, causes_of, dressed
+from freeswing.ident.bench.diagnose.errors import Errors, errors_of
+from freeswing.ident.bench.diagnose.removal import Removed, removals
+from freeswing.ident.bench.diagnose.search import Ground, Round, searched
+from freeswing.ident.bench.diagnose.weigh import Fit
+from freeswing.ident.bench.identify_bench import BenchResult, identify_bench
+from freeswing.ident.bench.modal import ModalSwing
+from freeswing.ident.bench.runs import Bench
+from freeswing.ident.bench.solve import CONTRADICTED, FINE, MassVerdict, Solved
+from freeswing.ident.bench.swing import COMMON
+from freeswing.ident.likelihood.fit_blocks import fit
+
+Progress = Callable[[str, float], None]
+
+LEAST_RUNS = 3  # of two, either is predicted by the other alone, drag, wires and all
+FEW = (
+    "{count} run(s) have role identify: to leave each out in turn takes {least} or more; record "
+    "further ones"
+)
+CHANNELS_ONLY = (
+    "nothing but uncalibrated channels was recorded: how far the platform swung, and what an "
+    "effect would do to it, is not known, so that none can be told from another; add one run with "
+    "poses, or with yaw by a calibrated sensor"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One step of the ladder.
+
+    Attributes:
+        effects: that the model has beside what the files say.
+        fit: of it.
+        errors: of runs that it was not fitted to.
+    """
+
+    effects: tuple[str, ...]
+    fit: Fit
+    errors: Errors
+
+
+@dataclass(frozen=True, slots=True)
+class BenchDiagnosis:
+    """What `diagnose` finds on a bench.
+
+    Attributes:
+        identified: what `identify` says, without any effect but drag.
+        rounds: of the search.
+        removed: what `identify` takes for granted, each taken away.
+        ladder: what the files say, then one step an effect.
+        solved: the last fit, with what deviations have to count.
+        declared: the first one's, likewise.
+        shares: of the platform's mass that hangs in each run, (r,).
+    """
+
+    identified: BenchResult
+    rounds: tuple[Round, ...]
+    removed: tuple[Removed, ...]
+    ladder: tuple[Step, ...]
+    solved: Solved
+    declared: Solved
+    shares: Array
+
+    @property
+    def accepted(self) -> tuple[Cause, ...]:
+        """Causes that were found, in their order."""
+        return self.ladder[-1].fit.causes
+
+
+@dataclass(frozen=True, slots=True)
+class CannotTell:
+    """A bench whose runs tell no effect from another.
+
+    Attributes:
+        identified: what `identify` says.
+        reason: why, and what to add.
+    """
+
+    identified: BenchResult
+    reason: str
+
+
+def diagnose_bench(
+    bench: Bench,
+    robot: Robot,
+    progress: Progress | None = None,
+    only: Sequence[str] | None = None,
+) -> BenchDiagnosis | CannotTell:
+    """Find what a bench lacks.
+
+    Args:
+        bench: the session.
+        robot: as declared.
+        progress: told a label and a fraction.
+        only: effects to consider; None for all that a bench may show.
+
+    Returns:
+        The diagnosis, or why there can be none.
+
+    Raises:
+        DataError: when the data cannot give a result, naming run, number and remedy.
+    """
+    told = progress or (lambda label, fraction: None)
+    told("all runs in one fit", 0.0)
+    identified = identify_bench(bench, robot)
+    if isinstance(identified.solved.swings[0], ModalSwing):
+        return CannotTell(identified, CHANNELS_ONLY)
+    count = len(identified.solved.swings)
+    if count < LEAST_RUNS:
+        return CannotTell(identified, FEW.format(count=count, least=LEAST_RUNS))
+    try:
+        return _diagnosed(identified, robot, told, only)
+    except (ValueError, np.linalg.LinAlgError) as error:
+        raise DataError(f"the bench's runs cannot be diagnosed: {error}") from error
+
+
+def _diagnosed(
+    identified: BenchResult, robot: Robot, told: Progress, only: Sequence[str] | None
+) -> BenchDiagnosis:
+    start = _start(identified.solved)
+    masses = [
+        swing.total(start.solution.unknowns.of_run(k))[0] for k, swing in enumerate(start.swings)
+    ]
+    shares = np.array(masses) / start.solution.value("platform")[0]
+    ground = Ground(start.swings, shares, identified.solved.fastest_hz)
+    last, rounds = searched(
+        ground, start, causes_of(robot, only), lambda label, part: told(label, 0.3 + 0.5 * part)
+    )
+    told("what is taken for granted", 0.8)
+    removed = removals(ground, last, identified.bench, only)
+    told("before and after", 0.9)
+    ladder = _ladder(identified.bench, ground, last, removed)
+    solved = _counted(identified.solved, ladder[-1].fit)
+    declared = _counted(identified.solved, ladder[0].fit)
+    told("diagnosis", 1.0)
+    return BenchDiagnosis(identified, tuple(rounds), removed, ladder, solved, declared, shares)
+
+
+def _start(solved: Solved) -> Fit:
+    """The fit with drag and each wire's own length, all wires together as long as told."""
+    unknowns = solved.solution.unknowns
+    zero = unknowns.moved({COMMON: np.zeros(1)}).held(COMMON)
+    return Fit(solved.swings, fit(solved.swings, zero, FINE))
+
+
+def _counted(solved: Solved, one: Fit) -> Solved:
+    """A fit with the covariance that its held numbers ask for, and what it says of the mass."""
+    found = considered(one.swings, one.solution, solved.held)
+    mass = solved.mass
+    if mass is not None and mass.contradicted:
+        value, std = float(found.value("platform")[0]), float(found.std("platform")[0])
+        off = abs(value - mass.declared_kg) > CONTRADICTED * std
+        mass = MassVerdict(mass.declared_kg, value, std, off)
+    return replace(solved, solution=found, swings=one.swings, mass=mass)
+
+
+def _ladder(
+    bench: Bench, ground: Ground, last: Fit, removed: Sequence[Removed]
+) -> tuple[Step, ...]:
+    """Without all that was accepted, then with one after the other."""
+    granted = [one for one in removed if one.accepted]
+    names = [one.effect for one in granted]
+    fits = [(names, last)]
+    causes = list(last.causes)
+    current = last
+    while causes:
+        gone = causes.pop()
+        unknowns = current.solution.unknowns
+        unknowns = (
+            unknowns.moved({COMMON: np.zeros(1)}).held(COMMON)
+            if gone.block == COMMON
+            else unknowns.without(gone.block)
+        )
+        swings = tuple(
+            replace(mine, columns=seen.columns)
+            for mine, seen in zip(
+                dressed(ground.swings, causes, ground.shares), last.swings, strict=True
+            )
+        )
+        current = Fit(swings, fit(swings, unknowns, FINE), tuple(causes))
+        fits.append((names, current))
+    for k in range(len(granted), 0, -1):
+        gone = granted[k - 1]
+        unknowns = gone.without(current.solution.unknowns)
+        current = Fit(current.swings, fit(current.swings, unknowns, FINE))
+        fits.append((names[: k - 1], current))
+    steps = []
+    for granted_names, one in reversed(fits):
+        effects = (*granted_names, *(cause.effect for cause in one.causes))
+        steps.append(Step(effects, one, errors_of(bench, ground, one)))
+    return tuple(steps)

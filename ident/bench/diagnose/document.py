@@ -1,0 +1,255 @@
+"""results/diagnosis.json of a bench."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from freeswing.cdpr.effects import catalogue
+from freeswing.ident.bench.diagnose.causes import LENGTHS, SAME, Cause
+from freeswing.ident.bench.diagnose.diagnose import BenchDiagnosis, CannotTell
+from freeswing.ident.bench.diagnose.left import remaining
+from freeswing.ident.bench.diagnose.removal import Removed
+from freeswing.ident.bench.diagnose.search import Word
+from freeswing.ident.bench.solve import Solved
+from freeswing.ident.bench.swing import COMMON
+from freeswing.ident.bench.told.classic import group_sentence
+from freeswing.ident.bench.told.report_objects import objects_document, platform_rows
+from freeswing.ident.diagnose.experiments import separating_experiment
+
+FORMAT = "freeswing-diagnosis/1"
+MASS = "platform_mass"
+MASS_GROUP = ("wire_radii", "payload_distance", "payload_mass", "frame_rate")
+WIRES_GROUP = ("yielding_clamp", "frame_rate")
+NOT_ON_BENCHES = "it is not looked for on benches: their wires would not show it, or not alone"
+WEIGH = (
+    "weigh the platform with all that hangs on it; if the declared mass is right, measure the "
+    "wires' radii and lengths again, then film a clock"
+)
+EXCHANGE = (
+    "exchange the wires and record again: what goes with a wire is its length, what stays with the "
+    "platform its end or the measured frame, what stays above the hook"
+)
+LEVEL = (
+    "hold a plumb line beside the hooks, or a level on their frame; a constant force tilts a "
+    "heavier load less, and a tilt does not"
+)
+CLAMPS = (
+    "measure the wires from bend to bend, film a clock, and push the hooks: a clamp that yields"
+)
+ADVICE = (
+    (frozenset({"gravity_tilt", "constant_force"}), LEVEL),
+    (frozenset({"gravity_tilt", "anchor_offset"}), LEVEL),
+    (frozenset({"attachment_offset", "anchor_offset"}), EXCHANGE),
+)
+
+
+def bench_document(found: BenchDiagnosis | CannotTell) -> dict[str, Any]:
+    """What `diagnose` writes of a bench."""
+    if isinstance(found, CannotTell):
+        return _cannot_tell(found)
+    bench, first, last = found.identified.bench, found.declared, found.solved
+    runs = tuple(run for run in bench.runs if run.role == "identify")
+    before, after = found.ladder[0].errors.document(), found.ladder[-1].errors.document()
+    mass = group_sentence(last)
+    entries = [_accepted(found, cause) for cause in found.accepted]
+    entries += [_granted(one) for one in found.removed if one.accepted]
+    entries += [_mass_entry(last)] if mass else []
+    notes = [mass] if mass else []
+    notes += [_basis(found)]
+    return {
+        "format": FORMAT,
+        "before": before,
+        "candidates": _candidates(found, bool(mass)),
+        "accepted": entries,
+        "after": after,
+        "share_closed": _closed(before, after),
+        "parameters_before": _parameters(first),
+        "parameters_after": _parameters(last),
+        "parameters_moved_percent": _moved(_parameters(first), _parameters(last)),
+        "ladder": [
+            {"effects": list(step.effects), **step.errors.document()} for step in found.ladder
+        ],
+        "unexplained": remaining(found.ladder[-1].fit),
+        "objects_before": objects_document(first, bench, runs),
+        "objects_after": objects_document(last, bench, runs),
+        "notes": notes,
+    }
+
+
+def _cannot_tell(found: CannotTell) -> dict[str, Any]:
+    rows = [_entry(name, "not_identifiable", found.reason) for name in catalogue()]
+    return {
+        "format": FORMAT,
+        "candidates": rows,
+        "accepted": [],
+        "ladder": [],
+        "unexplained": {"present": False, "signature": "", "evidence": {}},
+        "notes": [f"cannot tell: {found.reason}"],
+    }
+
+
+def _basis(found: BenchDiagnosis) -> str:
+    held_out = any(run.role == "validate" for run in found.identified.bench.runs)
+    if held_out:
+        return "before and after are of runs with role validate, over their second halves"
+    return "no run has role validate: before and after are of each run left out in turn"
+
+
+def _entry(effect: str, verdict: str, reason: str, **more: Any) -> dict[str, Any]:
+    empty = {"delta_bic": None, "held_out_gain": None, "probability": None, "confounded_with": []}
+    return {"effect": effect, "verdict": verdict, **empty, "reason": reason, **more}
+
+
+def _candidates(found: BenchDiagnosis, mass: bool) -> list[dict[str, Any]]:
+    """The last word on every effect, and on the declared mass."""
+    told: dict[str, dict[str, Any]] = {}
+    for words in (one.words for one in found.rounds):
+        for word in words:
+            name, before = word.cause.effect, told.get(word.cause.effect)
+            kept = before is not None and before["verdict"] in ("accepted", "confounded")
+            better = before is None or (word.gain > before["held_out_gain"])
+            if not kept and (better or word.verdict != "rejected"):
+                told[name] = _word(word)
+    for one in found.removed:
+        before = told.get(one.effect)
+        if before is None or before["verdict"] == "rejected":
+            told[one.effect] = _removed(one)
+    rows = list(told.values())
+    rows += [_entry(n, "not_identifiable", NOT_ON_BENCHES) for n in catalogue() if n not in told]
+    if mass:
+        reason = "runs with a known mass contradict the declared one"
+        rows.append(_entry(MASS, "confounded", reason, **_group(MASS_GROUP, WEIGH)))
+    return rows
+
+
+def _group(others: Sequence[str], experiment: str) -> dict[str, Any]:
+    return {"confounded_with": list(others), "experiment": experiment}
+
+
+def _others(cause: Cause, others: Sequence[Cause]) -> tuple[str, ...]:
+    """Effects that cannot be told from a cause, on these data or on any."""
+    if cause.block == COMMON:
+        same: tuple[str, ...] = WIRES_GROUP
+    else:
+        same = SAME.get(cause.effect, ()) if not cause.part else ()
+    names = (*(one.effect for one in others), *same)
+    return tuple(dict.fromkeys(name for name in names if name != cause.effect))
+
+
+def experiment_of(names: Sequence[str]) -> str:
+    """What would tell a group of effects apart on a bench."""
+    for pair, advice in ADVICE:
+        if pair <= set(names):
+            return advice
+    return separating_experiment(tuple(name for name in names if name in catalogue()))
+
+
+def _word(word: Word) -> dict[str, Any]:
+    others = _others(word.cause, word.others) if word.verdict != "rejected" else ()
+    verdict = "confounded" if others else word.verdict
+    verdict = "accepted" if word.verdict == "confounded" and not others else verdict
+    entry = _entry(
+        word.cause.effect,
+        verdict,
+        word.reason,
+        delta_bic=word.delta_bic,
+        held_out_gain=word.gain,
+        probability=word.chance,
+    )
+    if word.cause.part and word.verdict != "rejected":
+        entry["part"] = word.cause.part
+    if others:
+        common = word.cause.block == COMMON
+        entry |= _group(others, CLAMPS if common else experiment_of((word.cause.effect, *others)))
+    return entry
+
+
+def _removed(one: Removed) -> dict[str, Any]:
+    wires = one.effect == LENGTHS and one.accepted
+    verdict = "accepted" if one.accepted else "rejected"
+    entry = _entry(
+        one.effect,
+        "confounded" if wires else verdict,
+        one.reason,
+        delta_bic=one.delta_bic,
+        held_out_gain=one.gain,
+        probability=one.chance,
+    )
+    if one.part and wires:
+        entry["part"] = one.part
+    return entry | (_group(SAME[LENGTHS], EXCHANGE) if wires else {})
+
+
+def _accepted(found: BenchDiagnosis, cause: Cause) -> dict[str, Any]:
+    solution = found.solved.solution
+    values, stds = solution.value(cause.block), solution.std(cause.block)
+    word = next(
+        word
+        for one in found.rounds
+        for word in one.words
+        if word.cause == cause and word.verdict != "rejected"
+    )
+    return _found(
+        cause.effect,
+        cause.part,
+        [one.name for one in cause.parameters],
+        values.tolist(),
+        stds.tolist(),
+        _others(cause, word.others),
+    )
+
+
+def _granted(one: Removed) -> dict[str, Any]:
+    others = SAME[LENGTHS] if one.effect == LENGTHS else ()
+    return _found(one.effect, one.part, one.names, one.values, one.stds, others)
+
+
+def _mass_entry(solved: Solved) -> dict[str, Any]:
+    solution = solved.solution
+    value, std = solution.value("platform")[:1], solution.std("platform")[:1]
+    return _found(MASS, "", ["mass_kg"], value.tolist(), std.tolist(), MASS_GROUP)
+
+
+def _found(
+    effect: str,
+    part: str,
+    names: Sequence[str],
+    values: Sequence[float],
+    stds: Sequence[float],
+    others: Sequence[str],
+) -> dict[str, Any]:
+    rows = [
+        {"name": name, "value": float(value), "std": float(std) if np.isfinite(std) else None}
+        for name, value, std in zip(names, values, stds, strict=True)
+    ]
+    entry = {"effect": effect, "parameters": rows, "confounded_with": list(others)}
+    return entry | ({"part": part} if part else {})
+
+
+def _parameters(solved: Solved) -> list[dict[str, Any]]:
+    rows = platform_rows(solved)[:9]
+    return [{key: row[key] for key in ("name", "value", "std")} for row in rows]
+
+
+def _moved(first: list[dict[str, Any]], last: list[dict[str, Any]]) -> dict[str, float | None]:
+    found: dict[str, float | None] = {}
+    for before, after in zip(first, last, strict=True):
+        old, new = before["value"], after["value"]
+        known = old is not None and new is not None and old != 0.0
+        found[before["name"]] = 100.0 * (new - old) / abs(old) if known else None  # type: ignore[operator]
+    return found
+
+
+def _closed(before: dict[str, Any], after: dict[str, Any]) -> float | None:
+    """Share of the way from the error before to the noise."""
+    old, new, floor = (
+        before["prediction_rmse_m"],
+        after["prediction_rmse_m"],
+        after["noise_floor_m"],
+    )
+    if old is None or new is None or floor is None or old <= floor:
+        return None
+    return (old - new) / (old - floor)

@@ -1,0 +1,89 @@
+"""`diagnose` on independent simulated benches: what the files do not say is named, and mended."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from freeswing.main import main
+from tests.oracle.benches import CLEAN, Hidden, make_bench
+from tests.samples.expectations import result
+
+MASS_KG = 1.2  # of the platform, for which effects over the mass are told
+
+
+def diagnosed(folder: Path, hidden: Hidden, wires: int = 3) -> tuple[dict, float, float]:
+    """The result of a session, and by how much the object's Izz is off before and after."""
+    truth = make_bench(folder, 3, wires, duration_s=6.0, counts=(2, 1, 2), hidden=hidden)
+    out = folder / "out"
+    assert main(["diagnose", str(folder), "--results", str(out), "--quiet"]) == 0
+    told = result(out, "diagnosis")
+    off = []
+    for key in ("objects_before", "objects_after"):
+        rows = {row["name"]: row for row in told[key][1]["parameters"]}
+        off.append(abs(rows["Izz_kg_m2"]["value"] / truth.load_izz - 1.0))
+    deviations = off[1] * truth.load_izz / rows["Izz_kg_m2"]["std"]
+    assert deviations < 3.0, rows["Izz_kg_m2"]
+    return told, off[0], off[1]
+
+
+def accepted(told: dict) -> dict[str, dict[str, float]]:
+    return {
+        one["effect"]: {row["name"]: row["value"] for row in one["parameters"]}
+        for one in told["accepted"]
+    }
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("wires", [2, 3])
+def test_a_clean_bench_lacks_nothing(tmp_path: Path, wires: int) -> None:
+    told, _, _ = diagnosed(tmp_path, CLEAN, wires)
+    assert told["accepted"] == [], told["accepted"]
+    assert not told["unexplained"]["present"], told["unexplained"]
+
+
+@pytest.mark.slow
+def test_undeclared_drag(tmp_path: Path) -> None:
+    told, before, after = diagnosed(tmp_path, Hidden(0.0, 1.0, 2e-3, 0.02))
+    found = accepted(told)
+    assert found["rotational_drag"]["rate_m2_s"] == pytest.approx(2e-3 / MASS_KG, rel=0.05), found
+    assert "cable_length_bias" not in found, found
+    assert after < before, (before, after)
+    assert after < 0.005, after
+    assert told["after"]["prediction_rmse_rad"] < 0.5 * told["before"]["prediction_rmse_rad"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("wires", [2, 3])
+def test_a_wire_that_is_2_mm_long(tmp_path: Path, wires: int) -> None:
+    """What it cannot be told from is said, with the measurement that would."""
+    told, _, _ = diagnosed(tmp_path, Hidden(0.002, 1.0, 0.0, 0.0), wires)
+    (one,) = told["accepted"]
+    assert (one["effect"], one["part"]) == ("cable_length_bias", "1"), one
+    assert one["parameters"][0]["value"] == pytest.approx(0.002, rel=0.1), one
+    (row,) = [row for row in told["candidates"] if row["effect"] == "cable_length_bias"]
+    assert "attachment_offset" in row["confounded_with"], row
+    assert "exchange the wires" in row["experiment"], row
+
+
+@pytest.mark.slow
+def test_a_bench_that_is_not_level(tmp_path: Path) -> None:
+    told, before, after = diagnosed(tmp_path, Hidden(0.0, 1.0, 0.0, 0.0, (0.01, -0.006)))
+    found = accepted(told)
+    tilt = found["gravity_tilt"]
+    assert tilt["tilt_x_rad"] == pytest.approx(0.01, abs=3e-4), tilt
+    assert tilt["tilt_y_rad"] == pytest.approx(-0.006, abs=3e-4), tilt
+    assert after < 0.5 * before, (before, after)
+    assert after < 0.005, after
+
+
+@pytest.mark.slow
+def test_wires_that_stretch(tmp_path: Path) -> None:
+    """EA of 2.5 kN: 1.9 mm under the platform, 3.1 mm with the object."""
+    told, before, after = diagnosed(tmp_path, Hidden(0.0, 1.0, 0.0, 0.0, stiffness_ea_n=2500.0))
+    found = accepted(told)
+    stretch = found["cable_elasticity"]["mass_over_stiffness_s2_m"]
+    assert stretch == pytest.approx(MASS_KG / 2500.0, rel=0.15), found
+    assert after <= before + 1e-4, (before, after)
+    assert after < 0.005, after
