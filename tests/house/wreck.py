@@ -272,7 +272,7 @@ HELD = (
     Held("ident/bench/identify_bench.py", ("LEAST_OVER_NOISE",), BENCH),
     Held("ident/bench/diagnose/removal.py", ("SURE",), BENCH_DIAGNOSE),
     Held("ident/bench/diagnose/diagnose.py", ("LEAST_RUNS",), BENCH_DIAGNOSE),
-    Held("ident/bench/diagnose/left.py", ("COLOURED",), BENCH_DIAGNOSE),
+    Held("ident/bench/diagnose/left.py", ("COLOURED", "SLOWEST_PARTS"), BENCH_DIAGNOSE),
     Held(
         "ident/signals/prepare.py",
         ("LARGEST_AMPLIFICATION", "LEAST_SIGNAL"),

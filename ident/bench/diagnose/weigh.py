@@ -16,8 +16,6 @@ from freeswing.ident.diagnose.leave_one_out import Evidence, Score, score
 from freeswing.ident.diagnose.model_probabilities import Rival, model_probabilities
 from freeswing.ident.likelihood.fit_blocks import Linear, Solution, linear_problem
 
-FLAT = 10.0  # scales: an unknown of which nothing is known lies within so many of its usual size
-
 
 @dataclass(frozen=True)
 class Fit:
@@ -77,7 +75,8 @@ class Fit:
             own: how many numbers it gives to every run beyond the smallest model.
         """
         rows = self.linear.prior_rows
-        flat = np.eye(rows.shape[1])[:-1] / FLAT
+        # An unknown of which nothing is known lies within its usual size: so in every rival.
+        flat = np.eye(rows.shape[1])[:-1]
         known = np.any(rows[:, :-1] != 0.0, axis=0)
         prior = np.vstack([rows[np.any(rows[:, :-1] != 0.0, axis=1)], flat[~known]])
         tries = 0.5 * own * float(np.sum(np.log(self.squares)))

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from freeswing.main import main
-from tests.oracle.benches import CLEAN, Hidden, make_bench
+from tests.oracle.recorded.benches import CLEAN, Hidden, make_bench
 from tests.samples.expectations import result
 
 MASS_KG = 1.2  # of the platform, for which effects over the mass are told
