@@ -9,7 +9,7 @@ from freeswing.excite.plan import ExcitationOptions, Plan
 from freeswing.excite.swing import Bench, Swing
 from freeswing.excite.winch_release import WinchRelease
 
-_GOOD_COST = 10.0
+_GOOD_COST = 10.0  # FIDIM 2022, after eq. (42): optimal below
 
 
 def plan_document(bench: Bench, options: ExcitationOptions, plan: Plan) -> dict:

@@ -17,8 +17,8 @@ from freeswing.cdpr.files.documents import DataError
 FLAT = 0.02
 """Corners of the right board lie on a plane to 0.1 % of its size, with a wide lens to 1 %; those of
 a wrong layout are off by a square or more."""
-_LEAST_VIEWS = 3
-_MARKER_OFF = 0.01
+_LEAST_VIEWS = 3  # their median is not led by a false one
+_MARKER_OFF = 0.01  # of a marker: prints are right to some tenths of a percent
 
 
 def settled_board(board: Board, pixels: Array) -> tuple[Board, str | None]:

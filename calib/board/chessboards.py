@@ -22,8 +22,8 @@ MOST_HARD = 3
 """Images without a board in a row that are looked at hard."""
 LEAST_ALIKE = 3
 """Images that have to show one other board before it is said."""
-_LOOKED_FOR_OTHERS = 8
-_SMALLEST = 3
+_LOOKED_FOR_OTHERS = 8  # images, while none has shown the board: looking for any takes long
+_SMALLEST = 3  # inner corners: with two, any four corners are a board
 _SEEDS = ((5, 4), (3, 3))
 
 

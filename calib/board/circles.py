@@ -17,10 +17,12 @@ from freeswing.calib.camera.lens_models import Array
 
 Image = NDArray[np.uint8]
 
-_LEAST_AREA_PX2 = 20.0
+_LEAST_AREA_PX2 = 20.0  # a circle of 5 px: in smaller ones half-way grey is a pixel's accident
 _REACH = 0.5  # of the distance to the nearest circle: as far as a pixel can belong to this one
 _RIM_PX = 2  # what blur spreads around the half-way grey
-_LEAST_CONTRAST = 12.0
+_LEAST_CONTRAST = (
+    12.0  # grey values: noise of three makes 10 of a flat patch (3rd to 95th percentile)
+)
 _OUTLINE = 32
 
 

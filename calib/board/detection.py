@@ -23,12 +23,12 @@ from freeswing.calib.tags.tag_patterns import cut_dictionary
 
 Image = NDArray[np.uint8]
 
-LEAST_CORNERS = 6
+LEAST_CORNERS = 6  # four of a tag tell a pose that noise turns over; two more settle it
 _KALIBR_BORDERS = (2, 1)
 _WINDOW_MARGIN = 0.3
 _WINDOW_MARGIN_PX = 6.0
-_LEAST_EXPLAINED = 0.8
-LEAST_STD_PX = 0.003
+_LEAST_EXPLAINED = 0.8  # of the grey values' variance: below, it is a likeness of the tag
+LEAST_STD_PX = 0.003  # what print and lens leave: no fit is better than that
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,7 +17,7 @@ from freeswing.cdpr.files.documents import Problems, Reader, load_toml, replace_
 from freeswing.cdpr.files.toml_text import toml_text
 from freeswing.cdpr.rotation import matrix_from_quaternion, quaternion_from_matrix, transform
 
-_UNIT_TOLERANCE = 1e-3
+_UNIT_TOLERANCE = 1e-3  # a quaternion written with three decimals
 # Focal length over the longer side: a fisheye of 220 degrees has 0.25, a lens of one degree 57.
 SHORTEST_FOCAL, LONGEST_FOCAL = 0.1, 100.0
 HALFWAY = 0.5  # of the way from the middle to the corners every usable calibration reaches

@@ -22,13 +22,15 @@ from freeswing.calib.rig.reprojection_kernels import CLOCK, POSE, WARP
 from freeswing.calib.rig.views import Views
 from freeswing.cdpr.files.documents import DataError
 
-LEAST_VIEWS = 4
+LEAST_VIEWS = 4  # three tell five numbers of a lens (Zhang 2000, sec. 3.1); one more checks
+# Of the board: one that fills the image is off a plane by 3 % in a fisheye, by 5 at k1 = -0.3.
 FLATNESS_LIMIT = 0.06
+# Times the usual: a board twice as near is off by two to four times as much.
 _FLATNESS_OUTLIER = 8.0
-_FLATNESS_FLOOR = 0.01
+_FLATNESS_FLOOR = 0.01  # a board over a third of the image's width is off by 0.5 to 1 %
 _FOCAL_STARTS = (0.5, 0.8, 1.2, 2.0)
 _FISHEYE_STARTS = (0.3, 0.4, 0.5, 0.7)
-_GOOD_PX = 1.0
+_GOOD_PX = 1.0  # detection leaves a tenth: what is above is looked for from other focal lengths
 _START_VIEWS = 16
 
 

@@ -23,10 +23,10 @@ from freeswing.calib.rig.views import Views
 from freeswing.calib.verdict.truth_checks import at_moment
 
 LADDER = ("PINHOLE", "OPENCV", "FULL_OPENCV")
-LEAST_VIEWS = 12
+LEAST_VIEWS = 12  # six a half: a lens of eight numbers from 48 corners each and more
 _MOST_VIEWS = 60
-_SIGMAS = 3.0
-_LEAST_GAIN = 0.02
+_SIGMAS = 3.0  # of what differs from view to view: one camera in 700 is advised by chance
+_LEAST_GAIN = 0.02  # of the square error: less is not worth another calibration
 
 
 @dataclass(frozen=True, slots=True)

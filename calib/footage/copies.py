@@ -24,13 +24,13 @@ COPY_SHIFT_PX = 0.08
 """Edges of a copy stand still but for the codec (x264: 0.04 px at crf 18; in 95 % of copies less
 than this at crf 23). Of 22 frames at which a platform turned round, one moved less: it tells
 nothing that the frame before did not."""
-_EDGE_GREY = 8.0
+_EDGE_GREY = 8.0  # a pixel, mean of a tile: below, noise of some grey values would tell a shift
 _LEAST_GREY = 3.0
 """Where no frame around changes by more (mean of some tile), nothing moves: nothing is a copy."""
 _AROUND = 2
 _MOVED_GREY = 24.0
 """A pixel that changes by more was passed by an edge."""
-_LEAST_MOVED = 200
+_LEAST_MOVED = 200  # pixels: one edge of 20 px that went by ten
 COMB_RATIO = 1.1
 """Bend from row to row over bend from every second row to the next, where things move. Pictures of
 one moment have 0.3 to 0.5 (1.0 would be pure noise), two moments in one frame 1.4 and more."""

@@ -18,7 +18,7 @@ from freeswing.calib.tags.base_tags import SurveyedTag, find_base_tags
 from freeswing.cdpr.files.documents import InputError, read_text
 from freeswing.cdpr.files.number_table import comma_separated
 
-CLICK_STD_PX = 0.5
+CLICK_STD_PX = 0.5  # a point clicked by hand
 _COLUMNS = ("image", "point", "u_px", "v_px")
 _MOST_BYTES = 1 << 24
 

@@ -19,8 +19,8 @@ from freeswing.cdpr.files.documents import InputError
 
 MOST_WALK = 80  # images of a walk: pairs grow with the square, 80 take minutes
 _FRAMES_AT_REST = 9  # averaged: noise falls to a third
-_LEAST_WALK = 3
-_AT_REST_GREY = 12.0
+_LEAST_WALK = 3  # fewer tie no camera to another
+_AT_REST_GREY = 12.0  # mean of a whole image: noise makes 5
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,7 +24,7 @@ from freeswing.ident.signals.prepare import guessed_inertia
 
 EFFECTS = ("rotational_drag", "translational_drag")  # air is never absent
 UNIT_NOISE_M, UNIT_NOISE_RAD = 1e-4, 5e-4
-UNSTATED_LENGTH_STD_M = 1e-3
+UNSTATED_LENGTH_STD_M = 1e-3  # by tape
 EACH_LENGTH = 1e-4  # of a wire's length: what weights stretch and rehanging shifts
 TWICE_AS_WIDE = 3.0  # of squared amplitude: a twist of twice the usual is one deviation off
 WRONG_LENGTH = 0.03  # of it: knots, hooks, a unit's slip; what is looked for where sway is seen

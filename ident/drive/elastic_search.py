@@ -16,7 +16,7 @@ from freeswing.ident.drive.unknowns import Asked
 Array = NDArray[np.float64]
 
 FIRST_HEAD_S = 0.15  # of a run: a cable's swings turn by less than ten radians
-HEAD_STEPS = 10
+HEAD_STEPS = 10  # each head only leads to the next, which begins within a radian
 
 
 def stretches(name: str) -> bool:

@@ -64,6 +64,14 @@ MARKERS = "tests/freeswing/doctor/test_marker_limits.py"
 
 SPOTS = "tests/cdpr/markers/test_marker_decisions.py"
 
+PRIORS = "tests/ident/bench/test_bench_priors.py"
+PLAN = "tests/excite/test_plan_limits.py"
+FOOTAGE = "tests/calib/footage/test_footage_limits.py"
+LENS = "tests/calib/camera/test_lens_limits.py"
+BOARD = "tests/calib/board/test_board_limits.py"
+SCENE = "tests/calib/scene/test_scene_limits.py"
+UNTAGGED = "tests/vision/untagged/test_untagged_limits.py"
+
 HELD = (
     Held(
         "cdpr/markers/spacing.py",
@@ -382,6 +390,76 @@ HELD = (
         "servo/design/draws.py",
         ("LEAST_SHARE",),
         "tests/servo/design/test_robustness.py::test_wide_draws_stay_robots",
+    ),
+    Held(
+        "ident/bench/assemble.py",
+        (
+            "UNSTATED_LENGTH_STD_M", "EACH_LENGTH", "TWICE_AS_WIDE", "WRONG_LENGTH", "SWAY_RAD",
+            "UNSEEN_RAD", "SEEN_RAD", "WIDE_COM", "UPRIGHT", "CENTRED_COM", "WIDE_TENSOR",
+            "WIDE_PRODUCTS", "WIDE_MASS",
+        ),
+        PRIORS,
+    ),
+    Held(
+        "ident/bench/channel_blocks.py",
+        ("BENT", "TWICE_BENT", "UNKNOWN_GAIN", "OWN_LEVER", "OFFSET",),
+        PRIORS,
+    ),
+    Held("ident/bench/channels.py", ("HIGHEST_ORDER",), PRIORS),
+    Held("ident/bench/identify_bench.py", ("FROM_POSES_STD_M",), PRIORS),
+    Held("ident/bench/noise.py", ("WIDE_SCATTER",), PRIORS),
+    Held("excite/bench_plan.py", ("ENOUGH",), PLAN),
+    Held("excite/bench_table.py", ("HOOP", "SMALL", "LEAST",), PLAN),
+    Held("excite/plan_tables.py", ("_GOOD_COST",), PLAN),
+    Held("ident/drive/elastic_search.py", ("FIRST_HEAD_S", "HEAD_STEPS",), SEARCH),
+    Held("ident/drive/identify.py", ("HEAD_S", "ELASTIC_STEPS", "SECOND_START",), SEARCH),
+    Held("ident/drive/added_effects.py", ("SAME",), SEARCH),
+    Held("ident/drive/plan/deviations.py", ("STATIC_SAMPLES",), SEARCH),
+    Held("ident/drive/plan/plan_poses.py", ("MOST_TOGETHER",), SEARCH),
+    Held("freeswing/commands/session/drive.py", ("MISFIT",), SEARCH),
+    Held("calib/footage/condition.py", ("_ENOUGH_MOVING",), FOOTAGE),
+    Held(
+        "calib/footage/copies.py",
+        (
+            "COPY_SHARE", "COPY_SHIFT_PX", "_EDGE_GREY", "_LEAST_GREY", "_MOVED_GREY",
+            "_LEAST_MOVED", "COMB_RATIO",
+        ),
+        FOOTAGE,
+    ),
+    Held("calib/footage/frame_times.py", ("SAME_RATE", "NEAR_RATE", "_PLAYED_SLOWLY",), FOOTAGE),
+    Held("calib/footage/presentation.py", ("_TICK_SHARE", "_LONGEST_TICK",), FOOTAGE),
+    Held("calib/camera/lens_choice.py", ("LEAST_VIEWS", "_SIGMAS", "_LEAST_GAIN",), LENS),
+    Held(
+        "calib/camera/intrinsics.py",
+        ("LEAST_VIEWS", "FLATNESS_LIMIT", "_FLATNESS_OUTLIER", "_FLATNESS_FLOOR", "_GOOD_PX",),
+        LENS,
+    ),
+    Held("calib/board/board_check.py", ("FLAT", "_LEAST_VIEWS", "_MARKER_OFF",), BOARD),
+    Held("calib/board/boards.py", ("LARGEST_SQUARE_M",), BOARD),
+    Held("calib/board/chessboards.py", ("_LOOKED_FOR_OTHERS", "_SMALLEST",), BOARD),
+    Held("calib/board/circles.py", ("_LEAST_AREA_PX2", "_LEAST_CONTRAST",), BOARD),
+    Held(
+        "calib/board/detection.py",
+        ("LEAST_CORNERS", "_LEAST_EXPLAINED", "LEAST_STD_PX",),
+        BOARD,
+    ),
+    Held("calib/board/platform_tags.py", ("LEAST_TAGS",), BOARD),
+    Held("calib/camera/cameras_file.py", ("_UNIT_TOLERANCE", "HALFWAY", "LEAST_SEEN",), BOARD),
+    Held("calib/scene/frame.py", ("LEAST_BREADTH", "DISTANCE_SIGMAS",), SCENE),
+    Held("calib/scene/marks.py", ("CLICK_STD_PX",), SCENE),
+    Held("calib/scene/scene_rig.py", ("MATCH_SIGMAS", "LEAST_SIGHTINGS", "LEAST_SIZE_PX",), SCENE),
+    Held("calib/scene/source.py", ("TAPE_STD_M",), SCENE),
+    Held("calib/scene/stills.py", ("_LEAST_WALK", "_AT_REST_GREY",), SCENE),
+    Held("vision/untagged/features.py", ("RATIO", "MOST_ANGLE_COS",), UNTAGGED),
+    Held("vision/untagged/look.py", ("LEAST_MATCHES", "INLIER_PX", "FEATURE_STD_PX",), UNTAGGED),
+    Held("vision/untagged/refine.py", ("_FAR",), UNTAGGED),
+    Held(
+        "vision/untagged/rest_model.py",
+        (
+            "CHANGED_GREY", "CHANGED_SHARE", "WORST_PX", "LEAST_POINTS", "WORST_NAMED_M",
+            "CLICK_STD_PX",
+        ),
+        UNTAGGED,
     ),
 )  # fmt: skip
 

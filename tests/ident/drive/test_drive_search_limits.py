@@ -5,8 +5,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from freeswing.ident.drive import checks, elastic_search, ramps, slack
+from freeswing.commands.session import drive as drive_command
+from freeswing.ident.drive import (
+    added_effects,
+    checks,
+    elastic_search,
+    identify,
+    ramps,
+    slack,
+)
 from freeswing.ident.drive.diagnose import refit
+from freeswing.ident.drive.plan import deviations, plan_poses
 from freeswing.ident.drive.run_problem import DriveRun
 from freeswing.ident.drive.solver import Normal, minimise
 from tests.ident.drive.test_drive_limits import Seen, run_of, session_of
@@ -110,3 +119,108 @@ def test_a_head_is_lost_from_ten_times_its_noise(monkeypatch, square, lost):
             elastic_search.followed(given, None, refit.HEAD_S, refit.LOST)
     else:
         assert elastic_search.followed(given, None, refit.HEAD_S, refit.LOST) is ended
+
+
+def test_heads_of_elastic_cables_hold_one_turn_and_a_half_of_ten_a_second(monkeypatch):
+    """A stiff cable swings ten times a second: below ten radians, above a whole turn."""
+    heads, steps = [], []
+    monkeypatch.setattr(elastic_search, "head_of", lambda run, seconds: heads.append(seconds))
+    monkeypatch.setattr(elastic_search, "replace", lambda one, **_: one)
+
+    class Nothing:
+        def __init__(self, *_):
+            pass
+
+        def start(self):
+            return None
+
+        def normal(self, _):
+            return SimpleNamespace(cost=0.0)
+
+    monkeypatch.setattr(elastic_search, "Problem", Nothing)
+    elastic_search.best_start(SimpleNamespace(runs=(None,)), None, [np.zeros(1)])
+    assert 0.8 * 10.0 < 2.0 * np.pi * 10.0 * heads[0] < 10.0
+    found = SimpleNamespace(normal=SimpleNamespace(cost=0.0, n=1000))
+    ended = SimpleNamespace(found=found, theta=None, offsets=None)
+
+    def estimate(_given, _asked, most=60):
+        steps.append(most)
+        return ended
+
+    monkeypatch.setattr(elastic_search, "estimate", estimate)
+    run = SimpleNamespace(record=SimpleNamespace(times_s=np.zeros(400)), rate_hz=1000.0)
+    elastic_search.followed(SimpleNamespace(runs=(run,)), None)
+    assert steps == [10, 10, 60], "two heads of ten steps, and all of it to the end"
+
+
+@pytest.mark.parametrize(("stretch", "simulations"), [(None, 1), (0, 4)])
+def test_starts_of_elastic_cables_take_one_step_more_than_micrometres(
+    monkeypatch, stretch, simulations
+):
+    """A step leaves a thirtieth: of 30 mm the third leaves one micrometre, and one more is made."""
+    count, heads = [], []
+    model = SimpleNamespace(n_cables=1)
+    noise = SimpleNamespace(current_std_A=1.0)
+    run = SimpleNamespace(record=SimpleNamespace(currents_A=np.zeros((1, 1))))
+    monkeypatch.setattr(identify, "head_of", lambda run, seconds: heads.append(seconds))
+    monkeypatch.setattr(identify, "start_pose", lambda *_: np.zeros(7))
+    monkeypatch.setattr(identify, "moved", lambda pose, _: pose)
+    monkeypatch.setattr(identify, "stretch_of", lambda *_: stretch)
+    monkeypatch.setattr(identify, "simulated", lambda *_: count.append(1))
+    slopes = (np.eye(7)[None], np.zeros((0, 7)))
+    seen = SimpleNamespace(slopes=slopes, angles=np.zeros(7), poses=np.zeros(0))
+    monkeypatch.setattr(identify, "compared", lambda *_: seen)
+    identify._start(SimpleNamespace(model=model, noise=noise), run, None, None)
+    assert len(count) == simulations
+    assert heads == pytest.approx([0.3], rel=0.15)
+
+
+def test_a_second_start_is_five_percent_off(monkeypatch):
+    moved = []
+    dynamic = SimpleNamespace(put=lambda model, theta, values: moved.append(values))
+    monkeypatch.setattr(identify, "replace", lambda one, **_: one)
+    monkeypatch.setattr(identify, "estimate", lambda *_: None)
+    monkeypatch.setattr(identify, "apart", lambda *_: 0.0)
+    first = SimpleNamespace(values=np.ones(4), theta=None)
+    identify._second_start(SimpleNamespace(model=None), SimpleNamespace(dynamic=dynamic), first)
+    np.testing.assert_allclose(np.abs(moved[0] - 1.0), 0.05, rtol=0.1)
+
+
+@pytest.mark.parametrize(("left", "held"), [(0.9e-9, True), (1.1e-9, False)])
+def test_a_column_that_others_make_is_held(left, held):
+    slopes = np.array([[1.0, 1.0], [0.0, left]])
+    model = SimpleNamespace(index=lambda name: ("added", "asked").index(name))
+    asked = SimpleNamespace(groups=[SimpleNamespace(name="asked", members=("asked",))])
+    assert added_effects._held(model, asked, ("added",), slopes) == (("asked",) if held else ())
+
+
+def test_poses_at_rest_are_means_of_a_hundred_samples(monkeypatch):
+    monkeypatch.setattr(deviations, "static_pose", lambda *_: SimpleNamespace(pose=np.zeros(7)))
+    monkeypatch.setattr(deviations, "motor_angles", lambda *_: None)
+    noise = SimpleNamespace(pose_std=np.ones(6), angle_std_rad=1.0)
+    bench = SimpleNamespace(model=SimpleNamespace(declared=None), noise=noise)
+    std = deviations.at_rest(bench, np.zeros((1, 1))).pose_std
+    np.testing.assert_allclose(std, 0.1, rtol=0.1)
+
+
+def test_at_most_four_motors_hold_an_added_pose(monkeypatch):
+    rest = SimpleNamespace(pose=None, tensions_N=None)
+    monkeypatch.setattr(plan_poses, "static_pose", lambda *_: rest)
+    monkeypatch.setattr(plan_poses, "within", lambda *_: True)
+    drive = SimpleNamespace(current_limits_A=np.tile([0.0, 9.0], (8, 1)))
+    bench = SimpleNamespace(model=SimpleNamespace(n_cables=8, drive=drive))
+    together = np.count_nonzero(plan_poses._tried(bench, None, 0), axis=1)
+    assert together.min() == 1
+    assert together.max() == 4
+
+
+@pytest.mark.parametrize(("times", "told"), [(1.4, 0), (1.6, 1)])
+def test_residuals_above_their_noise_are_said(times, told):
+    """Counts that stand still make 1.1 of a right model's; a half more is something else."""
+    said = []
+    document = {
+        "slack": [], "saturated": [], "residual": {"times_noise": {"a": times}},
+        "estimates": {"joint": {"second_start_z": 0.0}},
+    }  # fmt: skip
+    drive_command._warn(document, SimpleNamespace(complain=said.append))
+    assert len(said) == told
