@@ -20,9 +20,7 @@ Image = NDArray[np.uint8]
 _LEAST_AREA_PX2 = 20.0  # a circle of 5 px: in smaller ones half-way grey is a pixel's accident
 _REACH = 0.5  # of the distance to the nearest circle: as far as a pixel can belong to this one
 _RIM_PX = 2  # what blur spreads around the half-way grey
-_LEAST_CONTRAST = (
-    12.0  # grey values: noise of three makes 10 of a flat patch (3rd to 95th percentile)
-)
+_LEAST_CONTRAST = 12.0  # 3rd to 95th percentile: noise of three makes 10 of a flat patch
 _OUTLINE = 32
 
 

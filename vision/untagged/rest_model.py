@@ -36,7 +36,7 @@ WORST_PX = 2.0
 LEAST_POINTS = 30
 # Named points where clicked against where stated: a millimetre is a click, 10 mm another point.
 WORST_NAMED_M = 0.01
-CLICK_STD_PX = 0.5
+CLICK_STD_PX = 0.5  # a point clicked by hand
 _COLUMNS = ("camera", "point", "u_px", "v_px")
 _MOST_BYTES = 1 << 24
 _SMOOTH_PX = 1.5
