@@ -1,4 +1,6 @@
 """What a plan takes, and what is worth a word: both sides of each limit, without any robot."""
+# Stubs stand for what is not looked at.
+# pyright: reportArgumentType=false, reportAttributeAccessIssue=false
 
 from __future__ import annotations
 
@@ -40,7 +42,7 @@ def test_bodies_of_which_nothing_is_said_are_a_disc_and_a_small_object() -> None
         attachments_m=ends, entries_m=ends + np.array([0.0, 0.0, 1.0]),
         platform=SimpleNamespace(mass_kg=2.0, specific_inertia_m2=None),
     )  # fmt: skip
-    case = bench_table.bench_case(robot, None, None)  # pyright: ignore[reportArgumentType]
+    case = bench_table.bench_case(robot, None, None)
     disc, ring = 0.5 * 2.0 * 0.3**2, 2.0 * (0.3 / 3.0) ** 2
     assert case.izz_kg_m2 == pytest.approx(disc, rel=0.1)
     assert case.load_izz_kg_m2 == pytest.approx(ring, rel=0.15)
@@ -55,5 +57,5 @@ def test_random_plans_are_good_below_the_papers_ten(cost, share) -> None:
     bench = SimpleNamespace(free=(), n_samples=1, duration_s=1.0, mass_kg=1.0)
     limits = SimpleNamespace(tension_N=(1.0, 2.0), reach_m=1.0, amplification=1.0)
     options = SimpleNamespace(criterion="C", limits=limits)
-    document = plan_tables.plan_document(bench, options, plan)  # pyright: ignore[reportArgumentType]
+    document = plan_tables.plan_document(bench, options, plan)
     assert document["random_plans"]["share_below_10"] == share

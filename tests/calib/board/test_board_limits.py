@@ -1,4 +1,6 @@
 """When a board is found, and which board it is: both sides of each limit, on made corners."""
+# Stubs stand for what is not looked at.
+# pyright: reportArgumentType=false, reportAttributeAccessIssue=false
 
 from __future__ import annotations
 
@@ -92,7 +94,7 @@ def test_no_corner_is_better_than_three_thousandths_of_a_pixel(monkeypatch) -> N
     finder = SimpleNamespace(detectMarkers=lambda _: ([quad], np.array([[0]]), None))
     monkeypatch.setattr(detection, "fitted_corners", lambda *_: exact)
     detector = detection.BoardDetector(CHARUCO)
-    found = detector._tag_corners(np.zeros((60, 80), np.uint8), 1, finder)  # pyright: ignore[reportArgumentType]
+    found = detector._tag_corners(np.zeros((60, 80), np.uint8), 1, finder)
     assert np.sqrt(found.covariance_px2[0, 0, 0]) == pytest.approx(0.003, rel=0.15)
 
 
@@ -100,7 +102,7 @@ def test_no_corner_is_better_than_three_thousandths_of_a_pixel(monkeypatch) -> N
 def test_one_tag_tells_no_pose(tags, known) -> None:
     tag = SimpleNamespace(family="tag36h11", id=1, corners_platform_m=np.zeros((4, 3)))
     target = SimpleNamespace(tags=(tag,) * tags)
-    assert (platform_tags(target) is not None) == known  # pyright: ignore[reportArgumentType]
+    assert (platform_tags(target) is not None) == known
 
 
 @pytest.mark.parametrize(("share", "refused"), [(0.33, False), (0.27, True)])
@@ -112,7 +114,7 @@ def test_no_lens_leaves_a_third_of_the_angle_half_way_to_the_corners(share, refu
     said = []
     entry = SimpleNamespace(add=lambda key, text: said.append(text))
     params = np.array([focal, focal, 400.0, 300.0, k, 0.0, 0.0, 0.0])
-    _question_lens(entry, "OPENCV", size, params)  # pyright: ignore[reportArgumentType]
+    _question_lens(entry, "OPENCV", size, params)
     assert bool(said) == refused, said
 
 

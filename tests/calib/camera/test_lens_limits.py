@@ -1,4 +1,6 @@
 """Which views start a lens and which model is advised: both sides of each limit, without images."""
+# Stubs stand for what is not looked at.
+# pyright: reportArgumentType=false, reportAttributeAccessIssue=false
 
 from __future__ import annotations
 
@@ -38,7 +40,7 @@ def advised(
 
     monkeypatch.setattr(lens_choice, "_held_out", held_out)
     rig = SimpleNamespace(cameras=(SimpleNamespace(model="OPENCV"),))
-    return lens_choice._weigh(rig, 0, Sighted(count))  # pyright: ignore[reportArgumentType]
+    return lens_choice._weigh(rig, 0, Sighted(count))
 
 
 @pytest.mark.parametrize(("count", "compared"), [(11, False), (12, True)])
@@ -69,7 +71,7 @@ def test_a_board_is_flat(monkeypatch, usual, error, kept) -> None:
     monkeypatch.setattr(
         intrinsics, "flatness_errors", lambda *_: np.array([usual, usual, usual, error])
     )
-    _, dropped = intrinsics.drop_false_boards(np.zeros((4, 3)), Sighted(4))  # pyright: ignore[reportArgumentType]
+    _, dropped = intrinsics.drop_false_boards(np.zeros((4, 3)), Sighted(4))
     assert len(dropped) == (0 if kept else 1)
 
 
@@ -91,5 +93,5 @@ def test_a_start_within_a_pixel_is_the_lens(monkeypatch, sigma_px, starts) -> No
     monkeypatch.setattr(intrinsics, "homographies", lambda *_: np.zeros((1, 3, 3)))
     monkeypatch.setattr(intrinsics, "focal_guess", lambda *_: 900.0)
     monkeypatch.setattr(intrinsics, "_adjust_lens", adjust)
-    intrinsics._best_lens("left", (800, 600), "OPENCV", np.zeros((4, 3)), Sighted(1))  # pyright: ignore[reportArgumentType]
+    intrinsics._best_lens("left", (800, 600), "OPENCV", np.zeros((4, 3)), Sighted(1))
     assert len(tried) == starts

@@ -1,4 +1,6 @@
 """What is a copy, what is torn, which rate is meant: both sides of each limit, on made frames."""
+# Stubs stand for what is not looked at.
+# pyright: reportArgumentType=false, reportAttributeAccessIssue=false
 
 from __future__ import annotations
 
@@ -83,7 +85,7 @@ def test_combs_bend_more_from_row_to_row(monkeypatch, ratio, torn) -> None:
 def container(rate_hz: float, stated_hz: float):
     shown = SimpleNamespace(rate_hz=rate_hz, missing=0, times_s=np.arange(3) / rate_hz)
     recording = SimpleNamespace(path=Path("a.mp4"), images=(), name="a")
-    return _from_container(recording, shown, stated_hz)  # pyright: ignore[reportArgumentType]
+    return _from_container(recording, shown, stated_hz)
 
 
 @pytest.mark.parametrize(("off", "remarks"), [(0.9e-4, 0), (1.1e-4, 1)])

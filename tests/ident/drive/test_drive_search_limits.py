@@ -1,4 +1,6 @@
 """Limits of slack, ramps and searches of driven robots, on both sides, without any robot."""
+# Stubs stand for what is not looked at.
+# pyright: reportArgumentType=false, reportAttributeAccessIssue=false
 
 from types import SimpleNamespace
 
