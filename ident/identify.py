@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from freeswing.cdpr.effects import Recorded, catalogue
 from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.model.equations import Model, build_model
 from freeswing.cdpr.robot import Robot
@@ -26,6 +27,7 @@ from freeswing.ident.runs import SwingRun
 from freeswing.ident.signals.derivatives import SignalSettings
 from freeswing.ident.signals.prepare import (
     LARGEST_AMPLIFICATION,
+    PreparedRun,
     PreparedRuns,
     Progress,
     fittable,
@@ -238,13 +240,14 @@ def _likelihood_estimates(
     starts = likelihood_starts(build_model(robot), prepared, results)
     masses = [one.mass.mass_kg for one in by_fidim.values() if one.mass is not None]
     asked = Asked(settings.consistent, next(iter(masses), robot.platform.mass_kg))
-    model, lawless = settings.geometry.model(robot), False
+    lawless = False
     for full in (True, False):
         name = "ml_full" if full else "ml_free"
         runs = fittable(prepared, full)
         if not runs or lawless:
             continue
         free = None if full else prepared.free
+        model = settings.geometry.model(robot, _nuisances(robot, runs))
         try:
             entry, fit = best_ml_estimate(
                 model, runs, free, starts, prepared.dropped, progress, asked
@@ -256,6 +259,13 @@ def _likelihood_estimates(
         starts = [entry.values, *starts]
         found[name] = Fitted(entry, corrected(robot, fit.model, fit.values), fitted_motions(fit))
     return found, failures, lawless
+
+
+def _nuisances(robot: Robot, runs: list[PreparedRun]) -> tuple[str, ...]:
+    """Effects of no interest that these runs' poses may have: each has a frame of its own."""
+    recorded = Recorded(slow_errors=any(run.run.trajectory.slow is not None for run in runs))
+    nuisances = (effect for effect in catalogue().values() if effect.nuisance)
+    return tuple(one.name for one in nuisances if not one.cannot_show(robot, recorded))
 
 
 def _meaningless(

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.cdpr.files.problems import DataError, InputError
+from freeswing.cdpr.markers.common_frame import common_frame
 from freeswing.cdpr.markers.layout import Alignment, SessionLayout, align, session_layout
 from freeswing.cdpr.markers.rigidity import Rigidity, marker_weights, rigidity
 from freeswing.cdpr.markers.slow_residuals import slow_share
@@ -23,6 +24,7 @@ from freeswing.cdpr.markers.spacing import (
 )
 from freeswing.cdpr.markers.stand_outs import stand_outs
 from freeswing.cdpr.measured.marker_recording import MarkerRecording
+from freeswing.cdpr.measured.pose_errors import PoseErrors
 from freeswing.cdpr.measured.rigid_fit import fit_rigid, pose_covariances
 from freeswing.cdpr.measured.slow_errors import SlowErrors
 from freeswing.cdpr.measured.target import Target
@@ -65,11 +67,14 @@ class RunMarkers:
         examined: what was found in it.
         layout_change_m: its markers' places minus the session's layout, platform frame, (n_m, 3).
         trajectory: the poses, with covariances and slow errors.
+        errors: what target.toml leaves open of the frame of all runs, in this one's poses; None
+            where the layout could not be laid on it.
     """
 
     examined: Examined
     layout_change_m: Array
     trajectory: Trajectory
+    errors: PoseErrors | None = None
 
 
 def examine(
@@ -157,7 +162,9 @@ def place(examined: Examined, layout: SessionLayout) -> RunMarkers:
     )
     known = covariances if found.kept_m > 0.0 else None
     trajectory = Trajectory.from_poses(recording.times_s, t, R, known, provenance, slow)
-    return RunMarkers(examined, onto.change_m, trajectory)
+    told = layout.from_target
+    common = None if told is None else common_frame(_frame_covariance(told), trajectory)
+    return RunMarkers(examined, onto.change_m, trajectory, common)
 
 
 def _poses(layout: Array, points: Array, weights: Array) -> tuple[Array, Array, Array]:

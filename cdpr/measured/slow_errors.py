@@ -16,6 +16,9 @@ from freeswing.cdpr.robot import frozen_array
 
 Array = NDArray[np.float64]
 
+# Who knows a run's frame beforehand, where that is what its poses state and no common tolerance.
+STATED_BY_RUN = "what each run's poses state"
+
 
 @dataclass(frozen=True, slots=True)
 class SlowErrors:

@@ -67,6 +67,7 @@ def load_swings(
     errors = calibration_errors(session)
     markers = read_marker_runs(session, target) if markers is None else markers
     swings = (load_swing(session, run, robot, target, markers) for run in session.runs)
+    errors |= markers.errors()
     return tuple(replace(swing, pose_errors=errors.get(swing.name)) for swing in swings)
 
 

@@ -16,6 +16,7 @@ from freeswing.cdpr.markers.session_markers import (
     place,
 )
 from freeswing.cdpr.measured.frame_change import moved_recording
+from freeswing.cdpr.measured.pose_errors import PoseErrors
 from freeswing.cdpr.measured.target import Target
 from freeswing.cdpr.measured.trajectory import Trajectory
 from freeswing.session.session_file import Session
@@ -48,6 +49,11 @@ class MarkerRuns:
         if name in self.failures:
             raise self.failures[name]
         return self.runs[name].trajectory if name in self.runs else None
+
+    def errors(self) -> dict[str, PoseErrors]:
+        """What the poses of all runs have wrong together, by run."""
+        found = ((name, run.errors) for name, run in self.runs.items())
+        return {name: errors for name, errors in found if errors is not None}
 
 
 def read_marker_runs(session: Session, target: Target | None) -> MarkerRuns:

@@ -7,11 +7,13 @@ inertia's standard deviations, which a geometry taken as exact makes too small.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from freeswing.cdpr.measured.slow_errors import STATED_BY_RUN
 from freeswing.cdpr.model.equations import Model, build_model
 from freeswing.cdpr.robot import Array, Robot
 from freeswing.ident.likelihood.fit_swings import LikelihoodFit, fit
@@ -46,13 +48,21 @@ class GeometryPriors:
         known = {_ENTRY: self.entry_std_m, _ATTACHMENT: self.attachment_std_m}
         return {name: std for name, std in known.items() if std is not None}
 
-    def model(self, robot: Robot) -> Model:
-        """The robot's equations with its cable ends as values of known spread."""
+    def model(self, robot: Robot, nuisances: Sequence[str] = ()) -> Model:
+        """The robot's equations with its cable ends as values of known spread.
+
+        Args:
+            robot: as declared.
+            nuisances: effects on what is measured that stand beside them, each run's own: known
+                as well as the run states.
+        """
         stds = self.stds
-        model = build_model(robot, tuple(stds))
-        spread = [stds[name.split(".")[0]] for name in model.names]
+        model = build_model(robot, (*stds, *nuisances))
+        spread = [stds.get(name.split(".")[0]) for name in model.names]
         parameters = tuple(
-            replace(parameter.known(0.0, std, "[tolerances] of robot.toml"), scale=std)
+            replace(parameter, source=STATED_BY_RUN)
+            if std is None
+            else replace(parameter.known(0.0, std, "[tolerances] of robot.toml"), scale=std)
             for parameter, std in zip(model.parameters, spread, strict=True)
         )
         return replace(model, parameters=parameters)
@@ -61,7 +71,7 @@ class GeometryPriors:
 def corrected(robot: Robot, model: Model, values: Array) -> Robot:
     """The robot with its cable ends where a fit has found them."""
     moves = {name: np.zeros((robot.n_cables, 3)) for name in (_ENTRY, _ATTACHMENT)}
-    for name in model.effects:
+    for name in moves.keys() & set(model.effects):
         moves[name] = values[model.place_of(name)].reshape(-1, 3)
     cables = tuple(
         replace(cable, entry_m=cable.entry_m + entry, attachment_m=cable.attachment_m + attachment)
@@ -95,13 +105,12 @@ def weighed_against_priors(found: LikelihoodFit, consistent: bool = False) -> Li
 
 def geometry_document(found: LikelihoodFit) -> dict[str, Any]:
     """`geometry` of an estimate's entry: each coordinate's correction; empty where it was exact."""
-    if not len(found.values):
-        return {}
-    stds = np.concatenate([found.std_of(name) for name in found.model.effects])
+    stds = np.concatenate([np.zeros(0), *(found.std_of(name) for name in found.model.effects)])
     rows = [
         {"name": name, "value": float(value), "std": float(std), "prior_std": parameter.prior_std}
         for name, value, std, parameter in zip(
             found.model.names, found.values, stds, found.model.parameters, strict=True
         )
+        if not parameter.per_run
     ]
-    return {"geometry": rows}
+    return {"geometry": rows} if rows else {}

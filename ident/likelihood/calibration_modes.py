@@ -59,9 +59,9 @@ class Calibrated:
         if largest <= UNLIKELY:
             return ()
         return (
-            f"the swings ask for cameras that are off by {largest:.1f} standard deviations of "
-            f"their calibration (more than {UNLIKELY:g} is unlikely): the base tags' survey, the "
-            "tags' places on the platform or the robot's geometry may be off",
+            f"the swings ask for errors of all poses together of {largest:.1f} standard deviations "
+            f"(more than {UNLIKELY:g} is unlikely): the cameras' calibration, the base tags' "
+            "survey, tags' or markers' places on the platform or the robot's geometry may be off",
         )
 
 

@@ -235,7 +235,7 @@ class Problem:
         for motion, samples in zip(state.motions, self.samples, strict=True):
             total += float(np.sum(residuals(motion, samples, state.scales) ** 2))
             total += float(np.sum(lengths_residual(motion, samples) ** 2))
-            total += float(np.sum(own_prior(motion) ** 2))
+            total += float(np.sum(own_prior(motion, samples) ** 2))
         return total
 
     def loads_of(self, state: State) -> Array:

@@ -12,8 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from freeswing.cdpr.effects import effect_named
-from freeswing.cdpr.measured.slow_errors import SlowErrors
+from freeswing.cdpr.measured.slow_errors import STATED_BY_RUN, SlowErrors
 from freeswing.cdpr.model.batch import evaluate, with_jacobian
+from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.model.free_motion import coordinate_indices
 from freeswing.cdpr.robot import POSE_COORDINATES, Array
 from freeswing.cdpr.rotation import angle_rate_matrix, log_slope, pose_differences
@@ -201,7 +202,7 @@ def reduce_run(
     shared[:, mine] = 0.0
     n_own = own.shape[1]
     together = np.column_stack([own, shared, beside, right + body[:, -1]])
-    known = prior_weight * _own_priors(motion, directions, together.shape[1])
+    known = prior_weight * _own_priors(motion, samples, directions, together.shape[1])
     together = np.vstack([together, known])
     triangle = np.linalg.qr(together, mode="r")
     size = together.shape[1]
@@ -226,24 +227,35 @@ def _triangle(rows: Array) -> Array:
     return np.asarray(np.linalg.qr(np.vstack([*parts, rows[whole:]]), mode="r"))
 
 
-def own_prior(motion: Motion) -> Array:
-    """A run's own effect values over their plausible size, (o,).
+def own_prior(motion: Motion, samples: Samples) -> Array:
+    """A run's own effect values over what is known of them, (o,).
 
     Source:
         Bishop 2006, Pattern Recognition and Machine Learning, sec. 3.3: a Gaussian prior as
         rows.
     """
-    parameters = motion.model.parameters
-    return np.array([motion.values[k] / parameters[k].prior_std for k in motion.model.own_values])
+    return _own_whitener(motion.model, samples) @ motion.values[motion.model.own_values]
 
 
-def _own_priors(motion: Motion, directions: int, columns: int) -> Array:
-    """Rows that keep a run's own effect values within their range, (o, columns)."""
-    places = motion.model.own_values
-    rows = np.zeros((len(places), columns))
-    for row, k in enumerate(places):
-        rows[row, directions + row] = 1.0 / motion.model.parameters[k].prior_std
-    rows[:, -1] = own_prior(motion)
+def _own_whitener(model: Model, samples: Samples) -> Array:
+    """Turns a run's own effect values into independent ones of unit deviation, (o, o).
+
+    A frame that is said to be known as a run states it is known so where the run does.
+    """
+    places = model.own_values
+    known = np.diag([model.parameters[k].prior_std ** 2 for k in places])
+    frame = [i for i, k in enumerate(places) if model.parameters[k].source == STATED_BY_RUN]
+    if frame and samples.slow is not None:
+        known[np.ix_(frame, frame)] = samples.slow.frame_covariance
+    return np.linalg.inv(np.linalg.cholesky(known))
+
+
+def _own_priors(motion: Motion, samples: Samples, directions: int, columns: int) -> Array:
+    """Rows that keep a run's own effect values near what is known of them, (o, columns)."""
+    count = len(motion.model.own_values)
+    rows = np.zeros((count, columns))
+    rows[:, directions : directions + count] = _own_whitener(motion.model, samples)
+    rows[:, -1] = own_prior(motion, samples)
     return rows
 
 

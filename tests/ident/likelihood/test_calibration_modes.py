@@ -103,7 +103,7 @@ def test_a_calibration_that_must_be_far_off_is_said(estimates) -> None:
     """Base tags surveyed 2 mm off: twenty standard deviations."""
     found = runs(np.array([20.0, 0, 0, 0, 0, 0, 0]), seed=8, duration_s=2.0)
     told, _ = ml_estimate(paper_model(), prepared(found), None, TRUE_INERTIA)
-    assert any("standard deviations of their calibration" in note for note in told.notes), told
+    assert any("errors of all poses together" in note for note in told.notes), told
 
 
 def test_without_known_errors_nothing_changes(estimates) -> None:
