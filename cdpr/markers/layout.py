@@ -186,7 +186,7 @@ def _scale(changes: Array, scale_m: float, noise_m: float) -> float:
     Source:
         Lange, Little, Taylor 1989, Robust statistical modeling using the t distribution.
     """
-    known = np.isfinite(changes).all(axis=2)
+    known: Mask = np.asarray(np.isfinite(changes).all(axis=2))
     squares = np.sum(np.where(known[..., None], changes, 0.0) ** 2, axis=2)
     freedom = 3 * known.sum() - 6 * known.any(axis=1).sum() - 3 * known.any(axis=0).sum() + 6
     if freedom < 6:

@@ -172,7 +172,7 @@ def test_one_layout_for_all_runs_and_a_frame_as_uncertain_as_the_markers_move():
         for seed in range(12)
     ]
     layout, runs = fit([m[0] for m in made], true)
-    assert layout.run_std_m == pytest.approx(spread, rel=0.2)
+    assert layout.run_std_m == pytest.approx(spread, rel=0.35)
     for run, (_, R, t) in zip(runs, made, strict=True):
         error = pose_error(run, R, t)
         body = np.concatenate(
