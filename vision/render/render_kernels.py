@@ -16,6 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Samples = NDArray[np.float32]
+_At = tuple[int, int, int]  # the first sample's row and column, samples to a pixel's side
 
 
 def gathering_weights(psf_px: float, subpixels: int) -> NDArray[np.float32]:
@@ -88,6 +90,17 @@ class _Place(NamedTuple):
     foot_r: float
 
 
+class _Slopes(NamedTuple):
+    """How the place changes to the next column (u) and row (v), and the depth w in parts of it."""
+
+    cu: float
+    cv: float
+    ru: float
+    rv: float
+    wu: float
+    wv: float
+
+
 @numba.njit(cache=True, nogil=True, forceinline=True)
 def _ray_of(rays: Array, column: int, row: int) -> _Ray:
     """The ray of a pixel, continued beyond the image's edge."""
@@ -96,61 +109,80 @@ def _ray_of(rays: Array, column: int, row: int) -> _Ray:
     v0, v1 = max(v - 1, 0), min(v + 1, height - 1)
     u = min(max(column, 0), width - 1)
     u0, u1 = max(u - 1, 0), min(u + 1, width - 1)
-    xu = (rays[v, u1, 0] - rays[v, u0, 0]) / (u1 - u0)
-    yu = (rays[v, u1, 1] - rays[v, u0, 1]) / (u1 - u0)
-    xv = (rays[v1, u, 0] - rays[v0, u, 0]) / (v1 - v0)
-    yv = (rays[v1, u, 1] - rays[v0, u, 1]) / (v1 - v0)
+    across, down = 1.0 / (u1 - u0), 1.0 / (v1 - v0)
+    xu = (rays[v, u1, 0] - rays[v, u0, 0]) * across
+    yu = (rays[v, u1, 1] - rays[v, u0, 1]) * across
+    xv = (rays[v1, u, 0] - rays[v0, u, 0]) * down
+    yv = (rays[v1, u, 1] - rays[v0, u, 1]) * down
     x = rays[v, u, 0] + (column - u) * xu + (row - v) * xv
     y = rays[v, u, 1] + (column - u) * yu + (row - v) * yv
     return _Ray(x, y, xu, yu, xv, yv)
 
 
 @numba.njit(cache=True, nogil=True, forceinline=True)
-def _place_of(h: Array, ray: _Ray, depth: float) -> _Place:
+def _place_of(h: Array, ray: _Ray, depth: float) -> tuple[_Place, _Slopes]:
     """Where a ray of that depth meets the cells, by the map h (3, 3)."""
     x, y, xu, yu, xv, yv = ray
-    c = (h[0, 0] * x + h[0, 1] * y + h[0, 2]) / depth
-    r = (h[1, 0] * x + h[1, 1] * y + h[1, 2]) / depth
-    cx, cy = (h[0, 0] - c * h[2, 0]) / depth, (h[0, 1] - c * h[2, 1]) / depth
-    rx, ry = (h[1, 0] - r * h[2, 0]) / depth, (h[1, 1] - r * h[2, 1]) / depth
-    foot_c = abs(cx * xu + cy * yu) + abs(cx * xv + cy * yv)
-    foot_r = abs(rx * xu + ry * yu) + abs(rx * xv + ry * yv)
-    return _Place(c, r, foot_c, foot_r)
+    nearer = 1.0 / depth
+    c = (h[0, 0] * x + h[0, 1] * y + h[0, 2]) * nearer
+    r = (h[1, 0] * x + h[1, 1] * y + h[1, 2]) * nearer
+    cx, cy = (h[0, 0] - c * h[2, 0]) * nearer, (h[0, 1] - c * h[2, 1]) * nearer
+    rx, ry = (h[1, 0] - r * h[2, 0]) * nearer, (h[1, 1] - r * h[2, 1]) * nearer
+    wx, wy = h[2, 0] * nearer, h[2, 1] * nearer
+    cu, cv, ru, rv = cx * xu + cy * yu, cx * xv + cy * yv, rx * xu + ry * yu, rx * xv + ry * yv
+    wu, wv = wx * xu + wy * yu, wx * xv + wy * yv
+    place = _Place(c, r, abs(cu) + abs(cv), abs(ru) + abs(rv))
+    return place, _Slopes(cu, cv, ru, rv, wu, wv)
 
 
 @numba.njit(cache=True, nogil=True, forceinline=True)
 def _cell_of(plane: Plane, place: _Place, subpixels: int) -> tuple[int, int]:
-    """Row and column of the one cell that the whole pixel lies within; (-1, -1): there is none."""
-    last_row, last_column = plane.light.shape[0] - 1, plane.light.shape[1] - 1
+    """Row and column of a cell that all of the pixel looks like; (-1, -1): there is none."""
+    light, cover = plane.light, plane.cover
     c, r, foot_c, foot_r = place
     reach = 0.5 + 0.6 / subpixels
-    k, m = math.floor(c - reach * foot_c), math.floor(r - reach * foot_r)
-    if (
-        math.floor(c + reach * foot_c) == k
-        and math.floor(r + reach * foot_r) == m
-        and 0 <= k < last_column - 1
-        and 0 <= m < last_row - 1
-    ):
-        return m + 1, k + 1
-    return -1, -1
+    k0, k1 = math.floor(c - reach * foot_c), math.floor(c + reach * foot_c)
+    m0, m1 = math.floor(r - reach * foot_r), math.floor(r + reach * foot_r)
+    if k0 < 0 or m0 < 0 or k1 >= light.shape[1] - 2 or m1 >= light.shape[0] - 2:
+        return -1, -1
+    first, covered = light[m0 + 1, k0 + 1], cover[m0 + 1, k0 + 1]
+    for m in range(m0 + 1, m1 + 2):
+        for k in range(k0 + 1, k1 + 2):
+            if light[m, k] != first or cover[m, k] != covered:
+                return -1, -1
+    return m0 + 1, k0 + 1
 
 
 @numba.njit(cache=True, nogil=True, forceinline=True)
-def _sampled(plane: Plane, c: float, r: float, foot_c: float, foot_r: float) -> tuple[float, float]:
-    """Light and coverage about a point, each cell edge a ramp as wide as the sub-pixel's foot."""
+def _sample_pixel(plane: Plane, place: _Place, slopes: _Slopes, out: Samples, at: _At) -> None:
+    """Adds light and coverage of one pixel's samples, each cell edge a ramp as wide as a foot."""
     light, cover = plane.light, plane.cover
     last_row, last_column = light.shape[0] - 1, light.shape[1] - 1
-    k, m = math.floor(c + 0.5), math.floor(r + 0.5)
-    fc = min(max(0.5 + (c - k) / foot_c, 0.0), 1.0)
-    fr = min(max(0.5 + (r - m) / foot_r, 0.0), 1.0)
-    k0, k1 = min(max(k, 0), last_column), min(max(k + 1, 0), last_column)
-    m0, m1 = min(max(m, 0), last_row), min(max(m + 1, 0), last_row)
-    w00, w01 = (1.0 - fr) * (1.0 - fc), (1.0 - fr) * fc
-    w10, w11 = fr * (1.0 - fc), fr * fc
-    return (
-        w00 * light[m0, k0] + w01 * light[m0, k1] + w10 * light[m1, k0] + w11 * light[m1, k1],
-        w00 * cover[m0, k0] + w01 * cover[m0, k1] + w10 * cover[m1, k0] + w11 * cover[m1, k1],
-    )
+    p, q, subpixels = at
+    step = 1.0 / subpixels
+    sharp_c, sharp_r = subpixels / place.foot_c, subpixels / place.foot_r
+    for a in range(subpixels):
+        dv = (a + 0.5) * step - 0.5
+        for b in range(subpixels):
+            du = (b + 0.5) * step - 0.5
+            nearer = du * slopes.wu + dv * slopes.wv
+            scale = 1.0 - nearer + nearer * nearer  # of 1 / (1 + nearer), which is below 1e-3
+            c = place.c + (du * slopes.cu + dv * slopes.cv) * scale
+            r = place.r + (du * slopes.ru + dv * slopes.rv) * scale
+            k, m = math.floor(c + 0.5), math.floor(r + 0.5)
+            fc = min(max(0.5 + (c - k) * sharp_c, 0.0), 1.0)
+            fr = min(max(0.5 + (r - m) * sharp_r, 0.0), 1.0)
+            k0, k1 = min(max(k, 0), last_column), min(max(k + 1, 0), last_column)
+            m0, m1 = min(max(m, 0), last_row), min(max(m + 1, 0), last_row)
+            upper = light[m0, k0] + fc * (light[m0, k1] - light[m0, k0])
+            lower = light[m1, k0] + fc * (light[m1, k1] - light[m1, k0])
+            out[0, p + a, q + b] += upper + fr * (lower - upper)
+            if 0 < k < last_column - 1 and 0 < m < last_row - 1:
+                out[1, p + a, q + b] += 1.0
+                continue
+            upper = cover[m0, k0] + fc * (cover[m0, k1] - cover[m0, k0])
+            lower = cover[m1, k0] + fc * (cover[m1, k1] - cover[m1, k0])
+            out[1, p + a, q + b] += upper + fr * (lower - upper)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -168,7 +200,7 @@ def sample_plane(plane: Plane, rays: Array, buffer: Buffer) -> Buffer:
             depth = h[2, 0] * ray.x + h[2, 1] * ray.y + h[2, 2]
             if not depth > 0.0:
                 continue
-            place = _place_of(h, ray, depth)
+            place, slopes = _place_of(h, ray, depth)
             c, r, foot_c, foot_r = place
             if (
                 c < -foot_c
@@ -178,25 +210,15 @@ def sample_plane(plane: Plane, rays: Array, buffer: Buffer) -> Buffer:
             ):
                 continue
             m, k = _cell_of(plane, place, subpixels)
+            p, q = i * subpixels, j * subpixels
             if m >= 0:
-                p, q = i * subpixels, j * subpixels
-                out[0, p : p + subpixels, q : q + subpixels] += plane.light[m, k]
-                out[1, p : p + subpixels, q : q + subpixels] += plane.cover[m, k]
+                light, cover = np.float32(plane.light[m, k]), np.float32(plane.cover[m, k])
+                for a in range(subpixels):
+                    for b in range(subpixels):
+                        out[0, p + a, q + b] += light
+                        out[1, p + a, q + b] += cover
                 continue
-            foot_c /= subpixels
-            foot_r /= subpixels
-            for a in range(subpixels):
-                dv = (a + 0.5) / subpixels - 0.5
-                for b in range(subpixels):
-                    du = (b + 0.5) / subpixels - 0.5
-                    x = ray.x + du * ray.xu + dv * ray.xv
-                    y = ray.y + du * ray.yu + dv * ray.yv
-                    scale = 1.0 / (h[2, 0] * x + h[2, 1] * y + h[2, 2])
-                    c = (h[0, 0] * x + h[0, 1] * y + h[0, 2]) * scale
-                    r = (h[1, 0] * x + h[1, 1] * y + h[1, 2]) * scale
-                    light, cover = _sampled(plane, c, r, foot_c, foot_r)
-                    out[0, i * subpixels + a, j * subpixels + b] += light
-                    out[1, i * subpixels + a, j * subpixels + b] += cover
+            _sample_pixel(plane, place, slopes, out, (p, q, subpixels))
     return buffer
 
 

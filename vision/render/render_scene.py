@@ -8,15 +8,18 @@ blur widths of the covering edge is a little too bright.
 
 from __future__ import annotations
 
+import math
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from functools import lru_cache
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.calib.camera.camera import Camera
+from freeswing.calib.camera.lens_models import normalise
 from freeswing.vision.render.patterns import Patch, Sphere
 from freeswing.vision.render.render_kernels import (
     Buffer,
@@ -37,6 +40,7 @@ Motion = Callable[[Array], tuple[Array, Array]]
 
 _RIM_POINTS = 9
 _NOISE_FRAMES = 3
+_KEPT_LENSES = 4  # 5 MB each at 640 x 480: a recording's runs are seen through the same ones
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,6 +109,27 @@ def motion_of(trajectory: Trajectory) -> Motion:
     return motion
 
 
+class _Region(NamedTuple):
+    """A part of the image: its first pixel, and how many there are."""
+
+    left: int
+    top: int
+    columns: int
+    rows: int
+
+
+_NOWHERE = _Region(0, 0, 0, 0)
+
+
+class _Sheet(NamedTuple):
+    """What a patch's picture is made of: `Plane.light` and `cover`, its outline (n, 3)."""
+
+    patch: Patch
+    light: Array
+    cover: Array
+    rim_m: Array
+
+
 @dataclass(slots=True)
 class Renderer:
     """One camera's view of a scene; keeps what does not change between frames."""
@@ -117,26 +142,27 @@ class Renderer:
     _weights: NDArray[np.float32] = field(init=False, repr=False)
     _noise: NDArray[np.float32] = field(init=False, repr=False)
     _still: NDArray[np.float32] = field(init=False, repr=False)
+    _sheets: dict[int, _Sheet] = field(init=False, repr=False)
+    _poses: dict[tuple[str, bytes], Array] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         width, height = self.camera.size_px
-        pixels = np.stack(np.meshgrid(np.arange(width), np.arange(height)), axis=-1)
-        self._rays = self.camera.normalise(pixels.astype(float))
+        self._rays = _rays_of(self.camera)
+        self._sheets, self._poses = {}, {}
         self._weights = gathering_weights(self.look.psf_px, self.look.subpixels)
         random = self._random(-1)
         self._noise = random.standard_normal(_NOISE_FRAMES * width * height, dtype=np.float32)
         self._still = self._background(random)
-        for patch in self._by_depth(0.0):
-            if not _changes(patch):
-                self._draw_patch(self._still, patch, 0.0)
+        self._draw(self._still, [one for one in self._by_depth(0.0) if not _changes(one)], 0.0)
 
     def frame(self, stamp_s: float, index: int = 0) -> NDArray[np.uint8]:
         """The image stamped `stamp_s` by the camera's clock, (h, w); `index` picks the noise."""
         image = self._still.copy()
+        self._poses.clear()
         time_s = stamp_s + self.camera.clock_offset_s
-        for patch in self._by_depth(time_s):
-            if _changes(patch) and _is_shown(patch, time_s):
-                self._draw_patch(image, patch, time_s)
+        patches = self._by_depth(time_s)
+        shown = [one for one in patches if _changes(one) and _is_shown(one, time_s)]
+        self._draw(image, shown, time_s)
         for sphere in self.scene.spheres:
             self._draw_sphere(image, sphere, time_s)
         start = int(self._random(index).integers(0, self._noise.size - image.size))
@@ -166,18 +192,21 @@ class Renderer:
         return (self.look.background + 1.5 * self.look.texture * texture).astype(np.float32)
 
     def _by_depth(self, time_s: float) -> list[Patch]:
-        positions, rotations = self.scene.motion(np.array([time_s]))
-        T_base_platform = _pose(positions[0], rotations[0])
-
         def depth(patch: Patch) -> tuple[int, float]:
-            parent = np.eye(4) if patch.parent == "base" else T_base_platform
-            centre = (parent @ patch.T_parent_patch)[:3, 3]
-            return patch.layer, -float(np.linalg.norm(self.camera.to_camera(centre)))
+            parent = self._parents_in_camera(patch.parent, np.array([time_s]))[0]
+            centre = parent @ patch.T_parent_patch[:, 3]
+            return patch.layer, -math.hypot(centre[0], centre[1], centre[2])
 
         return sorted(self.scene.patches, key=depth)
 
     def _parents_in_camera(self, parent: str, times_s: Array) -> Array:
-        """T_camera_parent at each time, (n, 4, 4)."""
+        """T_camera_parent at each time, (n, 4, 4); those of a frame are reckoned once."""
+        known = parent, times_s.tobytes()
+        if known not in self._poses:
+            self._poses[known] = self._reckoned(parent, times_s)
+        return self._poses[known]
+
+    def _reckoned(self, parent: str, times_s: Array) -> Array:
         if parent == "base":
             return np.tile(self.camera.T_camera_base, (len(times_s), 1, 1))
         positions, rotations = self.scene.motion(times_s)
@@ -186,76 +215,113 @@ class Renderer:
         np.matmul(self.camera.T_camera_base, poses.copy(), out=poses)
         return poses
 
-    def _row_times(self, time_s: float, top: int, rows: int, exposure: float) -> Array:
+    def _row_times(self, time_s: float, region: _Region, exposure: float) -> Array:
         if self.camera.line_time_s == 0.0:
             return np.array([time_s + exposure])
-        return time_s + exposure + self.camera.line_time_s * np.arange(top, top + rows, dtype=float)
+        rows = np.arange(region.top, region.top + region.rows, dtype=float)
+        return time_s + exposure + self.camera.line_time_s * rows
 
     def _exposures(self, *, moves: bool) -> list[float]:
         count = self.look.exposure_samples if moves and self.look.exposure_s > 0.0 else 1
         return [self.look.exposure_s * ((k + 0.5) / count - 0.5) for k in range(count)]
 
-    def _region(self, points: Array, time_s: float, parent: str) -> tuple[int, int, int, int]:
-        """Left, top, columns, rows of the buffer that holds points of the parent's frame."""
+    def _regions(self, points: Array, time_s: float, parent: str) -> list[_Region]:
+        """Of each of some bodies, the buffer that holds its points (b, n, 3) of the parent."""
         middle = time_s + self.camera.line_time_s * self.camera.size_px[1] / 2
         spread = self.camera.line_time_s * self.camera.size_px[1] / 2
         reach = self.look.exposure_s / 2 + abs(spread)
-        times = np.unique([middle - reach, middle, middle + reach])
+        times = np.array([middle - reach, middle, middle + reach] if reach > 0.0 else [middle])
         poses = self._parents_in_camera(parent, times)
-        inside = np.einsum("tij,pj->tpi", poses[:, :3, :3], points) + poses[:, None, :3, 3]
-        inside = inside.reshape(-1, 3)
-        if (inside[:, 2] <= 0.0).any():
-            return 0, 0, 0, 0
-        seen = self.camera.sees(inside)
-        if not seen.any():
-            return 0, 0, 0, 0
+        inside = np.einsum("tij,bpj->btpi", poses[:, :3, :3], points) + poses[:, None, :3, 3]
+        inside = inside.reshape(len(points), -1, 3)
+        is_there = (inside[..., 2] > 0.0).all(axis=1) & self.camera.sees(inside).any(axis=1)
         pixels = self.camera.project(inside)
-        pixels = pixels[np.isfinite(pixels).all(axis=1)]
-        margin = len(self._weights) // self.look.subpixels // 2
-        size = np.array(self.camera.size_px)
-        low = np.clip(np.floor(pixels.min(axis=0)) - 2, 0, size).astype(int) - 2 * margin
-        high = np.clip(np.ceil(pixels.max(axis=0)) + 3, 0, size).astype(int) + 2 * margin
-        return int(low[0]), int(low[1]), int(high[0] - low[0]), int(high[1] - low[1])
+        pixels[~np.isfinite(pixels).all(axis=2)] = np.nan
+        size, margin = np.array(self.camera.size_px), 2 * self._margin
+        regions = [_NOWHERE] * len(points)
+        for body in np.flatnonzero(is_there):
+            low = np.clip(np.floor(np.nanmin(pixels[body], axis=0)) - 2, 0, size) - margin
+            high = np.clip(np.ceil(np.nanmax(pixels[body], axis=0)) + 3, 0, size) + margin
+            regions[body] = _Region(*low.astype(int).tolist(), *(high - low).astype(int).tolist())
+        return regions
 
-    def _draw_patch(self, image: NDArray[np.float32], patch: Patch, time_s: float) -> None:
-        left, top, columns, rows = self._region(_rim(patch), time_s, patch.parent)
-        margin = len(self._weights) // self.look.subpixels // 2
-        if columns <= 2 * margin or rows <= 2 * margin:
-            return
+    @property
+    def _margin(self) -> int:
+        """Pixels on either side that the point spread gathers from."""
+        return len(self._weights) // self.look.subpixels // 2
+
+    def _buffer(self, region: _Region) -> Buffer | None:
+        """An empty one; None where nothing is to be seen."""
+        left, top, columns, rows = region
+        if columns <= 2 * self._margin or rows <= 2 * self._margin:
+            return None
         s = self.look.subpixels
-        buffer = Buffer(np.zeros((2, rows * s, columns * s), dtype=np.float32), left, top, s)
-        span = self.look.white - self.look.black
-        light = np.pad(self.look.black + span * patch.cells, 1)
-        cover = np.pad(np.ones(patch.cells.shape), 1)
+        return Buffer(np.zeros((2, rows * s, columns * s), dtype=np.float32), left, top, s)
+
+    def _draw(self, image: NDArray[np.float32], patches: Sequence[Patch], time_s: float) -> None:
+        """Lays patches over the image, the first undermost."""
+        where: dict[int, _Region] = {}
+        for parent in {patch.parent for patch in patches}:
+            some = [patch for patch in patches if patch.parent == parent]
+            rims = np.stack([self._sheet(patch).rim_m for patch in some])
+            where |= zip(map(id, some), self._regions(rims, time_s, parent), strict=True)
+        for patch in patches:
+            self._draw_patch(image, patch, time_s, where[id(patch)])
+
+    def _draw_patch(
+        self, image: NDArray[np.float32], patch: Patch, time_s: float, region: _Region
+    ) -> None:
+        buffer = self._buffer(region)
+        if buffer is None:
+            return
+        sheet = self._sheet(patch)
         exposures = self._exposures(moves=patch.parent == "platform")
         for exposure in exposures:
-            times = self._row_times(time_s, top, rows, exposure)
+            times = self._row_times(time_s, region, exposure)
             poses = self._parents_in_camera(patch.parent, times) @ patch.T_parent_patch
             if (np.einsum("ti,ti->t", poses[:, :3, 2], poses[:, :3, 3]) >= 0.0).any():
                 return
             inverse = _per_row(
-                np.asarray(np.linalg.inv(_cells_to_camera(poses, patch)), float), rows
+                np.asarray(np.linalg.inv(_cells_to_camera(poses, patch)), float), region.rows
             )
-            buffer = sample_plane(Plane(light, cover, inverse), self._rays, buffer)
+            buffer = sample_plane(Plane(sheet.light, sheet.cover, inverse), self._rays, buffer)
         composite(buffer, self._weights, 1.0 / len(exposures), image)
+
+    def _sheet(self, patch: Patch) -> _Sheet:
+        known = self._sheets.get(id(patch))
+        if known is None or known.patch is not patch:
+            span = self.look.white - self.look.black
+            light = np.pad(self.look.black + span * patch.cells, 1)
+            cover = np.pad(np.ones(patch.cells.shape), 1)
+            known = self._sheets[id(patch)] = _Sheet(patch, light, cover, _rim(patch))
+        return known
 
     def _draw_sphere(self, image: NDArray[np.float32], sphere: Sphere, time_s: float) -> None:
         around = sphere.position_m + sphere.diameter_m * 0.75 * np.vstack([np.eye(3), -np.eye(3)])
-        left, top, columns, rows = self._region(around, time_s, sphere.parent)
-        margin = len(self._weights) // self.look.subpixels // 2
-        if columns <= 2 * margin or rows <= 2 * margin:
+        region = self._regions(around[None], time_s, sphere.parent)[0]
+        buffer = self._buffer(region)
+        if buffer is None:
             return
-        s = self.look.subpixels
-        buffer = Buffer(np.zeros((2, rows * s, columns * s), dtype=np.float32), left, top, s)
         span = self.look.white - self.look.black
         grey = self.look.black + span * sphere.reflectance
         exposures = self._exposures(moves=sphere.parent == "platform")
         for exposure in exposures:
-            times = self._row_times(time_s, top, rows, exposure)
+            times = self._row_times(time_s, region, exposure)
             poses = self._parents_in_camera(sphere.parent, times)
-            centres = _per_row(poses[:, :3, :3] @ sphere.position_m + poses[:, :3, 3], rows)
+            centres = _per_row(poses[:, :3, :3] @ sphere.position_m + poses[:, :3, 3], region.rows)
             buffer = sample_sphere(grey, centres, sphere.diameter_m / 2, self._rays, buffer)
         composite(buffer, self._weights, 1.0 / len(exposures), image)
+
+
+def _rays_of(camera: Camera) -> Array:
+    """The undistorted pixels of a camera, (h, w, 2)."""
+    return _rays(camera.model, camera.size_px, tuple(camera.params.tolist()))
+
+
+@lru_cache(maxsize=_KEPT_LENSES)
+def _rays(model: str, size_px: tuple[int, int], params: tuple[float, ...]) -> Array:
+    pixels = np.stack(np.meshgrid(np.arange(size_px[0]), np.arange(size_px[1])), axis=-1)
+    return normalise(model, pixels.astype(float), np.array(params))
 
 
 def _per_row(values: Array, rows: int) -> Array:
@@ -274,12 +340,6 @@ def _is_shown(patch: Patch, time_s: float) -> bool:
 
 def _smooth(fraction: Array) -> Array:
     return fraction * fraction * (3.0 - 2.0 * fraction)
-
-
-def _pose(position: Array, rotation: Array) -> Array:
-    pose = np.eye(4)
-    pose[:3, :3], pose[:3, 3] = rotation, position
-    return pose
 
 
 def _rim(patch: Patch) -> Array:

@@ -45,7 +45,7 @@ def dense_image(view, patch, look, box) -> np.ndarray:
 def rendered(view, patch, look) -> np.ndarray:
     renderer = Renderer(view, Scene((patch,), still()), look)
     image = renderer._still.copy()
-    renderer._draw_patch(image, patch, 0.0)
+    renderer._draw(image, [patch], 0.0)
     return image.astype(float)
 
 
