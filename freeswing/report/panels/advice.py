@@ -6,6 +6,7 @@ from typing import Any
 
 from freeswing import __version__
 from freeswing.report.material import Material
+from freeswing.report.panels.ladder import told_once
 from freeswing.report.words import HALF_WIDTH_95, plain, unit_of
 
 FEWEST_IDENTIFY = 3
@@ -62,8 +63,8 @@ def _effects(material: Material, place: str) -> list[tuple[str, str]]:
         return []
     found = [
         (f"To tell {plain(one.effect)} from its rivals: {one.experiment}", "")
-        for one in diagnosis.candidates
-        if one.verdict == "confounded" and one.experiment
+        for one in told_once(diagnosis.candidates)
+        if one.experiment
     ]
     for effect in diagnosis.accepted:
         found.append(

@@ -9,6 +9,7 @@ import numpy as np
 
 from freeswing.report.body import body_about_com, hanging, principal_rows, tensor_rows
 from freeswing.report.material import Material
+from freeswing.report.panels.ladder import told_once
 from freeswing.report.space import in_space
 from freeswing.report.words import ESTIMATES, parameter_row, plain
 from freeswing.results.common import Parameter
@@ -99,16 +100,10 @@ def verdict(diagnosis: Diagnosis | None) -> list[str]:
     if diagnosis is None:
         return ["Missing effects have not been looked for yet: run freeswing diagnose."]
     accepted = [plain(entry.effect) for entry in diagnosis.accepted]
-    confounded = [one for one in diagnosis.candidates if one.verdict == "confounded"]
     sentences = []
     if accepted:
         sentences.append(f"The model lacked: {', '.join(accepted)}.")
-    told: set[frozenset[str]] = set()
-    for one in confounded:
-        group = frozenset((one.effect, *one.confounded_with))
-        if group in told:
-            continue
-        told.add(group)
+    for one in told_once(diagnosis.candidates):
         rivals = ", ".join(plain(name) for name in one.confounded_with) or "others"
         sentences.append(f"These data cannot tell {plain(one.effect)} from {rivals}.")
     unexplained = diagnosis.unexplained

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, NullFormatter
+from matplotlib.ticker import FuncFormatter, MaxNLocator, NullLocator
 
 from freeswing.report.figures import AFTER, BEFORE, INK, figure
 from freeswing.report.material import Material
@@ -73,8 +73,9 @@ def _chart(runs: list[Decay]) -> object:
             axes.plot(times, _drawn(one.after_m_s), "-", color=AFTER, lw=1.0)
             axes.plot(times, _drawn(one.measured_m_s), "o", color=INK, ms=3)
         axes.set_yscale("log")
+        axes.yaxis.set_major_locator(MaxNLocator(4))  # decades are too far apart for any number
         axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-        axes.yaxis.set_minor_formatter(NullFormatter())
+        axes.yaxis.set_minor_locator(NullLocator())
         axes.set_xlabel("time from the start of the swing (s)")
         axes.set_ylabel("speed (m/s)")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 from matplotlib.figure import Figure
@@ -42,7 +43,7 @@ class EffectLadder:
             "directions": [
                 line for entry in diagnosis.accepted for line in seen_directions(entry.directions)
             ],
-            "rivals": [_rival(one) for one in candidates if one.verdict == "confounded"],
+            "rivals": [_rival(one) for one in told_once(candidates)],
             "rows": _rows(candidates),
             "chart": _chart(candidates),
             "signature": remaining.signature if remaining and remaining.present else "",
@@ -76,10 +77,24 @@ def _gain(entry: Candidate) -> float:
     return float("-inf") if entry.held_out_gain is None else entry.held_out_gain
 
 
+def told_once(candidates: Iterable[Candidate]) -> list[Candidate]:
+    """The confounded ones, of those that are taken for each other the first."""
+    groups: dict[frozenset[str], Candidate] = {}
+    for one in candidates:
+        if one.verdict == "confounded":
+            groups.setdefault(frozenset((one.effect, *one.confounded_with)), one)
+    return list(groups.values())
+
+
 def _rival(entry: Candidate) -> str:
     others = ", ".join(plain(name) for name in entry.confounded_with)
-    tail = f" {entry.experiment}" if entry.experiment else ""
-    return f"{_named(entry)} cannot be told from {others}.{tail}"
+    tail = f" {as_sentence(entry.experiment)}" if entry.experiment else ""
+    return as_sentence(f"{_named(entry)} cannot be told from {others}.{tail}")
+
+
+def as_sentence(text: str) -> str:
+    """With a capital letter at its start."""
+    return text[:1].upper() + text[1:]
 
 
 def _named(one: Candidate | FoundEffect) -> str:

@@ -14,7 +14,9 @@ import pytest
 
 from freeswing.report.material import FILES, RESULTS, Material
 from freeswing.report.page import PANELS, render_page
+from freeswing.report.panels.advice import steps
 from freeswing.report.panels.answer import verdict
+from freeswing.report.panels.ladder import EffectLadder
 from freeswing.report.space import enlargement
 from freeswing.results.diagnosis import Candidate, Diagnosis
 from tests.freeswing.report.report_material import whole_material
@@ -273,3 +275,27 @@ def test_effects_that_replace_each_other_are_told_of_once() -> None:
     said = verdict(Diagnosis(candidates=candidates))
     assert len(said) == 2
     assert all(said[0].count(name) == 1 for name in ("quadratic drag", "translational drag"))
+
+
+def test_rivals_are_sentences_and_told_of_once_below_the_bars_and_in_the_advice() -> None:
+    rivals = [("quadratic_drag", "translational_drag"), ("translational_drag", "quadratic_drag")]
+    candidates = tuple(
+        Candidate(
+            effect=one, verdict="confounded", confounded_with=(other,), experiment="record more"
+        )
+        for one, other in rivals
+    )
+    material = dataclasses.replace(whole_material(), diagnosis=Diagnosis(candidates=candidates))
+    values = EffectLadder().values(material)
+    assert values is not None
+    assert values["rivals"] == [
+        "Quadratic drag cannot be told from translational drag. Record more"
+    ]
+    told = [text for text, _ in steps(material) if "rivals" in text]
+    assert told == ["To tell quadratic drag from its rivals: record more"]
+
+
+def test_speeds_of_swings_that_die_away_stand_beside_their_axis(page: str) -> None:
+    chart = page[page.index("How the swings die away") :]
+    chart = chart[: chart.index("</svg>")]
+    assert re.search(r">0\.[0-9]+</text>", chart), re.findall(r">([^<]+)</text>", chart)
