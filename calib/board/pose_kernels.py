@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from freeswing.calib.camera.lens_kernels import lens_point
 from freeswing.calib.rig.reprojection_kernels import turn_and_jacobian
+from freeswing.cdpr.elimination import eliminate
 
 Array = NDArray[np.float64]
 
@@ -85,10 +86,12 @@ def polish_poses(
         for _ in range(most_steps):
             if not math.isfinite(square):
                 break
-            damped[:] = normal
             for i in range(6):
+                step[i] = slope[i]
+                for j in range(6):
+                    damped[i, j] = normal[i, j]
                 damped[i, i] += damping * normal[i, i] + 1e-9
-            step[:] = np.linalg.solve(damped, slope)
+            eliminate(damped, step.reshape(-1, 1))
             turn_and_jacobian(step[3:], turn, left)
             for i in range(3):
                 trial[i, 3] = poses[v, i, 3] + step[i]
@@ -102,12 +105,17 @@ def polish_poses(
             if new > square:
                 damping *= 10.0
                 continue
-            gain = square - new
-            poses[v] = trial
+            gain, largest = square - new, 0.0
+            for i in range(6):
+                largest = max(largest, abs(step[i]))
+            for i in range(3):
+                for j in range(4):
+                    poses[v, i, j] = trial[i, j]
             square = new
-            normal[:], slope[:] = new_normal, new_slope
+            normal, new_normal = new_normal, normal
+            slope, new_slope = new_slope, slope
             damping *= 0.1
-            if np.abs(step).max() < _SMALL_STEP or gain < _LEAST_GAIN * square:
+            if largest < _SMALL_STEP or gain < _LEAST_GAIN * square:
                 break
         errors[v] = math.sqrt(square)
     return errors

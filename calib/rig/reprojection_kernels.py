@@ -135,8 +135,9 @@ def _carry(view: View, row_px: float, at: _Carried) -> float:
     if math.isfinite(view.lag_s):
         s = (view.lag_s + view.clock[0] + row_px * view.clock[1]) / view.scale_s
     w, m = at.w, at.rate
-    w[:], at.speed[:] = 0.0, 0.0
-    at.t[:], m[:] = T_board[:3, 3], 0.0
+    w[:], at.speed[:], m[:] = 0.0, 0.0, 0.0
+    for i in range(3):  # slices would bring the text of an error about shapes into what is compiled
+        at.t[i] = T_board[i, 3]
     power = 1.0
     for j in range(motion.shape[0]):
         for i in range(3):

@@ -53,7 +53,8 @@ def _whiten(factor: Array, block: Array, spare: Array) -> None:
             if f != 0.0:
                 for c in range(block.shape[1]):
                     spare[c] += f * block[j, c]
-        block[i] = spare
+        for c in range(block.shape[1]):
+            block[i, c] = spare[c]
 
 
 @numba.njit(cache=True, nogil=True, forceinline=True)
@@ -74,8 +75,9 @@ def _weighted(
         if not math.isfinite(views.pixels[v, first // 2, 0]):
             continue
         block = rows[used : used + size]
-        if used != first:
-            block[:] = rows[first : first + size]
+        for i in range(size if used != first else 0):
+            for j in range(rows.shape[1]):
+                block[i, j] = rows[first + i, j]
         _whiten(whitening[group], block, spare)
         square = 0.0
         for i in range(size):
@@ -89,7 +91,9 @@ def _weighted(
             weight *= math.sqrt(knee / error)
         else:
             cost += 0.5 * error * error
-        block *= weight
+        for i in range(size):
+            for j in range(rows.shape[1]):
+                block[i, j] *= weight
         used += size
     return used, cost
 
@@ -152,7 +156,8 @@ def view_equations(
         if wide != rows.shape[1]:
             rows, spare = np.zeros((2 * n_points, wide)), np.zeros(wide)
         view_rows(view_of(views, estimate, v), True, rows, residuals, scratch)
-        rows[:, wide - 1] = residuals
+        for i in range(2 * n_points):
+            rows[i, wide - 1] = residuals[i]
         used, cost = _weighted(views, v, rows, spare, float(sigma[c]), knee, cost)
         if not math.isfinite(cost):
             break

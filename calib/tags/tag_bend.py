@@ -32,6 +32,7 @@ from freeswing.calib.camera.lens_models import FISHEYE, Array, full_parameters
 from freeswing.calib.rig.reprojection import Scene
 from freeswing.calib.rig.views import Views
 from freeswing.calib.tags.corners import rimmed_cells
+from freeswing.cdpr.elimination import eliminate
 from freeswing.cdpr.rotation import log_rotation
 
 
@@ -219,12 +220,13 @@ def _biases(
         for i in range(8):
             for j in range(i):
                 normal[i, j] = normal[j, i]
-        change = np.linalg.solve(normal, right)
+        change = eliminate(normal, right.reshape(-1, 1))
         for k in range(4):
             x, y = (seen[k, 0] - u0) / span, (seen[k, 1] - v0) / span
             for axis in range(2):
                 _fields(x, y, 1.0 - axis, float(axis), row)
-                result[v, k, axis] = np.dot(row, change)
+                for i in range(8):
+                    result[v, k, axis] += row[i] * change[i, 0]
     return result
 
 

@@ -18,6 +18,9 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from freeswing.cdpr.elimination import eliminate
+from freeswing.vision.fuse.small_rotation import small_rotation
+
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Mask = NDArray[np.bool_]
@@ -138,30 +141,6 @@ class _Spare(NamedTuple):
 
 
 @numba.njit(cache=True, nogil=True)
-def small_rotation(r: Array, out: Array) -> Array:
-    """exp(skew(r)) in `out` (3, 3), which is given back.
-
-    Source:
-        Murray, Li, Sastry 1994, A Mathematical Introduction to Robotic Manipulation, ch. 2,
-        eq. (2.14).
-    """
-    angle2 = r[0] * r[0] + r[1] * r[1] + r[2] * r[2]
-    angle = math.sqrt(angle2)
-    if angle < 1e-6:
-        a, b = 1.0 - angle2 / 6.0, 0.5 - angle2 / 24.0
-    else:
-        a, b = math.sin(angle) / angle, (1.0 - math.cos(angle)) / angle2
-    x, y, z = r[0], r[1], r[2]
-    out[0, 0] = 1.0 - b * (y * y + z * z)
-    out[1, 1] = 1.0 - b * (x * x + z * z)
-    out[2, 2] = 1.0 - b * (x * x + y * y)
-    out[0, 1], out[1, 0] = b * x * y - a * z, b * x * y + a * z
-    out[0, 2], out[2, 0] = b * x * z + a * y, b * x * z - a * y
-    out[1, 2], out[2, 1] = b * y * z - a * x, b * y * z + a * x
-    return out
-
-
-@numba.njit(cache=True, nogil=True)
 def carried_on(
     times_s: Array, rotations: Array, positions: Array, time_s: float
 ) -> tuple[Array, Array]:
@@ -178,7 +157,7 @@ def carried_on(
         for j in range(n):
             if j != k:
                 weight *= (time_s - times_s[j]) / (times_s[k] - times_s[j])
-        turn[:] = rotations[k] @ rotations[n - 1].T
+        turn = rotations[k] @ rotations[n - 1].T
         x, y, z = turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]
         sine = 0.5 * math.sqrt(x * x + y * y + z * z)
         cosine = 0.5 * (turn[0, 0] + turn[1, 1] + turn[2, 2] - 1.0)
@@ -300,6 +279,17 @@ def _equations(
     return normal, right, scores
 
 
+@numba.njit(cache=True, nogil=True, forceinline=True)
+def _balanced(normal: Array) -> Array:
+    """A normal matrix whose diagonal is made one."""
+    balanced = normal.copy()
+    for i in range(len(normal)):
+        for j in range(len(normal)):
+            scale = math.sqrt(normal[i, i]) + 1e-300
+            balanced[i, j] /= scale * (math.sqrt(normal[j, j]) + 1e-300)
+    return balanced
+
+
 @numba.njit(cache=True, nogil=True)
 def solve_instant(
     seen: Seen,
@@ -324,19 +314,25 @@ def solve_instant(
         bound = limit * 100.0 if iteration == 0 else limit
         pose = MovingPose(rotation, position, start.motion)
         normal, right, scores = _equations(seen, whitening, k, pose, bound, free, spare)
-        scale = np.sqrt(np.diag(normal)) + 1e-300
-        balanced = normal / np.outer(scale, scale)
-        condition = float(np.linalg.eigvalsh(balanced)[0])
+        condition = float(np.linalg.eigvalsh(_balanced(normal))[0])
         if not condition > 1e-9:
             return SolvedPose(rotation, position, covariance, scores, 0.0)
-        step[:free] = np.linalg.solve(normal, right)
-        position += step[:3]
-        largest = np.abs(step[:free]).max()
+        largest = 0.0
+        for i in range(free):
+            step[i] = right[i]
+        eliminate(normal.copy(), step[:free].reshape(-1, 1))
+        for i in range(free):
+            largest = max(largest, abs(step[i]))
+        for i in range(3):
+            position[i] += step[i]
         if free == 6:
-            rotation[:] = small_rotation(step[3:], turn) @ rotation
+            rotation = small_rotation(step[3:], turn) @ rotation
         if largest < 1e-8 and iteration > 1:
             break
-    covariance[:free, :free] = np.linalg.inv(normal)
+    inverse = eliminate(normal, np.eye(free))
+    for i in range(free):
+        for j in range(free):
+            covariance[i, j] = inverse[i, j]
     return SolvedPose(rotation, position, covariance, scores, condition)
 
 
@@ -362,11 +358,18 @@ def solve_block(
             continue
         pose = MovingPose(start.rotations[k], start.positions[k], start.motions[k])
         one = solve_instant(seen, whitening, k, pose, free, limit, np.int64(MOST_PASSES))
-        found.scores[first:last] = one.scores
+        # Not by slices, which bring the text of an error about shapes into what is compiled.
+        for o in range(first, last):
+            found.scores[o] = one.scores[o - first]
         if one.condition > 0.0:
             found.known[k] = True
-            found.rotations[k], found.positions[k] = one.rotation, one.position
-            found.covariances[k] = one.covariance
+            for i in range(3):
+                found.positions[k, i] = one.position[i]
+                for j in range(3):
+                    found.rotations[k, i, j] = one.rotation[i, j]
+            for i in range(6):
+                for j in range(6):
+                    found.covariances[k, i, j] = one.covariance[i, j]
     return found
 
 

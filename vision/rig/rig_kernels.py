@@ -13,6 +13,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from freeswing.cdpr.elimination import eliminate
 from freeswing.vision.fuse.pose_kernels import Linear
 
 Array = NDArray[np.float64]
@@ -125,7 +126,7 @@ def _eliminate(pose: _PoseEquations, rig: RigEquations) -> None:
     unknowns = len(rig.right)
     for a in range(6):
         pose.normal[a, a] += 1e-12 * pose.normal[a, a] + 1e-12
-    eliminated = np.linalg.solve(pose.normal, pose.cross)
+    eliminated = eliminate(pose.normal, pose.cross.copy())
     for a in range(unknowns):
         for b in range(unknowns):
             total = 0.0
