@@ -23,7 +23,7 @@ from freeswing.demo.rig import (
 )
 from freeswing.demo.truth import EFFECT_VALUES, Swing, demo_robot, demo_swings
 
-DURATION_S = 5.4
+DURATION_S = 4.6
 CUT_S = 0.2  # nothing is filmed this close to the ends of the simulated motion
 FILMED = ("swing-01", "swing-02", "swing-03", "check-01")
 
@@ -40,8 +40,7 @@ def write_filmed_session(
     The same seed gives the same files. `truth.json` holds what no file declares.
     """
     generator = np.random.default_rng(seed)
-    swings = demo_swings(generator, DURATION_S, effect_values)
-    swings = tuple(swing for swing in swings if swing.name in filmed)
+    swings = demo_swings(generator, DURATION_S, effect_values, filmed)
     shots = board_shots(folder / "calibration", seed)
     for swing in swings:
         shots += swing_shots(folder / "runs" / swing.name, swing, CUT_S, seed)

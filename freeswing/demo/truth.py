@@ -70,14 +70,20 @@ def demo_swings(
     generator: np.random.Generator,
     duration_s: float,
     effect_values: tuple[float, float] = EFFECT_VALUES,
+    names: tuple[str, ...] | None = None,
 ) -> tuple[Swing, ...]:
-    """The swings, each released at rest beside an equilibrium of its own."""
+    """The swings of those names (all: None), each released at rest beside its own equilibrium.
+
+    Which ones are asked for does not change them.
+    """
     model = build_model(demo_robot(), (EFFECT,))
     values = np.array(effect_values)
     swings = []
     for name, role, lengths in SWINGS:
         rest = rest_at_lengths(model, np.array(lengths), TRUE_INERTIA, values, generator)
         zeta = release(model, rest, TRUE_INERTIA, values, SWING_AMPLITUDE_M, generator)
+        if names is not None and name not in names:
+            continue
         span = (0.0, duration_s)
         motion = simulate(model, zeta, np.zeros(6), span, TRUE_INERTIA, values)
         swings.append(Swing(name, role, rest.lengths_m, motion))

@@ -39,7 +39,7 @@ EXTRAS = {
     "arviz": "to_arviz() in Python",
 }
 READ = ("h264", "hevc", "mjpeg", "vp9", "av1", "ffv1")  # what phones and cameras write
-WRITTEN = ("libx264", "ffv1")  # overlays and the demonstration
+WRITTEN = ("libx264", "ffv1", "magicyuv")  # overlays, recordings, the demonstration
 # A tracked run of a minute by three cameras takes 0.6 GB, and two run side by side.
 COMFORTABLE_GB = 2.0
 

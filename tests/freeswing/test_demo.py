@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import multiprocessing
+import tempfile
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,8 +12,9 @@ import numpy as np
 import pytest
 
 from freeswing.cdpr.model.equations import build_model
-from freeswing.demo import mocap, truth
+from freeswing.demo import mocap, rehearsal, truth
 from freeswing.demo.lessons import LESSONS
+from freeswing.demo.rehearsal import is_compiled, rehearse
 from freeswing.ident.diagnose.heldout import held_out
 from freeswing.ident.identify import IdentifySettings, identify
 from freeswing.main import main
@@ -57,6 +60,35 @@ def test_a_short_one_by_motion_capture(
     said = capsys.readouterr().out
     check_ending(folder, said)
     assert f"identify: {LESSONS['identify']}" in said
+
+
+def test_which_swings_are_made_does_not_change_them() -> None:
+    """The filmed ones are those of the same seed's seven."""
+    some = truth.demo_swings(np.random.default_rng(1), 0.3, names=("swing-01", "check-01"))
+    every = {one.name: one for one in truth.demo_swings(np.random.default_rng(1), 0.3)}
+    assert [one.name for one in some] == ["swing-01", "check-01"]
+    for one in some:
+        assert np.array_equal(one.motion.zetas, every[one.name].motion.zetas)
+
+
+def test_the_rehearsal_goes_as_far_as_poses(tmp_path: Path) -> None:
+    """What it compiles is what tracking calls: it tracks, with the demonstration's cameras."""
+    assert rehearse(tmp_path)
+    assert is_compiled()
+    tracked = json.loads((tmp_path / "results" / "tracking.json").read_text(encoding="utf-8"))
+    assert tracked["format"] == "freeswing-tracking/1", tracked["format"]
+
+
+def test_a_rehearsal_ends_with_what_it_is_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(rehearsal, "is_compiled", lambda: False)
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    with rehearsal.rehearsed():
+        assert len(multiprocessing.active_children()) == 1
+        assert len(list(tmp_path.iterdir())) == 1
+    assert multiprocessing.active_children() == []
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_every_step_has_its_sentence() -> None:

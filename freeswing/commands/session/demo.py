@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 
 from freeswing.commands.arguments import add_workers, crew_of, whole
@@ -35,12 +36,21 @@ def run(options: Namespace, console: Console) -> None:
     if folder.exists() and not (folder / "truth.json").is_file() and any(folder.iterdir()):
         raise InputError(f"{folder}: holds other files; name a new folder")
     console.say(f"recording a session into {folder} (its truth.json is not read by what follows)")
-    session = read_session(_record(folder, options, console))
-    with crew_of(options, session) as crew:
-        run_session(session, console, crew, lessons=LESSONS)
+    with _compiled_beside(options):
+        session = read_session(_record(folder, options, console))
+        with crew_of(options, session) as crew:
+            run_session(session, console, crew, lessons=LESSONS)
     if options.open:
         open_page(session.results / "report.html", console)
     console.show_file(session.results / "identification.json")
+
+
+def _compiled_beside(options: Namespace) -> AbstractContextManager[None]:
+    if options.mocap:  # compiles little
+        return nullcontext()
+    from freeswing.demo.rehearsal import rehearsed
+
+    return rehearsed()
 
 
 def _record(folder: Path, options: Namespace, console: Console) -> Path:
