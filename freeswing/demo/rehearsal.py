@@ -30,9 +30,10 @@ LASTS_S = 0.8  # 24 frames: more than a motion's polynomial needs, filmed and tr
 
 
 def is_compiled() -> bool:
-    """Whether an earlier run left what tracking needs on the disk."""
-    kept = Path(solve_block.stats.cache_path)
-    return any(kept.glob(f"pose_kernels.{solve_block.py_func.__name__}-*.nbi"))
+    """Whether an earlier run left what tracking needs on the disk, or none can."""
+    kept = solve_block.stats.cache_path
+    pattern = f"pose_kernels.{solve_block.py_func.__name__}-*.nbi"
+    return kept is None or any(Path(kept).glob(pattern))
 
 
 @contextmanager
