@@ -118,11 +118,11 @@ class Text:
         pointer = self._at("%out", place)
         self.lines.append(f"store {self.kind} {value}, ptr {pointer}, align 8")
 
-    def vector_at(self, base: str, place: int) -> str:
+    def vector_at(self, base: str, place: int | str) -> str:
         """A vector of memory on a line of the cache, counted in vectors."""
         return self._new(f"load {self.kind}, ptr {self._at(base, place)}, align {8 * self.lanes}")
 
-    def put_vector(self, value: str, base: str, place: int) -> None:
+    def put_vector(self, value: str, base: str, place: int | str) -> None:
         """Store one there."""
         pointer = self._at(base, place)
         self.lines.append(f"store {self.kind} {value}, ptr {pointer}, align {8 * self.lanes}")
@@ -199,7 +199,7 @@ class Text:
     def _called(self, name: str, values: list[str]) -> str:
         return self._new(f"call double @{name}({', '.join(f'double {v}' for v in values)})")
 
-    def _at(self, base: str, place: int) -> str:
+    def _at(self, base: str, place: int | str) -> str:
         return self._new(f"getelementptr {self.kind}, ptr {base}, i64 {place}")
 
     def _of(self, kind: str) -> str:

@@ -70,8 +70,8 @@ class Instant:
         omega: angular velocity in the base frame, (3,).
         com: P to centre of mass in the base frame, (3,).
         cables: lengths and angles, one a cable.
-        tensions: specific tensions tau / m (n,), without the effects that need them; None for
-            effects that do not.
+        tensions: specific tensions tau / m (n,), without the effects that need them, and for
+            stretch without dry friction; None for effects that need none.
         second_rates: zeta_ddot, (6,); None but for effects on what is measured.
     """
 
@@ -184,6 +184,8 @@ class Effect:
         name: as in files and flags.
         summary: what the robot or the recording then has, as a phrase.
         needs_tension: whether its hooks use `Instant.tensions`.
+        dry: whether its force jumps where a motion turns round: cables stretch by tensions without
+            it.
         stage: "kinematics", "base" (gravity), "drive", "force" or "measurement".
         on_driven: whether robots moved by motors may have it.
         on_free: whether free swings may have it.
@@ -196,6 +198,7 @@ class Effect:
     name: str = ""
     summary: str = ""
     needs_tension: bool = False
+    dry: bool = False
     separated_by: tuple[Experiment, ...] = ()
     stage: str = "force"  # "kinematics", "base" (gravity), "drive", "force" or "measurement"
     on_driven: bool = False

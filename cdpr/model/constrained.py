@@ -208,11 +208,16 @@ def held_motion(robot: Robot, platform: Platform, geometry: Geometry, owned: Own
     tensions of the first: exact to first order in the effect, on the slow motion. What stretch
     leaves of second order would let the lengths run away with time, so that their rates are led
     back to what the stretch allows (EA = 100 kN, 10 s: 16 micrometres instead of 1.2 mm).
+
+    Stretch follows slow tensions: a smoothed jump of dry friction, a micrometre of stretch, would
+    count with its third derivative.
     """
     instant = platform.instant
-    force, moment = applied_wrench(
-        instant, platform.spin, geometry.gravity, platform.inertia, owned
-    )
+
+    def wrench_of(effects: Owned) -> tuple[Expression, Expression]:
+        return applied_wrench(instant, platform.spin, geometry.gravity, platform.inertia, effects)
+
+    force, moment = wrench_of(owned)
     change = length_change(robot, instant, owned, needs_tension=False)
     yielding = platform.yielding()
 
@@ -228,7 +233,11 @@ def held_motion(robot: Robot, platform: Platform, geometry: Geometry, owned: Own
         return Held(*rigid, change[0], change[1])
     loaded = replace(instant, tensions=rigid[1])
     more = effect_wrench(loaded, platform.spin, owned, needs_tension=True)
-    extra = length_change(robot, loaded, owned, needs_tension=True, acceleration=rigid[0])
+    slow = rigid
+    if stretches(owned) and any(effect.dry for effect, _ in owned):
+        slow = solve(*wrench_of([one for one in owned if not one[0].dry]), change[2])
+    stretched = replace(instant, tensions=slow[1])
+    extra = length_change(robot, stretched, owned, needs_tension=True, acceleration=slow[0])
     changes = [before + added for before, added in zip(change, extra, strict=True)]
     demanded = changes[2]
     if stretches(owned):

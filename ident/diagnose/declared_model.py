@@ -14,7 +14,7 @@ from freeswing.ident.diagnose.outstanding_runs import tempered
 from freeswing.ident.diagnose.spectrum import residual_powers
 from freeswing.ident.judge.consistency import is_possible
 from freeswing.ident.likelihood.blocks import first_unknowns, state_of
-from freeswing.ident.likelihood.fit_swings import LikelihoodFit, fit
+from freeswing.ident.likelihood.fit_swings import CONVERGED_DECREASE, LikelihoodFit, fit
 from freeswing.ident.likelihood.session_estimates import astray, begun
 from freeswing.ident.signals.prepare import PreparedRun
 
@@ -24,6 +24,8 @@ Progress = Callable[[str, float], None]
 LEAST_RUNS = 3
 MOST_STARTS = 3
 ROUGH_TOLERANCE = 1.0
+# Two starts that end within a tenth of the deviations have found one valley.
+SAME_FIT = 0.1
 # What an effect leaves is small beside the swings; what a fit in the wrong valley leaves is not.
 SMALL_BESIDE_SWINGS = 0.25
 AT_THE_NOISE = 2.0
@@ -39,7 +41,8 @@ def base_fit(
 ) -> tuple[LikelihoodFit, list[PreparedRun], list[str]]:
     """The fit without effects in units of the noise, the runs in it, and sentences on the others.
 
-    The first start that leads to residuals small beside the swings serves, else the likeliest.
+    The first start that leads to residuals small beside the swings serves, else the likeliest of
+    those tried until two have led to the same fit.
 
     Args:
         model: the declared one.
@@ -65,7 +68,8 @@ def base_fit(
             failure = failure or str(error)
             continue
         found.append((rough, kept, [f"run {one.run} left out: {one.why}" for one in left]))
-        if is_possible(rough.inertia) and _follows(rough, noise_scales):
+        follows = is_possible(rough.inertia) and _follows(rough, noise_scales)
+        if follows or any(_is_same(rough, other) for other, _, _ in found[:-1]):
             break
     if not found:
         raise DataError(f"the declared model could not be fitted to the runs: {failure}")
@@ -73,7 +77,11 @@ def base_fit(
     best = min((one for one in found if len(one[1]) == most), key=lambda one: one[0].deviance)
     rough, kept, dropped = best
     exact, samples = replace(rough.state, scales=noise_scales), tempered(rough, noise_scales)
-    return fit(model, samples, exact, estimate_scales=False, grow=False), kept, dropped
+    # In units of the noise a residual far above it would be followed to its last digit.
+    power = rough.cost / rough.n_samples * float(np.max(rough.scales / noise_scales)) ** 2
+    tolerance = CONVERGED_DECREASE * max(1.0, power)
+    found_exact = fit(model, samples, exact, estimate_scales=False, grow=False, tolerance=tolerance)
+    return found_exact, kept, dropped
 
 
 def refuse_few(runs: list[PreparedRun]) -> None:
@@ -83,6 +91,15 @@ def refuse_few(runs: list[PreparedRun]) -> None:
             f"{len(runs)} usable runs with role identify: at least {LEAST_RUNS} are needed to "
             "decide on runs left out; record more swings about other equilibria"
         )
+
+
+def _is_same(one: LikelihoodFit, other: LikelihoodFit) -> bool:
+    """Whether two starts have led to one fit: a third would too, most likely."""
+    if len(one.samples) != len(other.samples):
+        return False
+    level = abs(one.deviance - other.deviance) < 2.0 * ROUGH_TOLERANCE
+    apart = np.abs(one.inertia - other.inertia)
+    return level and bool(np.all(apart < SAME_FIT * one.std[: len(apart)]))
 
 
 def _follows(found: LikelihoodFit, noise_scales: Array) -> bool:

@@ -29,6 +29,7 @@ from freeswing.ident.diagnose.unexplained import Unexplained, unexplained
 from freeswing.ident.diagnose.variants import effect_of
 from freeswing.ident.fidim.fidim_stage import fidim_estimates
 from freeswing.ident.identify import session_notes
+from freeswing.ident.judge.prediction import Stage
 from freeswing.ident.likelihood.blocks import INERTIA
 from freeswing.ident.likelihood.calibration_modes import with_calibration
 from freeswing.ident.likelihood.fit_swings import LikelihoodFit, fit
@@ -314,17 +315,12 @@ def _ladder(
     """
     stages: list[Refit] = [search.rounds[0].before, *(one.after for one in accepted[:-1])]
     stages += [last] if accepted else []
-    rungs = []
+    if progress:
+        progress("before and after", 0.0)
+    models = [Stage(one.model, one.inertia, one.values) for one in (stage.fit for stage in stages)]
     with search.pool_of() as pool:
-        confronted = [
-            held_out(one.model, runs, free, one.inertia, one.values, pool)
-            for one in (stage.fit for stage in stages)
-        ]
-        for k, (stage, seen) in enumerate(zip(stages, confronted, strict=True)):
-            if progress:
-                progress("before and after", k / len(stages))
-            rungs.append(Rung(claims(stage.effects), seen()))
-    return tuple(rungs)
+        seen = held_out(models, runs, free, pool)
+    return tuple(Rung(claims(one.effects), held) for one, held in zip(stages, seen, strict=True))
 
 
 def _parameters(found: LikelihoodFit, covariance: Array) -> list[dict[str, Any]]:

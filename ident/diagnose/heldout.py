@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
@@ -15,7 +15,7 @@ from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.model.free_motion import free_basis
 from freeswing.cdpr.model.regressor import SwingMotion
 from freeswing.cdpr.robot import POSE_COORDINATES, Array
-from freeswing.ident.judge.prediction import Prediction, predict
+from freeswing.ident.judge.prediction import Prediction, Stage, predict_in_turn
 from freeswing.ident.signals.prepare import PreparedRun
 
 
@@ -98,49 +98,53 @@ def _median(numbers: list[float]) -> float | None:
 
 
 def held_out(
-    model: Model,
+    stages: Sequence[Stage],
     runs: list[PreparedRun],
     free: tuple[str, ...] | None,
-    inertia: Array,
-    values: Array,
     pool: Executor | None = None,
-) -> Callable[[], HeldOut]:
-    """Confront validation runs with a model: begun at once, and waited for where it is called.
+) -> Iterator[HeldOut]:
+    """Confront validation runs with models that grew out of each other: one result a model.
 
     Args:
-        model: with its effects.
+        stages: the models.
         runs: validation runs.
         free: the coordinates measured, or None for full poses.
-        inertia: (9,).
-        values: effect values, (k,).
-        pool: runs side by side; None: one after another, when they are asked for.
+        pool: takes runs side by side; None: one after another.
     """
-    jobs = [(model, run, free, inertia, values) for run in runs]
     calls = [
-        pool.submit(_one, *job).result if pool is not None else partial(_one, *job) for job in jobs
+        pool.submit(_one, stages, run, free).result
+        if pool is not None
+        else partial(_one, stages, run, free)
+        for run in runs
     ]
-    return lambda: HeldOut(tuple(call() for call in calls))
+    by_run = [call() for call in calls]
+    return (HeldOut(under) for under in zip(*by_run, strict=True))
 
 
 def _one(
-    model: Model,
-    run: PreparedRun,
-    free: tuple[str, ...] | None,
-    inertia: Array,
-    values: Array,
+    stages: Sequence[Stage], run: PreparedRun, free: tuple[str, ...] | None
+) -> tuple[HeldOutRun, ...]:
+    """One run under each of the models."""
+    predictions = predict_in_turn(stages, run, free)
+    return tuple(
+        _confronted(stage, prediction, run, free)
+        for stage, prediction in zip(stages, predictions, strict=True)
+    )
+
+
+def _confronted(
+    stage: Stage, prediction: Prediction | None, run: PreparedRun, free: tuple[str, ...] | None
 ) -> HeldOutRun:
-    try:
-        prediction = predict(model, run, free, inertia, values)
-    except (ValueError, np.linalg.LinAlgError):
-        prediction = None
-    if prediction is not None:
-        values = prediction.values
+    values = stage.values if prediction is None else prediction.values
+    values = stage.model.start_values if values is None else values
     motion = run.full if free is None else run.free
-    sigma = np.nan if motion is None else internal_error(model, motion, inertia, values)
+    sigma = np.nan
+    if motion is not None:
+        sigma = internal_error(stage.model, motion, stage.inertia, values)
     names = POSE_COORDINATES[:3] if free is None else free
     places = [run.signals.coordinates.index(n) for n in names if n in POSE_COORDINATES[:3]]
     floor = float(np.sqrt(np.mean(run.signals.noise_std[places] ** 2)))
-    return HeldOutRun(run.name, sigma, prediction, floor, _offset(model, prediction))
+    return HeldOutRun(run.name, sigma, prediction, floor, _offset(stage.model, prediction))
 
 
 def _offset(model: Model, prediction: Prediction | None) -> tuple[float, float] | None:

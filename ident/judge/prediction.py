@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,6 +19,7 @@ from freeswing.ident.signals.band import independent_numbers
 from freeswing.ident.signals.prepare import PreparedRun
 
 PREDICTED_HZ = 50.0
+_AS_GOOD = 1.1  # times the error under a model before: no reason for another, careful start
 _ASTRAY = 0.05  # residual over motion beyond which a fit deserves a second, careful start
 
 
@@ -81,14 +83,95 @@ def predict(
     Raises:
         ValueError: when the motion cannot be simulated.
     """
-    samples, first = started(model, run, free, inertia)
+    return _told(_fitted_to(Stage(model, inertia, values), run, free))
+
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """A model with its numbers, to be held against runs.
+
+    Attributes:
+        model: the robot with its effects.
+        inertia: the nine parameters, (9,).
+        values: effect values, (k,); None for those that leave the declared model as it is.
+    """
+
+    model: Model
+    inertia: Array
+    values: Array | None
+
+
+def predict_in_turn(
+    stages: Sequence[Stage], run: PreparedRun, free: tuple[str, ...] | None
+) -> tuple[Prediction | None, ...]:
+    """Predictions of a run by models that grew out of each other, as `predict` makes them.
+
+    Each begins where the one before it ended, which is nearer than any guess; None where one
+    cannot be simulated.
+    """
+    found: list[Prediction | None] = []
+    before = None
+    for stage in stages:
+        try:
+            before = _fitted_to(stage, run, free, before)
+        except (ValueError, np.linalg.LinAlgError):
+            before = None
+        found.append(None if before is None else _told(before))
+    return tuple(found)
+
+
+def _fitted_to(
+    stage: Stage,
+    run: PreparedRun,
+    free: tuple[str, ...] | None,
+    before: LikelihoodFit | None = None,
+) -> LikelihoodFit:
+    """A run's own unknowns under a model, from where they were under another or from a guess."""
+    model = stage.model
+    if before is not None:
+        samples = before.samples[0]
+        unknowns = first_unknowns(model, stage.inertia, [samples.payload], stage.values)
+        state = _carried(state_of(unknowns, model, before.state.starts, np.ones(2)), model, before)
+        found = _near(model, samples, state, _AS_GOOD * _error(before))
+        if found is not None:
+            return _weighed(found)
+    samples, first = started(model, run, free, stage.inertia)
     samples = _thinned(samples)
-    unknowns = first_unknowns(model, inertia, [samples.payload], values)
-    state = state_of(unknowns, model, first[None], np.ones(2))
-    found = _weighed(_followed(model, samples, state))
-    seen = _seen(found)
+    unknowns = first_unknowns(model, stage.inertia, [samples.payload], stage.values)
+    return _weighed(_followed(model, samples, state_of(unknowns, model, first[None], np.ones(2))))
+
+
+def _carried(state: State, model: Model, before: LikelihoodFit) -> State:
+    """A state with what the run had for itself before, by name."""
+    known = dict(zip(before.model.names, before.motions[0].values, strict=True))
+    own = np.zeros((1, 0)) if state.own_values is None else state.own_values.copy()
+    for place, k in enumerate(model.own_values):
+        own[0, place] = known.get(model.names[k], own[0, place])
+    return replace(state, own_values=own)
+
+
+def _near(model: Model, samples: Samples, state: State, error: float) -> LikelihoodFit | None:
+    """The fit from a start that is near already; None where it turns out not to be.
+
+    Args:
+        model: with the state's values.
+        samples: of the run.
+        state: where to start.
+        error: that of the fit that the start is from, or a little more: what is no worse is no
+            more astray than that was.
+    """
+    try:
+        found = _fitted(model, samples, state, grow=False)
+    except (ValueError, np.linalg.LinAlgError):
+        return None
+    good = not _is_astray(found) or _error(found) <= error
+    return found if found.stop.converged and good else None
+
+
+def _told(found: LikelihoodFit) -> Prediction:
+    samples, seen = found.samples[0], _seen(found)
     return Prediction(
-        run.name,
+        samples.name,
         frozen_array(samples.times_s, samples.times_s.shape, "times"),
         samples.coordinates,
         frozen_array(samples.values, samples.values.shape, "measured"),
@@ -118,12 +201,22 @@ def _followed(model: Model, samples: Samples, state: State) -> LikelihoodFit:
         quick = _fitted(model, samples, state, grow=False)
     except (ValueError, np.linalg.LinAlgError):
         return _fitted(model, samples, state, grow=True)
-    spread = np.sqrt(np.mean((samples.values - samples.values.mean(axis=0)) ** 2))
-    error = np.sqrt(np.mean((_seen(quick) - samples.values) ** 2))
-    if quick.stop.converged and error <= _ASTRAY * spread:
+    if quick.stop.converged and not _is_astray(quick):
         return quick
     careful = _fitted(model, samples, state, grow=True)
     return min(quick, careful, key=lambda one: one.deviance)
+
+
+def _is_astray(found: LikelihoodFit) -> bool:
+    """Whether the residuals are not small beside the motion."""
+    values = found.samples[0].values
+    spread = np.sqrt(np.mean((values - values.mean(axis=0)) ** 2))
+    return bool(_error(found) > _ASTRAY * spread)
+
+
+def _error(found: LikelihoodFit) -> float:
+    """Root mean square of what a fit leaves, all coordinates together."""
+    return float(np.sqrt(np.mean((_seen(found) - found.samples[0].values) ** 2)))
 
 
 def _weighed(found: LikelihoodFit) -> LikelihoodFit:

@@ -13,7 +13,7 @@ import numpy as np
 
 from freeswing.cdpr.effects import effect_named
 from freeswing.cdpr.measured.slow_errors import STATED_BY_RUN, SlowErrors
-from freeswing.cdpr.model.batch import evaluate, with_jacobian
+from freeswing.cdpr.model.batch import evaluate, moved_columns, with_jacobian
 from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.model.free_motion import coordinate_indices
 from freeswing.cdpr.robot import POSE_COORDINATES, Array
@@ -274,15 +274,18 @@ def _sample_rows(linear: Linearised, samples: Samples, maps: Array) -> Array:
     if not _changes_measurement(motion):
         return maps @ linear.poses_at(samples.times_s)
     zetas, rates, _ = motion.at(samples.times_s)
-    function = with_jacobian(motion.model.measured, (1, 2, 3, 4))
+    function, columns = moved_columns(motion.model.measured, (1, 2, 3, 4))
     arguments = (samples.times_s, zetas, rates, motion.inertia, motion.values)
-    slopes = maps @ evaluate(function, *arguments)[1]
-    if slopes[:, :, 6:STATE].any():
+    slopes = maps @ evaluate(function, *arguments)[0]
+    by_state = np.zeros((*maps.shape[:2], STATE))
+    states = [k for k in columns if k < STATE]
+    by_state[..., states] = slopes[..., : len(states)]
+    if states and states[-1] >= 6:
         change, change_rates = linear.at(samples.times_s)
-        found = slopes[:, :, :6] @ change + slopes[:, :, 6:STATE] @ change_rates
+        found = by_state[..., :6] @ change + by_state[..., 6:] @ change_rates
     else:
-        found = slopes[:, :, :6] @ linear.poses_at(samples.times_s)
-    found[:, :, STATE:] += slopes[:, :, STATE:]
+        found = by_state[..., :6] @ linear.poses_at(samples.times_s)
+    found[..., columns[len(states) :]] += slopes[..., len(states) :]
     return found
 
 

@@ -17,6 +17,7 @@ class SwivelFriction(Effect):
     name = "swivel_friction"
     summary = "dry friction in the swivel bearings"
     separated_by = (AMPLITUDES,)
+    dry = True
 
     def parameters(self, robot: Robot) -> tuple[Parameter, ...]:
         """Friction torque over the platform's mass, the same for all pulleys."""

@@ -71,7 +71,7 @@ def test_blocks_of_any_length_are_whole(count: int) -> None:
 
 
 def test_blocks_fit_the_number_of_points() -> None:
-    assert [lanes_for(count) for count in (2, 12, 16, 24, 64, 336)] == [16, 16, 16, 32, 64, 64]
+    assert [lanes_for(count) for count in (2, 12, 16, 24, 64, 336)] == [16, 16, 16, 16, 64, 64]
     assert all(lanes_for(count) in SIZES for count in range(1, 400))
 
 
