@@ -280,12 +280,12 @@ def _sample_rows(linear: Linearised, samples: Samples, maps: Array) -> Array:
     by_state = np.zeros((*maps.shape[:2], STATE))
     states = [k for k in columns if k < STATE]
     by_state[..., states] = slopes[..., : len(states)]
-    if states and states[-1] >= 6:
+    if by_state[..., 6:].any():
         change, change_rates = linear.at(samples.times_s)
         found = by_state[..., :6] @ change + by_state[..., 6:] @ change_rates
     else:
         found = by_state[..., :6] @ linear.poses_at(samples.times_s)
-    found[..., columns[len(states) :]] += slopes[..., len(states) :]
+    found[..., list(columns[len(states) :])] += slopes[..., len(states) :]
     return found
 
 
