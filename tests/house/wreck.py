@@ -316,6 +316,12 @@ HELD = (
     ),
     Held("vision/fuse/fuse_cameras.py", ("LEAST_FLOOR_PX", "_REJECT"), FUSE),
     Held("vision/fuse/calibration_share.py", ("_LEFT_OUT",), FUSE),
+    Held("vision/fuse/noise.py", ("ALIKE", "SURE_SIGMAS"), "tests/vision/fuse/test_noise.py"),
+    Held(
+        "vision/fuse/poses.py",
+        ("MOST_DEVIATIONS", "MOST_GROWTH"),
+        "tests/vision/fuse/test_noise.py",
+    ),
     Held(
         "vision/rig/gross_faults.py",
         (

@@ -21,8 +21,9 @@ from freeswing.calib.verdict.calibration_result import read_camera_covariance
 from freeswing.cdpr.files.documents import InputError
 from freeswing.cdpr.measured.pose_errors import PoseErrors, error_terms, fitted_terms
 from freeswing.vision.fuse.blocks import blocks
-from freeswing.vision.fuse.fuse_cameras import Fit, free_of, whitened
+from freeswing.vision.fuse.fuse_cameras import Fit, free_of
 from freeswing.vision.fuse.linearised_block import linearised
+from freeswing.vision.fuse.noise import Noise, whitened
 from freeswing.vision.fuse.poses import Poses
 from freeswing.vision.fuse.run_views import Block, CameraViews
 from freeswing.vision.look.watched_target import Watch
@@ -97,7 +98,6 @@ def run_share(
     if not len(known):
         return None
     chosen = known[:: max(1, len(known) // _INSTANTS_A_RUN)]
-    focal = np.array([v.camera.focal_px.mean() for v in views])
     roots = np.zeros((0, 0)) if noise is None else noise.roots()
     found = []
     for block in blocks(views, watch, poses.times_s, poses):
@@ -105,9 +105,7 @@ def run_share(
             break
         mine = chosen[(chosen >= block.first) & (chosen < block.first + len(block.starts) - 1)]
         if len(mine):
-            slopes = _pose_slopes(
-                block, poses, views, fit.floor_px / focal, noise.names, mine, free_of(watch)
-            )
+            slopes = _pose_slopes(block, poses, views, fit.noise, noise.names, mine, free_of(watch))
             found.append(slopes @ roots)
     slopes = np.concatenate(found) if found else np.zeros((len(chosen), 6, 0))
     if doubt is not None:
@@ -157,7 +155,7 @@ def _pose_slopes(
     block: Block,
     poses: Poses,
     views: Sequence[CameraViews],
-    floors: Array,
+    corners: Noise,
     names: tuple[str, ...],
     chosen: Ints,
     free: int,
@@ -165,7 +163,7 @@ def _pose_slopes(
     """Change of the pose by the calibration at the chosen instants, (n, 6, n_names)."""
     linear = linearised(block, views, poses)
     residuals, rates, places = linear.residuals, linear.rates, linear.places
-    white = whitened(block, floors)
+    white = whitened(block, corners, views)
     slopes = np.zeros((len(chosen), 6, len(names)))
     for row, k in enumerate(chosen - block.first):
         normal, cross = np.zeros((free, free)), np.zeros((free, len(names)))

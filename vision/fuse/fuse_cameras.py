@@ -2,34 +2,33 @@
 
 Cameras take their frames at different times, so each corner is compared with the pose carried to
 its own time by the motion, which is taken from the poses themselves and improved with them. What
-the lenses and the calibration leave (beyond pixel noise) is found from the residuals, camera by
-camera, and counts as noise.
+squeezed pictures, lenses and the calibration leave beyond pixel noise is found from the residuals,
+camera by camera, and counts as noise (`vision.fuse.noise`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.vision.fuse.blocks import blocks
 from freeswing.vision.fuse.linearised_block import block_poses, lags, seen_by
+from freeswing.vision.fuse.noise import Noise, NoiseSums, whitened
 from freeswing.vision.fuse.pose_kernels import Linear, Solved, linearise_block, solve_block
 from freeswing.vision.fuse.poses import Poses, motion_of_poses, unknown_poses
 from freeswing.vision.fuse.run_views import Block, CameraViews
-from freeswing.vision.look.single_pose import whitening
 from freeswing.vision.look.watched_target import Watch
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-START_FLOOR_PX = 0.15
 LEAST_FLOOR_PX = 0.002  # no lens is known better
 _ROBUST_LIMIT = 9.0
 _REJECT = 16.0  # mean square: four deviations in all numbers of a sighting
-_MOTION_PASSES = 3
+_MOTION_PASSES = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,12 +36,13 @@ class Fit:
     """How the sightings agree with the poses, per camera.
 
     Attributes:
-        floor_px: what calibration and lens leave beyond pixel noise, (n_c,).
+        floor_px: what is left beyond pixel noise, a corner's usual one, (n_c,).
         reprojection_px: root mean square residual of the accepted sightings, (n_c,).
         consistency_m: rms distance at which a camera's mean ray passes the joint pose, (n_c,).
         used: sightings accepted, (n_c,).
         rejected: {(camera, thing): (count, first frame, worst px)} of outliers.
         total: sum of the accepted squared whitened residuals, and their number.
+        noise: of the corners, with which the poses were found.
     """
 
     floor_px: Array
@@ -51,17 +51,18 @@ class Fit:
     used: NDArray[np.int64]
     rejected: dict[tuple[int, int], tuple[int, int, float]]
     total: tuple[float, int]
+    noise: Noise
 
 
 def fuse(
     views: Sequence[CameraViews],
     watch: Watch,
     instants_s: Array,
-    floor_px: Array | None = None,
     start: Poses | None = None,
     passes: int = _MOTION_PASSES,
     *,
     rough: bool = False,
+    plain: bool = False,
 ) -> tuple[Poses, Fit]:
     """Poses at the instants from all cameras.
 
@@ -69,34 +70,41 @@ def fuse(
         views: the cameras as they are believed to be, with their sightings.
         watch: what was looked for.
         instants_s: base times sought, (n,).
-        floor_px: noise beyond the pixels' own, (n_c,); found from the residuals when None.
         start: poses of an earlier call at the same instants.
-        passes: solves; each improves the motion and the floor for the next.
+        passes: solves; each improves the motion and the noise for the next. The last takes the
+            noise in its parts.
         rough: leaves the covariances out (0, 6, 6), more than half of what poses take.
+        plain: takes all noise as each corner's own, which what is wrong with a rig cannot pass for.
     """
     n, n_c = len(instants_s), len(views)
-    floors = np.full(n_c, START_FLOOR_PX) if floor_px is None else floor_px
+    noise = Noise.unknown(n_c)
     poses = unknown_poses(instants_s) if start is None else start
-    fit = Fit(floors, np.zeros(n_c), np.zeros(n_c), np.zeros(n_c, np.int64), {}, (0.0, 0))
+    account = _Account(noise)
     for turn in range(passes):
         positions, rotations = poses.positions_m.copy(), poses.rotations.copy()
         known = np.zeros(n, dtype=bool)
         kept = 0 if rough or turn + 1 < passes else n
         covariances = np.full((kept, 6, 6), np.nan)
-        account = _Account(n_c)
+        spreads = [np.zeros((0, 6))]
+        account = _Account(noise)
+        parts = NoiseSums(noise) if not plain and turn + 2 == passes else None
         for block in blocks(views, watch, instants_s, poses):
             span = slice(block.first, block.first + len(block.starts) - 1)
             start_position, start_rotation, can = _starts(
                 block, positions[span], rotations[span], poses.motions[span]
             )
-            noise = floors / np.array([v.camera.focal_px.mean() for v in views])
             begun = block_poses(start_rotation, start_position, can, poses.motions[span])
             seen = seen_by(block, views, lags(block, instants_s[span]))
-            found = solve_block(seen, whitened(block, noise), begun, free_of(watch), _ROBUST_LIMIT)
-            account.add(block, views, found, linearise_block(seen, found.poses(begun.motions)))
+            white = whitened(block, noise, views)
+            found = solve_block(seen, white, begun, free_of(watch), _ROBUST_LIMIT)
+            linear = linearise_block(seen, found.poses(begun.motions))
+            good = account.add(block, views, found, linear)
+            if parts is not None:
+                parts.add(block, views, good, linear, found.covariances)
             if kept:
                 covariances[span] = found.covariances
             can = found.known
+            spreads.append(np.diagonal(found.covariances[can], axis1=1, axis2=2))
             positions[span] = np.where(can[:, None], found.positions, np.nan)
             rotations[span] = np.where(can[:, None, None], found.rotations, np.nan)
             known[span] = can
@@ -106,12 +114,19 @@ def fuse(
             rotations,
             covariances,
             known,
-            motion_of_poses(instants_s, positions, rotations, known),
+            motion_of_poses(instants_s, positions, rotations, known, _usual(spreads)),
         )
-        fit = account.fit(floors)
-        if floor_px is None:
-            floors = account.floors()
-    return poses, fit
+        noise = Noise.plain(account.floors())
+        if parts is not None:
+            noise = replace(noise, turned_px=parts.turned_px())
+    return poses, account.fit()
+
+
+def _usual(variances: Sequence[Array]) -> Array | None:
+    """The poses' usual deviations, (6,), None where none is known in all six."""
+    found = np.concatenate(variances)
+    found = found[(found > 0.0).all(axis=1)]
+    return np.sqrt(np.median(found, axis=0)) if len(found) else None
 
 
 def free_of(watch: Watch) -> int:
@@ -140,28 +155,12 @@ def _starts(
     return position, rotation, can
 
 
-def whitened(block: Block, noise: Array) -> Array:
-    """Whitening of each sighting with the camera's floor (in rays) added, (n_o, 8, 8).
-
-    Source:
-        Golub, Van Loan 2013, Matrix Computations, sec. 4.2: the Cholesky factor.
-    """
-    if not len(block.things):
-        return np.zeros((0, 8, 8))
-    covariances = block.covariances.copy()
-    single = block.counts == 1
-    diagonal = np.arange(8)
-    covariances[single[:, None] & (diagonal >= 2), diagonal[None, :].repeat(len(single), 0)[
-        single[:, None] & (diagonal >= 2)
-    ]] = 1.0  # fmt: skip
-    covariances[:, diagonal, diagonal] += (noise[block.camera_of] ** 2)[:, None]
-    return whitening(covariances)
-
-
 class _Account:
     """Sums over the sightings of a pass."""
 
-    def __init__(self, cameras: int) -> None:
+    def __init__(self, noise: Noise) -> None:
+        cameras = len(noise.floor_px)
+        self.used_noise = noise
         self.squares, self.noise = np.zeros(cameras), np.zeros(cameras)
         self.numbers, self.used = np.zeros(cameras), np.zeros(cameras, dtype=np.int64)
         self.misses, self.frames = np.zeros(cameras), np.zeros(cameras)
@@ -175,7 +174,8 @@ class _Account:
         views: Sequence[CameraViews],
         solved: Solved,
         linear: Linear,
-    ) -> None:
+    ) -> Mask:
+        """Takes a block in; which sightings agree with the poses, (n_o,)."""
         scores, residuals = solved.scores, linear.residuals
         known = np.repeat(solved.known, np.diff(block.starts))
         good = known & (scores >= 0.0) & (scores < _REJECT)
@@ -202,6 +202,7 @@ class _Account:
             count, first, worst = self.rejected.get(key, (0, int(block.frames[o]), 0.0))
             size = float(np.sqrt(squares[o] / block.counts[o]))
             self.rejected[key] = (count + 1, min(first, int(block.frames[o])), max(worst, size))
+        return good
 
     def _add_misses(self, block: Block, good: Mask, residuals: Array, places: Array) -> None:
         """How far each frame's mean ray passes the joint pose, in metres at its distance."""
@@ -228,12 +229,13 @@ class _Account:
                 floors[camera] = np.sqrt(max(np.median(excess) / 0.92, LEAST_FLOOR_PX**2))
         return floors
 
-    def fit(self, floors: Array) -> Fit:
+    def fit(self) -> Fit:
         return Fit(
-            floors,
+            self.floors(),
             np.sqrt(self.squares / np.maximum(self.numbers, 1)),
             np.sqrt(self.misses / np.maximum(self.frames, 1)),
             self.used,
             dict(sorted(self.rejected.items())),
             (self.total, self.count),
+            self.used_noise,
         )

@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.vision.fuse.blocks import blocks
-from freeswing.vision.fuse.fuse_cameras import Fit, whitened
+from freeswing.vision.fuse.fuse_cameras import Fit
 from freeswing.vision.fuse.linearised_block import linearised
+from freeswing.vision.fuse.noise import Noise, whitened
 from freeswing.vision.fuse.poses import Poses
 from freeswing.vision.fuse.run_views import Block, CameraViews
 from freeswing.vision.look.watched_target import Watch
@@ -47,9 +48,8 @@ def layout_sums(poses: Poses, fit: Fit, views: Sequence[CameraViews], watch: Wat
     """What one run says about the layout."""
     size = 6 * len(watch.tags)
     normal, right = np.zeros((size, size)), np.zeros(size)
-    noise = fit.floor_px / np.array([v.camera.focal_px.mean() for v in views])
     for block in blocks(views, watch, poses.times_s, poses):
-        _add_block(block, poses, views, watch, noise, normal, right)
+        _add_block(block, poses, views, watch, fit.noise, normal, right)
     return LayoutSums(normal, right)
 
 
@@ -86,7 +86,7 @@ def _add_block(
     poses: Poses,
     views: Sequence[CameraViews],
     watch: Watch,
-    noise: Array,
+    noise: Noise,
     normal: Array,
     right: Array,
 ) -> None:
@@ -94,7 +94,7 @@ def _add_block(
     span = slice(block.first, block.first + count)
     linear = linearised(block, views, poses)
     residuals, jacobians = linear.residuals, linear.jacobians
-    white = whitened(block, noise)
+    white = whitened(block, noise, views)
     chosen = np.flatnonzero(poses.known[span])
     arms = watch.tag_corners_m - watch.tag_corners_m.mean(axis=1, keepdims=True)
     for k in chosen[:: max(1, len(chosen) // _INSTANTS_A_BLOCK)]:

@@ -136,14 +136,14 @@ def correct_rig(
 def _missed(views: Sequence[CameraViews], watch: Watch, survey_std_m: float) -> Missed:
     """What the last camera misses, clocks and line times free."""
     instants, current = instants_of(views), list(views)
-    poses, fit = fuse(current, watch, instants, passes=2, rough=True)
+    poses, fit = fuse(current, watch, instants, passes=2, rough=True, plain=True)
     if int(poses.known.sum()) < _LEAST_KNOWN:
         return Missed(float("inf"), {})
     free = np.zeros((len(views), PER_CAMERA), dtype=bool)
     free[:, LINE] = True
     free[:, CLOCK] = np.arange(len(views)) != _reference(current)
     iterated(current, watch, poses, fit, free, np.zeros_like(free, dtype=float), survey_std_m)
-    poses, fit = fuse(current, watch, instants, start=poses, passes=2, rough=True)
+    poses, fit = fuse(current, watch, instants, start=poses, passes=2, rough=True, plain=True)
     squares = frame_squares_px2(current, watch, poses)
     clocks = [view.camera.clock_offset_s for view in current]
     return Missed(float(fit.floor_px[-1]), squares, clocks[-1] - clocks[0])

@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from freeswing.calib.camera.camera import Camera
 from freeswing.cdpr.rotation import exp_rotation
 from freeswing.vision.fuse.blocks import blocks
-from freeswing.vision.fuse.fuse_cameras import Fit, fuse, whitened
+from freeswing.vision.fuse.fuse_cameras import Fit, fuse
 from freeswing.vision.fuse.linearised_block import linearised
+from freeswing.vision.fuse.noise import whitened
 from freeswing.vision.fuse.poses import Poses
 from freeswing.vision.fuse.run_views import CameraViews
 from freeswing.vision.look.watched_target import Watch
@@ -183,14 +184,13 @@ def rig_step(
     n_c = len(views)
     size = PER_CAMERA * n_c
     sums = RigEquations(np.zeros((size, size)), np.zeros(size))
-    focal = np.array([v.camera.focal_px.mean() for v in views])
     offsets = np.array([v.camera.T_camera_base[:3, 3] for v in views])
     for block in blocks(views, watch, poses.times_s, poses):
         span = slice(block.first, block.first + len(block.starts) - 1)
         known = poses.known[span] & (np.abs(poses.motions[span]).sum(axis=1) > 0.0)
         instant = np.repeat(np.arange(len(known)), np.diff(block.starts))
         linear = linearised(block, views, poses)
-        white = whitened(block, fit.floor_px / focal)
+        white = whitened(block, fit.noise, views)
         scores = (np.einsum("oij,oj->oi", white, linear.residuals) ** 2).sum(axis=1) / (
             2 * block.counts
         )

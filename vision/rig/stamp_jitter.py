@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.vision.fuse.blocks import blocks
-from freeswing.vision.fuse.fuse_cameras import Fit, free_of, whitened
+from freeswing.vision.fuse.fuse_cameras import Fit, free_of
 from freeswing.vision.fuse.linearised_block import linearised
+from freeswing.vision.fuse.noise import whitened
 from freeswing.vision.fuse.poses import Poses
 from freeswing.vision.fuse.run_views import CameraViews
 from freeswing.vision.look.watched_target import Watch
@@ -48,10 +49,9 @@ def stamp_jitter_s(views: Sequence[CameraViews], watch: Watch, poses: Poses, fit
     late, own = np.zeros((n_c, n)), np.zeros((n_c, n))
     cross, whole = np.zeros((n_c, n, size)), np.zeros((n, size, size))
     pull = np.zeros((n, size))
-    focal = np.array([view.camera.focal_px.mean() for view in views])
     for block in blocks(views, watch, poses.times_s, poses):
         linear = linearised(block, views, poses)
-        white = whitened(block, np.minimum(fit.floor_px, _FLOOR_PX) / focal)
+        white = whitened(block, fit.noise.at_most(_FLOOR_PX), views)
         rates = np.einsum("oij,oj->oi", white, linear.rates)
         misses = np.einsum("oij,oj->oi", white, linear.residuals)
         by_pose = white @ linear.jacobians[:, :, :size]

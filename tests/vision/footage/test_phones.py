@@ -48,10 +48,6 @@ def test_two_phones_started_by_hand_are_placed_in_time(phones) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(
-    reason="com y is 2.5 to 4 of its deviations off: errors of a tag's corners are alike in H.264, "
-    "poses are claimed 1.3 to 1.7 times too well about the horizontal axes"
-)
 def test_two_phones_started_by_hand_give_the_centre_of_mass(phones) -> None:
     folder, _, body = phones
     assert main(["identify", str(folder), "--quiet"]) == 0

@@ -10,6 +10,7 @@ import pytest
 from freeswing.cdpr.measured.pose_errors import TERMS, PoseErrors
 from freeswing.vision.fuse.calibration_share import RunShare, common_errors
 from freeswing.vision.fuse.fuse_cameras import _Account
+from freeswing.vision.fuse.noise import Noise
 
 FOCAL = 100.0
 
@@ -23,7 +24,7 @@ def account(scores, miss_px=0.0, noise_px=0.0) -> _Account:
         covariances=np.tile(np.eye(8) * (noise_px / FOCAL) ** 2, (n, 1, 1)),
     )  # fmt: skip
     camera = SimpleNamespace(focal_px=np.array([FOCAL, FOCAL]))
-    made = _Account(1)
+    made = _Account(Noise.unknown(1))
     solved = SimpleNamespace(scores=np.array(scores), known=np.ones(1, bool))
     linear = SimpleNamespace(residuals=np.full((n, 8), miss_px / FOCAL), places=np.ones((n, 4, 3)))
     made.add(block, [SimpleNamespace(camera=camera)], solved, linear)
@@ -33,7 +34,7 @@ def account(scores, miss_px=0.0, noise_px=0.0) -> _Account:
 @pytest.mark.parametrize(("score", "used"), [(14.5, 1), (17.5, 0)])
 def test_a_sighting_far_from_the_others_is_left_out(score, used) -> None:
     """Scores are mean squares of whitened residuals: 16 is four deviations in all eight numbers."""
-    found = account([score]).fit(np.ones(1))
+    found = account([score]).fit()
     assert found.used.tolist() == [used]
     assert len(found.rejected) == 1 - used, found.rejected
 

@@ -13,6 +13,7 @@ from freeswing.calib.camera.camera import Camera
 from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.rotation import exp_rotation, invert
 from freeswing.vision.fuse.fuse_cameras import Fit
+from freeswing.vision.fuse.noise import Noise
 from freeswing.vision.rig.alignment import Missed, _chosen, _needed, deviations_apart
 from freeswing.vision.rig.correct_rig import is_real
 from freeswing.vision.rig.gross_faults import (
@@ -90,7 +91,7 @@ def test_cameras_that_still_do_not_agree(floor_px, lost, refused) -> None:
     views = [SimpleNamespace(camera=VIEW), SimpleNamespace(camera=replace(VIEW, name="cam1"))]
     rejected = {(0, 0): (lost, 0, 9.0)} if lost else {}
     fit = Fit(np.array([floor_px, 0.1]), np.zeros(2), np.zeros(2), np.array([100 - lost, 100]),
-              rejected, (0.0, 1))  # fmt: skip
+              rejected, (0.0, 1), Noise.unknown(2))  # fmt: skip
     with pytest.raises(DataError, match="camera cam0") if refused else nullcontext():
         refuse_disagreement(views, fit)
 
