@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,19 +16,24 @@ from freeswing.vision.fuse.noise import Noise
 FOCAL = 100.0
 
 
+def stub(**attributes: Any) -> Any:
+    """What has these attributes and stands for something that has more."""
+    return SimpleNamespace(**attributes)
+
+
 def account(scores, miss_px=0.0, noise_px=0.0) -> _Account:
     """A pass over one camera's sightings of one tag, all alike but for their scores."""
     n = len(scores)
-    block = SimpleNamespace(
+    block = stub(
         camera_of=np.zeros(n, int), counts=np.full(n, 4), things=np.zeros(n, int),
         frames=np.arange(n), starts=np.array([0, n]),
         covariances=np.tile(np.eye(8) * (noise_px / FOCAL) ** 2, (n, 1, 1)),
     )  # fmt: skip
-    camera = SimpleNamespace(focal_px=np.array([FOCAL, FOCAL]))
+    camera = stub(focal_px=np.array([FOCAL, FOCAL]))
     made = _Account(Noise.unknown(1))
-    solved = SimpleNamespace(scores=np.array(scores), known=np.ones(1, bool))
-    linear = SimpleNamespace(residuals=np.full((n, 8), miss_px / FOCAL), places=np.ones((n, 4, 3)))
-    made.add(block, [SimpleNamespace(camera=camera)], solved, linear)
+    solved = stub(scores=np.array(scores), known=np.ones(1, bool))
+    linear = stub(residuals=np.full((n, 8), miss_px / FOCAL), places=np.ones((n, 4, 3)))
+    made.add(block, [stub(camera=camera)], solved, linear)
     return made
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,7 +22,12 @@ from freeswing.vision.fuse.poses import is_noise, motion_of_poses
 FOCAL, INSTANTS, TAGS = 500.0, 150, 5
 
 
-def sightings(seed: int) -> tuple[SimpleNamespace, list, np.ndarray]:
+def stub(**attributes: Any) -> Any:
+    """What has these attributes and stands for something that has more."""
+    return SimpleNamespace(**attributes)
+
+
+def sightings(seed: int) -> tuple[Any, list, np.ndarray]:
     """Tags of two cameras, a little turned, the corners' pixel noise, and slopes by the pose."""
     rng = np.random.default_rng(seed)
     n = INSTANTS * TAGS
@@ -29,14 +35,14 @@ def sightings(seed: int) -> tuple[SimpleNamespace, list, np.ndarray]:
     angle = rng.uniform(-0.2, 0.2, n)
     turn = np.stack([np.cos(angle), -np.sin(angle), np.sin(angle), np.cos(angle)], axis=1)
     rays = 0.03 * square @ np.swapaxes(turn.reshape(n, 2, 2), 1, 2) + rng.normal(size=(n, 1, 2)) / 9
-    block = SimpleNamespace(
+    block = stub(
         camera_of=np.tile([0, 0, 0, 1, 1], INSTANTS), counts=np.full(n, 4), things=np.zeros(n, int),
         starts=np.arange(0, n + 1, TAGS), rays=rays.reshape(n, 8),
         covariances=np.eye(8) * rng.uniform(0.5, 2.0, n)[:, None, None] * (0.004 / FOCAL) ** 2,
     )  # fmt: skip
     slopes = rng.normal(size=(n, 8, 6))
     slopes[:, :, :2] += 2.0 * np.tile(np.eye(2), (4, 1))
-    views = [SimpleNamespace(camera=SimpleNamespace(focal_px=np.full(2, FOCAL)))] * 2
+    views = [stub(camera=stub(focal_px=np.full(2, FOCAL)))] * 2
     return block, views, slopes
 
 
@@ -60,7 +66,7 @@ def found_turns(floor_px, turned_px, seed=0, weights: Noise | None = None) -> np
         missed = np.einsum("nij,nj->ni", white[mine], errors[mine]).ravel()
         residuals[mine] = errors[mine] - slopes[mine] @ (covariances[k] @ flat.T @ missed)
     sums = NoiseSums(weights)
-    linear = SimpleNamespace(residuals=residuals, jacobians=slopes)
+    linear = stub(residuals=residuals, jacobians=slopes)
     sums.add(block, views, np.ones(n, dtype=bool), linear, covariances)
     return sums.turned_px()
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from contextlib import nullcontext
 from dataclasses import replace
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -28,6 +29,11 @@ from freeswing.vision.rig.pairs import OwnTrack, _candidates, _correlations, _fi
 from freeswing.vision.rig.rig_effects import LEAST_CLOCK_S, LEAST_LINE_S, Finding, was_moved
 from freeswing.vision.rig.untied import is_sure, was_knocked
 from tests.vision.scenes import camera
+
+
+def stub(**attributes: Any) -> Any:
+    """What has these attributes and stands for something that has more."""
+    return SimpleNamespace(**attributes)
 
 
 @pytest.mark.parametrize(("miss_px", "moved"), [(0.39, False), (0.41, True)])
@@ -88,7 +94,7 @@ def test_more_than_a_knock(angle_rad, shift_m, far) -> None:
 )
 def test_cameras_that_still_do_not_agree(floor_px, lost, refused) -> None:
     """Floors in px, and how many of a hundred sightings contradict the other camera's."""
-    views = [SimpleNamespace(camera=VIEW), SimpleNamespace(camera=replace(VIEW, name="cam1"))]
+    views = [stub(camera=VIEW), stub(camera=replace(VIEW, name="cam1"))]
     rejected = {(0, 0): (lost, 0, 9.0)} if lost else {}
     fit = Fit(np.array([floor_px, 0.1]), np.zeros(2), np.zeros(2), np.array([100 - lost, 100]),
               rejected, (0.0, 1), Noise.unknown(2))  # fmt: skip
@@ -133,10 +139,10 @@ def test_one_factor_for_all_distances_is_a_wrong_size(angle_rad, ratios, named) 
 def test_cameras_that_see_the_platform_apart(monkeypatch, known_m, kept) -> None:
     """Free of base tags; three times the pair's own miss of 1 cm is allowed on top of 6 cm."""
     monkeypatch.setattr("freeswing.vision.rig.gross_faults._by_base_tags", lambda *_: [])
-    pair = SimpleNamespace(known_m=known_m, miss_m=0.01, T_first_second=np.eye(4))
-    views = [SimpleNamespace(camera=VIEW), SimpleNamespace(camera=replace(VIEW, name="cam1"))]
+    pair = stub(known_m=known_m, miss_m=0.01, T_first_second=np.eye(4))
+    views = [stub(camera=VIEW), stub(camera=replace(VIEW, name="cam1"))]
     with pytest.raises(DataError, match="one of them moved") if kept else nullcontext():
-        refuse_gross(views, None, {(0, 1): pair})
+        refuse_gross(views, stub(), {(0, 1): pair})
 
 
 @pytest.mark.parametrize(("apart_s", "written"), [(0.9e-3, True), (1.1e-3, False)])
@@ -155,7 +161,7 @@ def test_a_clock_that_is_the_cameras_own(apart_s, written) -> None:
     [(0.0175, 0.01, False), (0.0185, 0.01, True), (0.0335, 0.02, True), (0.0325, 0.02, False)],
 )
 def test_when_a_camera_was_started_apart(at_zero_m, decided_m, needed) -> None:
-    assert _needed(SimpleNamespace(at_zero_m=at_zero_m, decided_m=decided_m)) == needed
+    assert _needed(stub(at_zero_m=at_zero_m, decided_m=decided_m)) == needed
 
 
 def test_starts_are_compared_frame_by_frame() -> None:
@@ -174,8 +180,8 @@ def test_starts_are_compared_frame_by_frame() -> None:
 
 
 def test_a_start_that_ends_where_the_best_does_is_no_rival() -> None:
-    view = SimpleNamespace(camera=VIEW, believed=lambda camera: camera)
-    pair = SimpleNamespace(lag_s=1.0, decided_m=0.01, rivals=[(1.07, 0.011), (2.0, 0.012)])
+    view = stub(camera=VIEW, believed=lambda camera: camera)
+    pair = stub(lag_s=1.0, decided_m=0.01, rivals=[(1.07, 0.011), (2.0, 0.012)])
     ends = iter((1.02, 1.021, 2.0))
 
     def misfit(known, new):
@@ -188,8 +194,8 @@ def test_a_start_that_ends_where_the_best_does_is_no_rival() -> None:
 
 @pytest.mark.parametrize(("miss_m", "tried"), [(0.029, 2), (0.031, 1)])
 def test_other_starts_that_are_tried_in_earnest(miss_m, tried) -> None:
-    view = SimpleNamespace(camera=VIEW, believed=lambda camera: camera)
-    pair = SimpleNamespace(lag_s=1.0, decided_m=0.01, rivals=[(2.0, miss_m)])
+    view = stub(camera=VIEW, believed=lambda camera: camera)
+    pair = stub(lag_s=1.0, decided_m=0.01, rivals=[(2.0, miss_m)])
     asked = []
 
     def misfit(known, new):
