@@ -213,3 +213,21 @@ def invert(T: ArrayLike) -> Array:
 def _matrix(rows: list[list[Array]]) -> Array:
     """Stack scalar fields (...) into matrices (..., len(rows), len(rows[0]))."""
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def nearest_rotation(matrices: Array) -> Array:
+    """The rotation R that maximises trace(R' M) for each matrix M, (..., 3, 3).
+
+    Of points `a` and `b` about their middles, M = b' a gives the R that turns a onto b best; where
+    a mirror image would do better, the least certain direction turns round.
+
+    Source:
+        Kabsch 1976, A solution for the best rotation to relate two sets of vectors.
+    """
+    left, _, right = np.linalg.svd(matrices)
+    turns = left @ right
+    mirrored = np.linalg.det(turns) < 0.0
+    if mirrored.any():
+        left[mirrored, :, 2] *= -1.0
+        turns = left @ right
+    return np.asarray(turns, dtype=np.float64)

@@ -12,6 +12,7 @@ from freeswing.calib.rig.bundle_adjustment import Adjustment, Problem, adjust
 from freeswing.calib.rig.reprojection import Scene, board_residuals, camera_slices, warped
 from freeswing.calib.rig.solve_rig import Rig
 from freeswing.calib.rig.triangulation import triangulate
+from freeswing.cdpr.rotation import nearest_rotation
 
 LEAST_HALF = 4
 _VOLUME_POINTS = 200
@@ -222,9 +223,7 @@ def rigidly_fitted(source: Array, target: Array) -> Array:
         Kabsch 1976, A solution for the best rotation to relate two sets of vectors.
     """
     a, b = source - source.mean(axis=0), target - target.mean(axis=0)
-    left, _, right = np.linalg.svd(a.T @ b)
-    turn = np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
-    return a @ (left @ turn @ right) + target.mean(axis=0)
+    return np.asarray(a @ nearest_rotation(a.T @ b) + target.mean(axis=0))
 
 
 def volume_std_m(result: Adjustment, points: Array) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from freeswing.cdpr.rotation import skew
+from freeswing.cdpr.rotation import nearest_rotation, skew
 
 Array = NDArray[np.float64]
 
@@ -37,10 +37,7 @@ def fit_rigid(
     centre_points = np.einsum("tm,tmi->ti", w, x) / total
     cross = np.einsum("tm,tmi,mj->tij", w, x, layout)
     cross -= total[:, :, None] * centre_points[:, :, None] * centre_layout[:, None, :]
-    U, _, Vt = np.linalg.svd(cross)
-    mirrored = np.linalg.det(U @ Vt) < 0.0
-    U[mirrored, :, 2] *= -1.0
-    R = U @ Vt
+    R = nearest_rotation(cross)
     t = centre_points - np.einsum("tij,tj->ti", R, centre_layout)
     R[~determined], t[~determined] = np.nan, np.nan
     return R, t

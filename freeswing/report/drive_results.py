@@ -8,9 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from freeswing.cdpr.files.documents import load_json
-
-LARGEST_BYTES = 64 * 2**20
-AGAIN = "delete it and run freeswing drive again"
+from freeswing.results.driven.estimates import AGAIN, LARGEST_BYTES, DriveResult, read_drive
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,7 +20,7 @@ class DriveResults:
         motion: `drive_motion.json`, empty where it is not there.
     """
 
-    estimates: Mapping[str, Any]
+    estimates: DriveResult
     motion: Mapping[str, Any]
 
 
@@ -35,7 +33,7 @@ def read_drive_results(results: Path) -> DriveResults | None:
     path, beside = results / "drive.json", results / "drive_motion.json"
     if not path.is_file():
         return None
-    estimates = load_json(path, "freeswing-drive-result/1", LARGEST_BYTES, AGAIN)
+    estimates = read_drive(path, DriveResult)
     motion: dict[str, Any] = {}
     if beside.is_file():
         motion = load_json(beside, "freeswing-drive-motion/1", LARGEST_BYTES, AGAIN)

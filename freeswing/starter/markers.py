@@ -18,6 +18,7 @@ from freeswing.cdpr.markers.from_recording import trajectory_from_markers
 from freeswing.cdpr.measured.target import Marker, Target
 from freeswing.cdpr.measured.trajectory import Trajectory
 from freeswing.cdpr.robot import Array
+from freeswing.cdpr.rotation import nearest_rotation
 from freeswing.ident.signals.free_motions import free_motions
 
 FEWEST = 3
@@ -149,17 +150,10 @@ def _shape(positions_m: Array) -> tuple[Array, float]:
         turns = _turns(centred, shape)
         shape = np.einsum("tij,tnj->ni", turns, centred) / len(centred)
     left = np.einsum("tij,tnj->tni", turns, centred) - shape
-    back = _nearest_rotation(turns.sum(axis=0).T)  # to the axes in which it hangs on average
+    back = nearest_rotation(turns.sum(axis=0).T)  # to the axes in which it hangs on average
     return shape @ back.T, float(np.sqrt(np.mean(left**2)))
 
 
 def _turns(centred: Array, shape: Array) -> Array:
     """The rotation of each sample onto the shape, (n_t, 3, 3)."""
-    return np.stack([_nearest_rotation(shape.T @ one) for one in centred])
-
-
-def _nearest_rotation(matrix: Array) -> Array:
-    """Of a 3 x 3 matrix (Kabsch 1976)."""
-    left, _, right = np.linalg.svd(matrix)
-    sign = np.sign(np.linalg.det(left @ right))
-    return np.asarray(left @ np.diag([1.0, 1.0, sign]) @ right, dtype=np.float64)
+    return np.stack([nearest_rotation(shape.T @ one) for one in centred])

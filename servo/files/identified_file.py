@@ -1,22 +1,31 @@
-"""drive.json as far as robustness needs it: numbers, their covariance, and what stays unknown."""
+"""An identified robot as far as robustness needs it: numbers, covariance, what stays unknown."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+from typing import Protocol
 
 import numpy as np
 
 from freeswing.cdpr.driven.model import DrivenModel
-from freeswing.cdpr.files.documents import load_json
-from freeswing.cdpr.files.problems import InputError
 from freeswing.servo.synthesis.state_space import Array
 
-FORMAT = "freeswing-drive-result/1"
-LARGEST_FILE_BYTES = 64 * 2**20
 # Eigenvalues of a correlation matrix written with 16 digits are negative by rounding alone.
 NEGATIVE = -1e-8
+
+
+class Estimated(Protocol):
+    """One number: its value and deviation (None: not determined), and names held equal to it."""
+
+    @property
+    def name(self) -> str: ...  # noqa: D102
+    @property
+    def value(self) -> float | None: ...  # noqa: D102
+    @property
+    def std(self) -> float | None: ...  # noqa: D102
+    @property
+    def tied(self) -> tuple[str, ...]: ...  # noqa: D102
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,41 +45,36 @@ class Identified:
     unknown: tuple[str, ...]
 
 
-def read_identified(path: Path | str, model: DrivenModel) -> Identified:
-    """Read and check drive.json against the robot that is to be controlled.
+def identified(numbers: Sequence[Estimated], correlation: Array, model: DrivenModel) -> Identified:
+    """The estimate, checked against the robot that is to be controlled.
+
+    Args:
+        numbers: of the joint estimate, (n,).
+        correlation: of them, (n, n).
+        model: the robot.
 
     Raises:
-        InputError: unreadable, of another kind, of another robot, or no covariance.
+        ValueError: of another robot, nothing determined, or no covariance.
+
+    Source:
+        Bishop 2006, Pattern Recognition and Machine Learning, sec. 2.3: a Gaussian's covariance.
     """
-    table = load_json(path, FORMAT, LARGEST_FILE_BYTES, "freeswing drive writes such a file")
-    try:
-        return _read(table["estimates"]["joint"], model)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from error
-    except (KeyError, TypeError, ValueError) as error:
-        raise InputError(f"{path}: estimates.joint: {error!r}") from error
-
-
-def _read(joint: dict[str, Any], model: DrivenModel) -> Identified:
-    entries = joint["parameters"]
-    names = [str(entry["name"]) for entry in entries]
-    strange = [name for name in names if name not in model.names]
+    strange = [one.name for one in numbers if one.name not in model.names]
     if strange:
-        raise InputError(f"{', '.join(strange)}: no numbers of robot {model.robot.name}")
-    known = [k for k, entry in enumerate(entries) if entry["value"] is not None]
+        raise ValueError(f"{', '.join(strange)}: no numbers of robot {model.robot.name}")
+    known = [k for k, one in enumerate(numbers) if one.value is not None]
     if not known:
-        raise InputError("estimates.joint determines nothing")
-    std = np.array([entries[k]["std"] for k in known], dtype=np.float64)
-    whole = np.array(joint["correlation"], dtype=np.float64)
-    if whole.shape != (len(names), len(names)):
-        raise ValueError(f"correlation of shape {whole.shape} for {len(names)} numbers")
-    correlation = whole[np.ix_(known, known)]
-    least = float(np.linalg.eigvalsh(correlation)[0])
+        raise ValueError("nothing is determined")
+    std = np.array([numbers[k].std for k in known], dtype=np.float64)
+    if correlation.shape != (len(numbers), len(numbers)):
+        raise ValueError(f"correlation of shape {correlation.shape} for {len(numbers)} numbers")
+    own = correlation[np.ix_(known, known)]
+    least = float(np.linalg.eigvalsh(own)[0]) if np.isfinite(own).all() else -np.inf
     if not np.isfinite(std).all() or (std < 0.0).any() or least < NEGATIVE:
         raise ValueError("std and correlation make no covariance")
     return Identified(
-        tuple((names[k], *map(str, entries[k].get("tied", ()))) for k in known),
-        np.array([entries[k]["value"] for k in known], dtype=np.float64),
-        correlation * np.outer(std, std),
-        tuple(name for k, name in enumerate(names) if k not in known),
+        tuple((numbers[k].name, *numbers[k].tied) for k in known),
+        np.array([numbers[k].value for k in known], dtype=np.float64),
+        own * np.outer(std, std),
+        tuple(one.name for one in numbers if one.value is None),
     )

@@ -13,6 +13,7 @@ from freeswing.cdpr.rotation import (
     log_slope,
     matrix_from_angles,
     matrix_from_quaternion,
+    nearest_rotation,
     quaternion_from_matrix,
     skew,
     transform,
@@ -142,3 +143,18 @@ def test_slope_of_the_log_is_its_difference_quotient(angle):
     quotient = (moved[:3] - moved[3:]).T / (2.0 * h)
     error = np.abs(log_slope(rotvec) - quotient).max()
     assert error < 1e-8, error
+
+
+def test_the_nearest_rotation_is_scipys() -> None:
+    """Of points turned and disturbed, some so flat that a mirror image would do better."""
+    rng = np.random.default_rng(4)
+    a, turns = rng.normal(size=(40, 6, 3)), Rotation.random(40, rng=rng)
+    a[::2, :, 2] *= 1e-2
+    b = np.einsum("tij,tnj->tni", turns.as_matrix(), a) + 0.2 * rng.normal(size=a.shape)
+    found = nearest_rotation(np.einsum("tni,tnj->tij", b, a))
+    for one, x, y in zip(found, a, b, strict=True):
+        expected = Rotation.align_vectors(y, x)[0].as_matrix()
+        assert np.abs(one - expected).max() < 1e-9
+        np.testing.assert_array_equal(nearest_rotation(y.T @ x).shape, (3, 3))
+    assert np.linalg.det(found) == pytest.approx(1.0)
+    assert min(np.linalg.det(y.T @ x) for x, y in zip(a, b, strict=True)) < 0.0, "a mirror image"

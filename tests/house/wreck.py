@@ -115,7 +115,7 @@ HELD = (
     Held("ident/drive/solver.py", ("MISFIT",), SEARCH),
     Held("ident/drive/diagnose/refit.py", ("LOST",), SEARCH),
     Held("ident/drive/joint.py", ("DYNAMIC_REACH", "KINEMATIC_REACH"), CHOICE),
-    Held("freeswing/results/drive.py", ("LARGEST_SHARE",), CHOICE),
+    Held("freeswing/results/driven/drive.py", ("LARGEST_SHARE",), CHOICE),
     Held("ident/likelihood/calibration_modes.py", ("UNLIKELY",), LIKELIHOOD),
     Held("ident/likelihood/fit_swings.py", ("COLOURED", "LOW_BAND_HZ"), LIKELIHOOD),
     Held("ident/likelihood/payload_runs.py", ("LEAST_SIGNIFICANCE",), LIKELIHOOD),

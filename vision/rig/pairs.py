@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from freeswing.cdpr.rotation import log_rotation
+from freeswing.cdpr.rotation import log_rotation, nearest_rotation, transform
 
 Array = NDArray[np.float64]
 
@@ -198,9 +198,9 @@ def _fitted(first: OwnTrack, second: OwnTrack, lag: float, T_known: Array) -> Fi
     four, own = four[inside], _points(second)[inside]
     weights = _cubic(times[four], at[inside])
     seen = np.einsum("nk,nkpa->npa", weights, _points(first)[four])
-    miss = _misses(rigid(own.reshape(-1, 3), seen.reshape(-1, 3)), own, seen)
+    miss = _misses(_onto(own, seen), own, seen)
     good = miss <= 2.0 * np.median(miss)
-    T = rigid(own[good].reshape(-1, 3), seen[good].reshape(-1, 3))
+    T = _onto(own[good], seen[good])
     known = float(np.median(_misses(T_known, own, seen)))
     return Fitted(lag, float(np.median(_misses(T, own, seen))), known, T)
 
@@ -225,15 +225,13 @@ def _points(track: OwnTrack) -> Array:
     return _LEVERS @ np.swapaxes(track.rotations, 1, 2) + track.positions_m[:, None]
 
 
-def rigid(points: Array, onto: Array) -> Array:
-    """The motion that brings points nearest to others, both (n, 3).
+def _onto(points: Array, aim: Array) -> Array:
+    """The motion that brings points nearest to others, both (n, 7, 3).
 
-    Source:
-        Kabsch 1976, A solution for the best rotation to relate two sets of vectors.
+    Seven points about each instant's platform never lie on a line, none is missing: the rotation of
+    Kabsch 1976 stands without the checks of `cdpr.measured.rigid_fit`.
     """
-    middle, aim = points.mean(axis=0), onto.mean(axis=0)
-    left, _, right = np.linalg.svd((points - middle).T @ (onto - aim))
-    turn = (left @ np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))]) @ right).T
-    T = np.eye(4)
-    T[:3, :3], T[:3, 3] = turn, aim - turn @ middle
-    return T
+    points, aim = points.reshape(-1, 3), aim.reshape(-1, 3)
+    middle, goal = points.mean(axis=0), aim.mean(axis=0)
+    turn = nearest_rotation((points - middle).T @ (aim - goal)).T
+    return transform(turn, goal - turn @ middle)

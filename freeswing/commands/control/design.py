@@ -120,8 +120,8 @@ def _write(folder: Path, found: Controller, is_first: bool) -> ControllerResult:
 
 
 def _cloud(model: DrivenModel, identified: str | None) -> Cloud:
+    from freeswing.results.driven.estimates import read_identified
     from freeswing.servo.design.draws import by_identified, by_table_1
-    from freeswing.servo.files.identified_file import read_identified
 
     if identified is None:
         return by_table_1(model)

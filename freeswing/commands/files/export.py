@@ -67,14 +67,14 @@ def _driven(path: Path, options: Namespace, kind: str, console: Console) -> None
     from freeswing.cdpr.driven.statics import static_pose
     from freeswing.cdpr.files.documents import DataError, InputError, replace_file
     from freeswing.export.driven_mjcf import driven_mjcf
-    from freeswing.results.drive import joint_estimates
+    from freeswing.results.driven.estimates import joint_numbers
     from freeswing.session.drive_session import read_drive_session
 
     if kind != "mjcf":
         raise InputError(f"{path}: a driven robot is exported as --mjcf alone")
     file = read_drive_session(path, options.results)
     found = file.results / "drive.json"
-    values = joint_estimates(found)
+    values = joint_numbers(found)
     if values is None:
         raise DataError(f"{found}: nothing is identified yet; run freeswing drive first")
     model, asked = file.session.model, file.session.asked

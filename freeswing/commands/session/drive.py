@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 from dataclasses import replace
-from math import isnan
+from math import nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +14,7 @@ from freeswing.console import Console
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from freeswing.results.driven.estimates import DriveResult
     from freeswing.session.drive_session import DriveFile
 
 # Residuals of a right model are their noise: counts that stand still make 1.1 of it at most.
@@ -74,7 +75,7 @@ def identify(
     from freeswing.ident.drive.added_effects import with_effects
     from freeswing.ident.drive.identify import identify_drive
     from freeswing.ident.drive.identify_effects import identify_with_effects
-    from freeswing.results.drive import drive_document, drive_motion_document
+    from freeswing.results.driven.drive import drive_document, drive_motion_document
 
     session, held = file.session, ()
     if effects or starts:
@@ -93,11 +94,9 @@ def identify(
         found = identified(session, console.progress)
     except ValueError as error:
         raise DataError(f"{file.path}: {error}") from error
-    document = drive_document(file.name, session, found)
-    if effects:
-        document |= {"effects": list(effects), "held": list(held)}
+    document = drive_document(file.name, session, found, effects, held)
     result = file.results / "drive.json"
-    write_json(result, document)
+    write_json(result, document.to_json())
     write_json(file.results / "drive_motion.json", drive_motion_document(file.name, session, found))
     _say(document, console)
     console.say(str(result))
@@ -137,7 +136,7 @@ def diagnose(path: Path, results: str | None, only: list[str] | None, console: C
     from freeswing.cdpr.effects import driven_catalogue
     from freeswing.cdpr.files.documents import DataError, InputError, write_json
     from freeswing.ident.drive.diagnose.diagnose import diagnose_drive
-    from freeswing.results.drive import drive_diagnosis_document
+    from freeswing.results.driven.drive import drive_diagnosis_document
     from freeswing.session.drive_session import read_drive_session
 
     file, known = read_drive_session(path, results), driven_catalogue()
@@ -201,69 +200,72 @@ def _label(entry: dict[str, Any]) -> str:
     return f"{entry['effect']}.{entry['part']}" if "part" in entry else entry["effect"]
 
 
-def _say(document: dict[str, Any], console: Console) -> None:
-    for entry in document["estimates"]["joint"]["parameters"]:
-        if not entry["identifiable"]:
+def _say(document: DriveResult, console: Console) -> None:
+    for entry in document.estimates.joint.parameters:
+        if not entry.identifiable:
             console.complain(
-                f"{entry['name']} is not determined by these recordings: no run excites it enough"
+                f"{entry.name} is not determined by these recordings: no run excites it enough"
             )
             continue
-        bound = "  on a bound of the search: no estimate" if entry["on_bound"] else ""
-        share = 100.0 * entry["std"] / abs(entry["value"]) if entry["value"] else 0.0
-        console.say(
-            f"  {entry['name']:24} {entry['value']:12.6g}  +- {entry['std']:.2g} "
-            f"({share:.2g} %){bound}"
-        )
-    lost = [e["name"] for e in document["estimates"]["joint"]["parameters"] if e["value"] is None]
+        bound = "  on a bound of the search: no estimate" if entry.on_bound else ""
+        value, std = _number(entry.value), _number(entry.std)
+        share = 100.0 * std / abs(value) if value else 0.0
+        console.say(f"  {entry.name:24} {value:12.6g}  +- {std:.2g} ({share:.2g} %){bound}")
+    lost = [e.name for e in document.estimates.joint.parameters if e.value is None]
     if len(lost) > 1:
         console.complain(
             f"of these {len(lost)} perhaps only combinations are determined (all torque constants "
             "with mass, friction and springs are, for one): take one whose value is known out of "
             "[unknown], or name one motor, as --effect torque_constant.1"
         )
-    for fit in document["fit_percent"]:
-        mean = sum(fit["matlab"]) / len(fit["matlab"])
-        times = document["residual"]["times_noise"][fit["run"]]
+    for fit in document.fit_percent:
+        mean = sum(map(_number, fit.matlab)) / len(fit.matlab)
+        times = _number(document.residual.times_noise[fit.run])
         console.say(
-            f"  {fit['run']} ({fit['role']}): FIT {mean:.2f} %, "
-            f"angles {times:.2f} times their noise"
+            f"  {fit.run} ({fit.role}): FIT {mean:.2f} %, angles {times:.2f} times their noise"
         )
-    for one in document["ramps"]:
-        moved = "never moved" if isnan(one["ramp_N_m"]) else f"{one['ramp_N_m']:.2e} N m"
+    for one in document.ramps:
+        moved = "never moved" if one.ramp_N_m is None else f"{one.ramp_N_m:.2e} N m"
         console.say(
-            f"  ramp {one['run']} (motor {one['motor']}, {one['slope_A_s']:.3g} A/s): {moved}; "
-            f"read of the estimate {one['estimate_on_this_ramp_N_m']:.2e}, off by "
-            f"{one['slope_costs_N_m']:.1e} from its friction {one['estimate_N_m']:.2e}"
+            f"  ramp {one.run} (motor {one.motor}, {_number(one.slope_A_s):.3g} A/s): {moved}; "
+            f"read of the estimate {_number(one.estimate_on_this_ramp_N_m):.2e}, off by "
+            f"{_number(one.slope_costs_N_m):.1e} from its friction "
+            f"{_number(one.estimate_N_m):.2e}"
         )
     _warn(document, console)
 
 
-def _warn(document: dict[str, Any], console: Console) -> None:
+def _number(value: float | None) -> float:
+    """The number, NaN where it is not finite."""
+    return nan if value is None else value
+
+
+def _warn(document: DriveResult, console: Console) -> None:
     """FIT alone passes nothing: what is left over is said."""
-    for entry in document["slack"]:
-        if entry["in_model"]:  # elastic cables go slack by themselves
+    for entry in document.slack:
+        if entry.in_model:  # elastic cables go slack by themselves
             continue
         console.complain(
-            f"run {entry['run']}: cables {', '.join(entry['cables'])} would have had to push at "
-            f"{entry['samples']} samples, first at {entry['from_s']:.3f} s: nothing is fitted to, "
-            "or judged by, what follows in this run"
+            f"run {entry.run}: cables {', '.join(entry.cables)} would have had to push at "
+            f"{entry.samples} samples, first at {_number(entry.from_s):.3f} s: nothing is fitted "
+            "to, or judged by, what follows in this run"
         )
-    for entry in document["saturated"]:
+    for entry in document.saturated:
         console.complain(
-            f"run {entry['run']}: motors {', '.join(entry['motors'])} were asked for more than "
-            f"current_limits_A at {entry['samples']} samples: they are taken to give the limit"
+            f"run {entry.run}: motors {', '.join(entry.motors)} were asked for more than "
+            f"current_limits_A at {entry.samples} samples: they are taken to give the limit"
         )
-    times = document["residual"]["times_noise"]
-    wrong = [f"{run} {value:.1f}" for run, value in times.items() if value > MISFIT]
+    times = document.residual.times_noise
+    wrong = [f"{run} {value:.1f}" for run, value in times.items() if value and value > MISFIT]
     if wrong:
         console.complain(
             f"the angles' residuals are above their noise (times: {', '.join(wrong)}): something "
             "is missing in the model, and the deviations above do not count it; see diagnose"
         )
-    name = "output_error" if "output_error" in document["estimates"] else "joint"
-    apart = document["estimates"][name]["second_start_z"]
+    first = document.estimates.output_error
+    apart = _number((first or document.estimates.joint).second_start_z)
     if apart > 1.0:
-        what = "output error" if name == "output_error" else "the joint estimate"
+        what = "the joint estimate" if first is None else "output error"
         console.complain(
             f"{what} ends {apart:.1f} deviations elsewhere from a second start: another minimum; "
             "do not trust its numbers"

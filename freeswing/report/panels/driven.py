@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,17 +15,26 @@ from freeswing.report.panels.sure import draw_correlation
 from freeswing.report.words import HALF_WIDTH_95, number, parameter_row, plain, unit_of
 from freeswing.results.common import Parameter
 from freeswing.results.diagnosis import Diagnosis
-
-Table = Mapping[str, Any]
+from freeswing.results.driven.estimates import (
+    DriveNumber,
+    DriveResult,
+    Estimates,
+    Joint,
+    Method,
+    OfPublished,
+    RampRead,
+    SaturatedRun,
+    SlackRun,
+)
 
 # Methods in the order in which they are taken, and where each stands in the document.
-METHODS = (
-    ("the paper's (18)", ("kinematic", "equation_18")),
-    ("static poses", ("kinematic",)),
-    ("inverse dynamics", ("inverse_dynamics",)),
-    ("output error", ("output_error",)),
-    ("joint estimate", ("joint",)),
-)
+METHODS: Mapping[str, Callable[[Estimates], Method | OfPublished | Joint | None]] = {
+    "the paper's (18)": lambda told: told.kinematic and told.kinematic.equation_18,
+    "static poses": lambda told: told.kinematic,
+    "inverse dynamics": lambda told: told.inverse_dynamics,
+    "output error": lambda told: told.output_error,
+    "joint estimate": lambda told: told.joint,
+}
 MEANT = "Noise alone leaves 1; above 1.5 something is missing in the model."
 
 
@@ -40,27 +49,27 @@ class DrivenEstimates:
         if material.drive is None:
             return None
         found = material.drive.estimates
-        joint = found["estimates"]["joint"]
+        joint = found.estimates.joint
         diagnosis = material.diagnosis
-        lost = [one["name"] for one in joint["parameters"] if not one["identifiable"]]
+        lost = [one.name for one in joint.parameters if not one.identifiable]
         return {
-            "rows": [_row(one) for one in joint["parameters"]],
+            "rows": [_row(one) for one in joint.parameters],
             "lost": lost,
-            "bounds": [one["name"] for one in joint["parameters"] if one["on_bound"]],
-            "intervals": _intervals(found["estimates"]),
+            "bounds": [one.name for one in joint.parameters if one.on_bound],
+            "intervals": _intervals(found.estimates),
             "changed": _changed(diagnosis),
             "correlation": _correlation(joint),
             "fits": _fits(found),
             "meant": MEANT,
-            "slack": [_slack(one) for one in found["slack"] if not one["in_model"]],
-            "saturated": [_saturated(one) for one in found["saturated"]],
-            "ramps": [_ramp(one) for one in found["ramps"]],
+            "slack": [_slack(one) for one in found.slack if not one.in_model],
+            "saturated": [_saturated(one) for one in found.saturated],
+            "ramps": [_ramp(one) for one in found.ramps],
         }
 
 
-def _row(one: Table) -> dict[str, str]:
+def _row(one: DriveNumber) -> dict[str, str]:
     row = parameter_row(_parameter(one))
-    tied = f" = {', '.join(one['tied'])}" if one.get("tied") else ""
+    tied = f" = {', '.join(one.tied)}" if one.tied else ""
     return {
         "parameter": plain(row["name"]) + tied,
         "value": row["value"],
@@ -71,28 +80,26 @@ def _row(one: Table) -> dict[str, str]:
     }
 
 
-def _remark(one: Table) -> str:
-    if not one["identifiable"]:
+def _remark(one: DriveNumber) -> str:
+    if not one.identifiable:
         return "these recordings do not determine it"
-    return "on a bound of the search: no estimate" if one["on_bound"] else ""
+    return "on a bound of the search: no estimate" if one.on_bound else ""
 
 
-def _parameter(one: Table) -> Parameter:
-    return Parameter(name=str(one["name"]), value=one["value"], std=one["std"])
+def _parameter(one: DriveNumber) -> Parameter:
+    return Parameter(name=one.name, value=one.value, std=one.std)
 
 
-def _intervals(estimates: Table) -> Markup:
+def _intervals(estimates: Estimates) -> Markup:
     """Each parameter by every method, less the joint estimate, in per cent of it."""
-    joint = {one["name"]: one["value"] for one in estimates["joint"]["parameters"]}
-    points: dict[str, list[tuple[int, Table]]] = {name: [] for name, at in joint.items() if at}
-    for place, (_, keys) in enumerate(METHODS):
-        table: Any = estimates
-        for one in keys:
-            table = table.get(one, {})
-        for entry in table.get("parameters", ()):
-            if entry["name"] in points and entry["value"] is not None:
-                points[entry["name"]].append((place, entry))
-    names = [(label, SERIES[k], MARKS[k]) for k, (label, _) in enumerate(METHODS)]
+    joint = {name: at for name, at in estimates.joint.values.items() if at}
+    points: dict[str, list[tuple[int, DriveNumber]]] = {name: [] for name in joint}
+    for place, told in enumerate(METHODS.values()):
+        method = told(estimates)
+        for one in () if method is None else method.parameters:
+            if one.name in points and one.value is not None:
+                points[one.name].append((place, one))
+    names = [(label, SERIES[k], MARKS[k]) for k, label in enumerate(METHODS)]
     draws = [_interval(name, entries, joint[name]) for name, entries in points.items()]
     caption = (
         "Each parameter by each method with its 95 % interval, in per cent off the joint estimate."
@@ -100,12 +107,12 @@ def _intervals(estimates: Table) -> Markup:
     return figures([*draws, key(names)], 1.45, caption) if draws else Markup()
 
 
-def _interval(name: str, entries: Sequence[tuple[int, Table]], middle: float) -> Draw:
+def _interval(name: str, entries: Sequence[tuple[int, DriveNumber]], middle: float) -> Draw:
     def draw(sheet: Figure) -> None:
         axes = sheet.subplots()
-        for place, entry in entries:
-            off = 100.0 * (entry["value"] / middle - 1.0)
-            half = 100.0 * HALF_WIDTH_95 * (entry["std"] or 0.0) / abs(middle)
+        for place, one in entries:
+            off = 100.0 * ((one.value or 0.0) / middle - 1.0)
+            half = 100.0 * HALF_WIDTH_95 * (one.std or 0.0) / abs(middle)
             axes.errorbar(off, -place, xerr=half, color=SERIES[place], marker=MARKS[place], ms=4)
         axes.axvline(0.0, color=INK, lw=0.6)
         interval_axes(axes, f"{plain(unit_of(name)[0])} (%)")
@@ -134,9 +141,9 @@ def _changed(diagnosis: Diagnosis | None) -> list[dict[str, str]]:
     return rows
 
 
-def _correlation(joint: Table) -> Markup:
-    names = [one["name"] for one in joint["parameters"]]
-    rows = np.array(joint["correlation"], dtype=float)
+def _correlation(joint: Joint) -> Markup:
+    names = [one.name for one in joint.parameters]
+    rows = np.array(joint.correlation, dtype=float)
     caption = (
         "Correlations of the joint estimate: two that err together are blue, against each other "
         "orange and hatched."
@@ -144,25 +151,25 @@ def _correlation(joint: Table) -> Markup:
     return figure(lambda sheet: draw_correlation(sheet.subplots(), rows, names), 5.2, 4.8, caption)
 
 
-def _fits(found: Table) -> list[dict[str, str]]:
+def _fits(found: DriveResult) -> list[dict[str, str]]:
     """Table 2: FIT of every run by both definitions, of the declared numbers too."""
-    initial = {one["run"]: one for one in found["initial_fit_percent"]}
-    used = {one["run"]: one for one in found["used"]}
+    initial = {one.run: one for one in found.initial_fit_percent}
+    used = {one.run: one for one in found.used}
     rows = []
-    for one in found["fit_percent"]:
-        name, start = one["run"], initial.get(one["run"])
+    for one in found.fit_percent:
+        name, start = one.run, initial.get(one.run)
         part = used.get(name)
         rows.append(
             {
                 "run": name,
-                "role": str(one["role"])
-                + ("" if part is None or part["whole"] else f", its first {part['seconds']:.2f} s"),
-                "FIT by motor (%)": ", ".join(_percent(value) for value in one["matlab"]),
-                "FIT (%)": _mean(one["matlab"]),
-                "FIT by (22) (%)": _mean(one["equation_22"]),
-                "FIT as declared (%)": "cannot follow" if start is None else _mean(start["matlab"]),
-                "angles off (mrad)": _milli(one["rms_rad"]),
-                "over their noise": number(found["residual"]["times_noise"][name]),
+                "role": one.role
+                + ("" if part is None or part.whole else f", its first {part.seconds:.2f} s"),
+                "FIT by motor (%)": ", ".join(_percent(value) for value in one.matlab),
+                "FIT (%)": _mean(one.matlab),
+                "FIT by (22) (%)": _mean(one.equation_22),
+                "FIT as declared (%)": "cannot follow" if start is None else _mean(start.matlab),
+                "angles off (mrad)": _milli(one.rms_rad),
+                "over their noise": number(found.residual.times_noise[name]),
             }
         )
     return rows
@@ -177,33 +184,33 @@ def _mean(values: Sequence[float | None]) -> str:
     return f"{sum(known) / len(known):.2f}" if known else "–"
 
 
-def _slack(one: Table) -> str:
-    cables = ", ".join(str(name) for name in one["cables"])
+def _slack(one: SlackRun) -> str:
+    cables = ", ".join(one.cables)
     return (
-        f"Run {one['run']}: cables {cables} would have had to push from {one['from_s']:.2f} s on "
-        f"({one['samples']} samples, down to {one['least_tension_N']:.2f} N). Rigid cables are "
+        f"Run {one.run}: cables {cables} would have had to push from {one.from_s:.2f} s on "
+        f"({one.samples} samples, down to {one.least_tension_N:.2f} N). Rigid cables are "
         "wrong after that: nothing is fitted to, or judged by, what follows."
     )
 
 
-def _saturated(one: Table) -> str:
-    motors = ", ".join(str(name) for name in one["motors"])
+def _saturated(one: SaturatedRun) -> str:
+    motors = ", ".join(one.motors)
     return (
-        f"Run {one['run']}: motors {motors} were asked for more than their limits at "
-        f"{one['samples']} samples; they are taken to give the limit."
+        f"Run {one.run}: motors {motors} were asked for more than their limits at "
+        f"{one.samples} samples; they are taken to give the limit."
     )
 
 
-def _ramp(one: Table) -> dict[str, str]:
+def _ramp(one: RampRead) -> dict[str, str]:
     return {
-        "run": str(one["run"]),
-        "motor": str(one["motor"]),
-        "slope (A/s)": number(one["slope_A_s"]),
-        "moved after (ms)": number(None if one["moved_s"] is None else 1e3 * one["moved_s"]),
-        "read off (mN m)": _milli(one["ramp_N_m"]),
-        "the same of the estimate (mN m)": _milli(one["estimate_on_this_ramp_N_m"]),
-        "off by the slope (mN m)": _milli(one["slope_costs_N_m"]),
-        "the motor's own friction (mN m)": _milli(one["estimate_N_m"]),
+        "run": one.run,
+        "motor": one.motor,
+        "slope (A/s)": number(one.slope_A_s),
+        "moved after (ms)": number(None if one.moved_s is None else 1e3 * one.moved_s),
+        "read off (mN m)": _milli(one.ramp_N_m),
+        "the same of the estimate (mN m)": _milli(one.estimate_on_this_ramp_N_m),
+        "off by the slope (mN m)": _milli(one.slope_costs_N_m),
+        "the motor's own friction (mN m)": _milli(one.estimate_N_m),
     }
 
 

@@ -1,4 +1,6 @@
 """A driven robot in MuJoCo, as exported, moves as it does here."""
+# MuJoCo's stubs lack its classes.
+# pyright: reportAttributeAccessIssue=false
 
 import json
 
@@ -66,13 +68,15 @@ def test_export_takes_what_was_identified(tmp_path, capsys):
     entries = [{"name": name, "value": value} for name, value in values.items()]
     (folder / "results").mkdir()
     path = folder / "results" / "drive.json"
-    path.write_text(json.dumps({"estimates": {"joint": {"parameters": entries}}}))
+    estimates = {"joint": {"parameters": entries}}
+    table = {"format": "freeswing-drive-result/1", "estimates": estimates}
+    path.write_text(json.dumps(table))
     assert main(["export", str(folder), "--mjcf", "--quiet"]) == 0
     model = mujoco.MjModel.from_xml_path(str(folder / "results" / "robot.xml"))
     assert np.allclose(model.tendon_frictionloss, 4.4e-3 / 0.0175)
     assert np.allclose(model.tendon_armature, 3.88e-5 / 0.0175**2)
     entries[3]["value"] = None
-    path.write_text(json.dumps({"estimates": {"joint": {"parameters": entries}}}))
+    path.write_text(json.dumps(table))
     assert main(["export", str(folder), "--mjcf"]) == 1
     assert f"has no value of {entries[3]['name']}" in capsys.readouterr().err
     path.write_text("{}")

@@ -7,7 +7,7 @@ import pytest
 
 from freeswing.ident.drive.diagnose import diagnose as module
 from freeswing.ident.drive.joint import Problem
-from freeswing.results.drive import unknown
+from freeswing.results.driven.drive import unknown
 
 
 class Fit(SimpleNamespace):

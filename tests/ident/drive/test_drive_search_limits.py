@@ -220,9 +220,8 @@ def test_at_most_four_motors_hold_an_added_pose(monkeypatch):
 def test_residuals_above_their_noise_are_said(times, told):
     """Counts that stand still make 1.1 of a right model's; a half more is something else."""
     said = []
-    document = {
-        "slack": [], "saturated": [], "residual": {"times_noise": {"a": times}},
-        "estimates": {"joint": {"second_start_z": 0.0}},
-    }  # fmt: skip
+    found = SimpleNamespace(output_error=None, joint=SimpleNamespace(second_start_z=0.0))
+    left = SimpleNamespace(times_noise={"a": times})
+    document = SimpleNamespace(slack=(), saturated=(), residual=left, estimates=found)
     drive_command._warn(document, SimpleNamespace(complain=said.append))
     assert len(said) == told

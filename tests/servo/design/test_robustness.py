@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from freeswing.cdpr.files.problems import InputError
+from freeswing.results.driven.estimates import read_identified
 from freeswing.servo.design.draws import Cloud, by_identified, by_table_1
 from freeswing.servo.design.offer import Order, offer
 from freeswing.servo.design.plant import plant_at
@@ -18,7 +19,6 @@ from freeswing.servo.design.robustness import (
 )
 from freeswing.servo.design.schedule import Schedule, scheduled
 from freeswing.servo.driven_file import read_driven
-from freeswing.servo.files.identified_file import read_identified
 from freeswing.servo.files.task_file import Task, Watch
 from freeswing.servo.files.weights_file import USUAL, Goals
 from freeswing.servo.loop.feasible_path import leaves_workspace

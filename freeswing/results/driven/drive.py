@@ -1,17 +1,14 @@
-"""`drive.json` and a driven robot's `diagnosis.json`: estimates, and what the model lacks."""
+"""Makes `drive.json`, its curves and a driven robot's `diagnosis.json` of what was found."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.cdpr.effects import driven_catalogue
-from freeswing.cdpr.files.documents import InputError
 from freeswing.ident.drive.diagnose.candidates import Candidate
 from freeswing.ident.drive.diagnose.diagnose import DriveDiagnosis, Verdict
 from freeswing.ident.drive.diagnose.refit import Fitted
@@ -20,6 +17,7 @@ from freeswing.ident.drive.joint import Estimate
 from freeswing.ident.drive.kinematics import Kinematics
 from freeswing.ident.drive.ramps import Ramp
 from freeswing.ident.drive.run_problem import DriveRun
+from freeswing.results.driven.estimates import DriveResult
 
 Array = NDArray[np.float64]
 
@@ -34,8 +32,22 @@ MOST_EVIDENCE = 5
 LARGEST_SHARE = 0.3
 
 
-def drive_document(name: str, session: DriveSession, found: DriveIdentification) -> dict[str, Any]:
-    """The document; what the data do not determine has null values."""
+def drive_document(
+    name: str,
+    session: DriveSession,
+    found: DriveIdentification,
+    effects: Sequence[str] = (),
+    held: Sequence[str] = (),
+) -> DriveResult:
+    """The document; what the data do not determine has null values.
+
+    Args:
+        name: of the session.
+        session: as it was asked.
+        found: by all methods.
+        effects: asked for beside the session's own numbers.
+        held: numbers of the file that stay as declared for their sake.
+    """
     estimates: dict[str, Any] = {}
     if found.regression is not None:
         names = session.asked.without_effects.dynamic.names
@@ -56,8 +68,8 @@ def drive_document(name: str, session: DriveSession, found: DriveIdentification)
             **_kinematics(names, found.kinematics),
             "equation_18": _kinematics(names, found.published),
         }
-    return {
-        "format": "freeswing-drive-result/1",
+    table = {
+        "format": DriveResult.format(),
         "session": name,
         "estimates": estimates,
         "fit_percent": [_fit(fit) for fit in found.fits],
@@ -71,6 +83,9 @@ def drive_document(name: str, session: DriveSession, found: DriveIdentification)
             "times_noise": {fit.run.name: times_noise(session, fit) for fit in found.fits},
         },
     }
+    return DriveResult.from_json(
+        table | ({"effects": list(effects), "held": list(held)} if effects else {})
+    )
 
 
 def drive_motion_document(
@@ -142,25 +157,6 @@ def _ramp(session: DriveSession, ramp: Ramp) -> dict[str, Any]:
         "slope_costs_N_m": ramp.slope_costs_N_m,
         "breakaway_s": ramp.breakaway_s,
     }
-
-
-def joint_estimates(path: Path) -> dict[str, float | None] | None:
-    """Values of the joint estimate in a `drive.json`, None where there is no such file.
-
-    Raises:
-        InputError: where it is not one.
-    """
-    try:
-        table = json.loads(path.read_text(encoding="utf-8"))
-        entries = table["estimates"]["joint"]["parameters"]
-        return {entry["name"]: entry["value"] for entry in entries}
-    except FileNotFoundError:
-        return None
-    except (OSError, ValueError, KeyError, TypeError) as failure:
-        raise InputError(
-            f"{path}: not a result of this version ({str(failure)[:200]}); delete it and run "
-            "freeswing drive again"
-        ) from None
 
 
 def times_noise(session: DriveSession, fit: RunFit) -> float:

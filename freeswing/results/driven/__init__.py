@@ -1,0 +1,1 @@
+"""Results of driven robots: what `drive.json` holds, and what makes it and their diagnosis."""
