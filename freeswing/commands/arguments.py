@@ -8,8 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from argparse import _ArgumentGroup
     from contextlib import AbstractContextManager
 
+    from freeswing.cdpr.driven.record import Instruments
     from freeswing.session.session_file import Session
     from freeswing.workers.crew import Crew
 
@@ -152,3 +154,33 @@ def setting(text: str) -> tuple[str, float]:
         return name, float(value)
     except ValueError:
         raise ArgumentTypeError(f"{text!r} is not PARAMETER=VALUE") from None
+
+
+def add_instruments(
+    group: _ArgumentGroup,
+    *,
+    latency_s: float = 0.0,
+    encoder_step_rad: float = 0.0,
+    current_noise_a: float = 0.0,
+) -> None:
+    """How a driven robot is measured; a number whose default is not zero may not be zero."""
+    step = positive if encoder_step_rad else not_negative
+    current = positive if current_noise_a else not_negative
+    group.add_argument("--pose-rate-hz", type=positive, default=200.0, help="default 200")
+    group.add_argument("--latency-s", type=not_negative, default=latency_s, help="of the poses")
+    group.add_argument("--encoder-step-rad", type=step, default=encoder_step_rad)
+    group.add_argument("--current-noise-a", type=current, default=current_noise_a)
+
+
+def instruments_of(options: Namespace) -> Instruments:
+    """What the flags of `add_instruments` and of poses' noise say."""
+    from freeswing.cdpr.driven.record import Instruments
+
+    return Instruments(
+        pose_rate_hz=options.pose_rate_hz,
+        latency_s=options.latency_s,
+        position_std_m=options.noise_m,
+        angle_std_rad=options.noise_rad,
+        encoder_step_rad=options.encoder_step_rad,
+        current_std_A=options.current_noise_a,
+    )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING, Any
 
-from freeswing.commands.arguments import not_negative, positive, whole
+from freeswing.commands.arguments import add_instruments, instruments_of, positive, whole
 from freeswing.console import Console
 
 if TYPE_CHECKING:
@@ -50,12 +50,9 @@ def add_drive_arguments(parser: ArgumentParser) -> None:
     group.add_argument("--margin-n", type=positive, default=0.5, help="to slack, default 0.5")
     group.add_argument("--room", type=positive, default=0.6, help="of the frame, default 0.6")
     group.add_argument("--poses", type=whole, default=8, metavar="N", help="at rest to add (8)")
-    group.add_argument("--encoder-step-rad", type=positive, default=0.001534)
     group.add_argument("--noise-m", type=positive, default=1e-3, help="of a pose, default 1e-3")
     group.add_argument("--noise-rad", type=positive, default=5e-3, help="of a pose, default 5e-3")
-    group.add_argument("--pose-rate-hz", type=positive, default=200.0, help="default 200")
-    group.add_argument("--latency-s", type=not_negative, default=0.0107, help="of the poses")
-    group.add_argument("--current-noise-a", type=positive, default=0.005)
+    add_instruments(group, latency_s=0.0107, encoder_step_rad=0.001534, current_noise_a=0.005)
 
 
 def run_drive(options: Namespace, console: Console) -> None:
@@ -75,7 +72,7 @@ def run_drive(options: Namespace, console: Console) -> None:
     bench, limits = _bench(path, options), Limits(options.margin_n, options.room)
     folder = results_folder(path.parent, options.results)
     try:
-        bench.sizes  # noqa: B018
+        bench.refuse_zero()
     except ValueError as error:
         raise InputError(f"{path}: {error}; leave it out with --unknown") from error
     try:
@@ -107,7 +104,6 @@ def run_drive(options: Namespace, console: Console) -> None:
 
 def _bench(path: Path, options: Namespace) -> Bench:
     from freeswing.cdpr.driven.model import build_driven
-    from freeswing.cdpr.driven.record import Instruments
     from freeswing.cdpr.files.documents import InputError
     from freeswing.cdpr.files.robot_file import read_robot
     from freeswing.ident.drive.plan.deviations import Bench
@@ -115,16 +111,9 @@ def _bench(path: Path, options: Namespace) -> Bench:
     robot = read_robot(path)
     if robot.drive is None:
         raise InputError(f"{path}: has no [drive]: --drive is for driven robots")
-    instruments = Instruments(
-        pose_rate_hz=options.pose_rate_hz,
-        latency_s=options.latency_s,
-        position_std_m=options.noise_m,
-        angle_std_rad=options.noise_rad,
-        encoder_step_rad=options.encoder_step_rad,
-        current_std_A=options.current_noise_a,
-    )
     model = build_driven(robot)
-    return Bench(model, _asked(path, model, options.unknown), instruments, RATE_HZ)
+    asked = _asked(path, model, options.unknown)
+    return Bench(model, asked, instruments_of(options), RATE_HZ)
 
 
 def _asked(path: Path, model: DrivenModel, texts: list[str]) -> Any:

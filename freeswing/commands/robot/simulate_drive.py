@@ -6,7 +6,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from freeswing.commands.arguments import finite, not_negative, positive
+from freeswing.commands.arguments import add_instruments, finite, instruments_of, positive
 from freeswing.console import Console
 
 if TYPE_CHECKING:
@@ -30,23 +30,20 @@ def add_drive_arguments(parser: ArgumentParser) -> None:
     group.add_argument("--band-hz", type=positive, default=1.0, help="of the PRBS, default 1")
     group.add_argument("--motor", help="the cable whose motor the ramp drives")
     group.add_argument("--slope-a-s", type=finite, default=1.0, help="of the ramp, default 1")
-    group.add_argument("--pose-rate-hz", type=positive, default=200.0, help="default 200")
-    group.add_argument("--latency-s", type=not_negative, default=0.0, help="of the poses")
-    group.add_argument("--encoder-step-rad", type=not_negative, default=0.0)
+    add_instruments(group)
     group.add_argument(
         "--elastic-n",
         type=finite,
         metavar="EA",
         help="elastic cables of EA N: slack is exact",
     )
-    group.add_argument("--current-noise-a", type=not_negative, default=0.0)
 
 
 def run_drive(options: Namespace, console: Console) -> None:
     """Start from rest without current, integrate, measure, write."""
     import numpy as np
 
-    from freeswing.cdpr.driven.record import Instruments, observed
+    from freeswing.cdpr.driven.record import observed
     from freeswing.cdpr.driven.statics import CENTRE
     from freeswing.cdpr.files.documents import InputError
     from freeswing.cdpr.files.drive_csv import write_drive_run
@@ -60,15 +57,7 @@ def run_drive(options: Namespace, console: Console) -> None:
     limits = model.drive.current_limits_A
     references = np.clip(asked, limits[:, 0], limits[:, 1])
     motion = _motion(model, theta, references, rate_hz, options.elastic_n)
-    instruments = Instruments(
-        pose_rate_hz=options.pose_rate_hz,
-        latency_s=options.latency_s,
-        position_std_m=options.noise_m,
-        angle_std_rad=options.noise_rad,
-        encoder_step_rad=options.encoder_step_rad,
-        current_std_A=options.current_noise_a,
-    )
-    record = observed(motion, CENTRE, instruments, generator)
+    record = observed(motion, CENTRE, instruments_of(options), generator)
     write_drive_run(result, record, motion.tensions_N)
     slack = [*_said_of_limits(model, asked, references), *_said_of_slack(model, motion)]
     for line in slack:

@@ -52,13 +52,21 @@ class Bench:
         """Declared values of the unknowns, (k,).
 
         Raises:
+            ValueError: see `refuse_zero`.
+        """
+        self.refuse_zero()
+        return np.abs(self.asked.read(self.model, self.model.declared))
+
+    def refuse_zero(self) -> None:
+        """Every unknown has a size.
+
+        Raises:
             ValueError: for one that is declared zero: its deviation has nothing to be compared to.
         """
         values = self.asked.read(self.model, self.model.declared)
         empty = [name for name, value in zip(self.asked.names, values, strict=True) if not value]
         if empty:
             raise ValueError(f"{empty[0]} is declared 0: no deviation is small beside it")
-        return np.abs(values)
 
 
 def moved_by(bench: Bench, references: Array) -> DrivenMotion:
