@@ -1,4 +1,6 @@
 """What the diagnosis of driven robots decides, on both sides of every limit, without any fit."""
+# Stubs stand for what is not looked at.
+# pyright: reportArgumentType=false
 
 from types import SimpleNamespace
 
