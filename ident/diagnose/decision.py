@@ -11,8 +11,8 @@ from freeswing.cdpr.effects import effect_named
 from freeswing.cdpr.robot import Array
 from freeswing.ident.diagnose.leave_one_out import Score
 from freeswing.ident.diagnose.lengths.wrong_places import WrongPlace
-from freeswing.ident.diagnose.model_probabilities import Rival, model_probabilities
-from freeswing.ident.diagnose.refit import Refit, colour_of, plausible
+from freeswing.ident.diagnose.model_probabilities import LeftOut, Rival, model_probabilities
+from freeswing.ident.diagnose.refit import Refit, plausible
 from freeswing.ident.diagnose.screen import value_priors
 from freeswing.ident.diagnose.spectrum import independent_numbers
 from freeswing.ident.diagnose.variants import effect_of, inside, variants
@@ -115,6 +115,7 @@ def promising(
     current: Refit,
     linear: dict[str, Score],
     colour: float,
+    noise_scales: Array,
     tried: Collection[str] = (),
     later: bool = False,
 ) -> list[str]:
@@ -129,35 +130,38 @@ def promising(
         current: the fit without any.
         linear: what each makes of the linear evidence.
         colour: of the current residual.
+        noise_scales: of metres and radians, (2,).
         tried: keys that were fitted.
         later: whether something was accepted before: a further effect must be worth its place.
     """
-    count = float(current.evidence.counts.sum())
-    excesses = current.held_out - count, (current.score.cost - count) / colour
-    held_out = {n: current.held_out - float(one.held_out.sum()) for n, one in linear.items()}
+    runs = left_out(current, noise_scales)
+    excess = max((current.score.cost - float(runs.counts.sum())) / colour, LEAST_GAIN)
+    held_out = {n: 2.0 * float(runs.gains(one.held_out).sum()) for n, one in linear.items()}
     likelihood = {
         n: (current.score.cost - one.cost) / colour - penalty(current, n)
         for n, one in linear.items()
     }
+    shares = {n: runs.share(one.held_out) for n, one in linear.items()}
+    of_likelihood = {n: gain / excess for n, gain in likelihood.items()}
     chosen: list[str] = []
-    for gains, excess in zip((held_out, likelihood), excesses, strict=True):
+    for gains, promise in ((held_out, shares), (likelihood, of_likelihood)):
         ranked = _best_of_each(sorted(gains, key=lambda n: -gains[n]))
-        share = NEARLY_AS_GOOD * gains[ranked[0]] if not tried else 0.0
-        share = max(share, LEAST_PROMISE_LATER * excess) if later else share
-        least = max(share, LEAST_GAIN)
-        further = [n for n in ranked if gains[n] > least and n not in tried]
+        least = NEARLY_AS_GOOD * promise[ranked[0]] if not tried else 0.0
+        least = max(least, LEAST_PROMISE_LATER) if later else least
+        worth = (n for n in ranked if promise[n] > least and gains[n] > LEAST_GAIN)
+        further = [n for n in worth if n not in tried]
         chosen += [n for n in further[:REFITTED] if n not in chosen]
     return chosen
 
 
-def settles(decision: Decision, current: Refit) -> bool:
+def settles(decision: Decision, current: Refit, noise_scales: Array) -> bool:
     """Whether what won may be the cause: it explains the excess, or reaches the noise nearly.
 
     Else the nearest of those fitted may have won, and the others want fitting too.
     """
     if decision.winner is None:
         return False
-    gain = _gain(current, decision.winner.held_out)
+    gain = left_out(current, noise_scales).share(decision.winner.score.held_out)
     return gain >= LEAST_SHARE_EXPLAINED or excess_of(decision.winner) < LEAST_EXCESS_LATER
 
 
@@ -188,6 +192,7 @@ def decided(
         noise_scales: of metres and radians, (2,).
     """
     ranked = sorted(linear, key=lambda name: float(linear[name].held_out.sum()))
+    runs = left_out(current, noise_scales)
     complaints: dict[str, str] = {}
     passed: dict[str, Refit] = {}
     for name, one in tried.items():
@@ -197,14 +202,14 @@ def decided(
         else:
             passed[name] = one
     chances = probabilities(current, tried, noise_scales)
-    key, group = _winner(passed, chances, current, noise_scales)
+    key, group = _winner(passed, chances, current, runs)
     told = _best_of_each([key, *sorted(tried, key=lambda n: tried[n].held_out), *ranked])
     candidates = []
     for one in filter(None, told):
         known = tried.get(one)
-        held_out = known.held_out if known else float(linear[one].held_out.sum())
-        bic = delta_bic(current, known.score if known else linear[one], one, colour)
-        gain = _gain(current, held_out)
+        seen = known.score if known else linear[one]
+        bic = delta_bic(current, seen, one, colour)
+        gain = runs.share(seen.held_out)
         verdict, reason, others = _verdict(one, key, group, complaints, known, passed, gain)
         mine = [p for other, p in chances.items() if effect_of(other) == effect_of(one)]
         chance = sum(mine) if mine else None
@@ -282,7 +287,8 @@ def _complaint(current: Refit, one: Refit, name: str, noise_scales: Array, later
     outside = plausible(one, name)
     if outside:
         return "; ".join(outside)
-    excess, gain = excess_of(current), _gain(current, one.held_out)
+    excess, runs = excess_of(current), left_out(current, noise_scales)
+    gain, gains = runs.share(one.score.held_out), runs.gains(one.score.held_out)
     if excess < -MOST_BELOW_NOISE:
         return (
             f"left-out runs are predicted without it, {-100 * excess:.0f} % below their noise: "
@@ -291,8 +297,7 @@ def _complaint(current: Refit, one: Refit, name: str, noise_scales: Array, later
     chance = included(current, one, name, noise_scales)
     if chance <= ACCEPTED:
         return f"not sure: with probability {chance:.2g} it is there rather than nothing"
-    gains = current.score.held_out - one.score.held_out
-    worse = runs_worse(gains, current.score)
+    worse = runs_worse(current.score.held_out - one.score.held_out, current.score)
     if gains.sum() <= 0.0 or worse > MOST_WORSE * len(gains):
         return f"{worse} of {len(gains)} left-out runs are predicted worse with it"
     if worse >= CONTRADICTED * len(gains) and gains.sum() < 2.0 * _scatter(gains):
@@ -317,12 +322,10 @@ def runs_worse(gains: Array, before: Score) -> int:
     return int((gains < -least).sum())
 
 
-def _gain(current: Refit, held_out: float) -> float:
-    """Share of the left-out runs' excess over the noise that a sum of squares takes away."""
-    count = float(current.evidence.counts.sum())
-    return float(
-        (current.held_out - held_out) / max(current.held_out - count, LEAST_EXCESS * count)
-    )
+def left_out(current: Refit, noise_scales: Array) -> LeftOut:
+    """The runs, each left out, as a fit predicts them."""
+    independent = independent_numbers(current.fit, noise_scales)
+    return LeftOut(current.score.held_out, current.evidence.counts, independent, LEAST_EXCESS)
 
 
 def excess_of(current: Refit) -> float:
@@ -331,7 +334,7 @@ def excess_of(current: Refit) -> float:
 
 
 def _winner(
-    passed: dict[str, Refit], chances: dict[str, float], current: Refit, noise_scales: Array
+    passed: dict[str, Refit], chances: dict[str, float], current: Refit, runs: LeftOut
 ) -> tuple[str, tuple[str, ...]]:
     """The best of those that passed, and all effects that the runs cannot tell from it.
 
@@ -340,15 +343,14 @@ def _winner(
     """
     if not passed:
         return "", ()
-    first = min(passed, key=lambda name: passed[name].held_out)
-    colour = colour_of(passed[first].fit, noise_scales)
+    gains = {name: float(runs.gains(one.score.held_out).sum()) for name, one in passed.items()}
+    best = max(gains.values())
     group = [
         name
-        for name, one in passed.items()
-        if (one.held_out - passed[first].held_out) / colour < CONFOUNDED_DIFFERENCE
-        or chances[name] > RIVAL
+        for name in passed
+        if 2.0 * (best - gains[name]) < CONFOUNDED_DIFFERENCE or chances[name] > RIVAL
     ]
-    group.sort(key=lambda n: (sum(unknowns(current, n)), passed[n].held_out))
+    group.sort(key=lambda n: (sum(unknowns(current, n)), -gains[n]))
     return group[0], tuple(dict.fromkeys(map(effect_of, group)))
 
 

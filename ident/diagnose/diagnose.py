@@ -19,7 +19,12 @@ from freeswing.ident.diagnose.answer.deviations import honest_covariance
 from freeswing.ident.diagnose.answer.entries import accepted_entries, candidate_entry, claims
 from freeswing.ident.diagnose.answer.last_words import last_words, rivals_of
 from freeswing.ident.diagnose.answer.next_swing import NextSwing, next_swing
-from freeswing.ident.diagnose.decision import LEAST_SHARE_EXPLAINED, Candidate, excess_of
+from freeswing.ident.diagnose.decision import (
+    LEAST_SHARE_EXPLAINED,
+    Candidate,
+    excess_of,
+    left_out,
+)
 from freeswing.ident.diagnose.declared_model import base_fit, refuse_few
 from freeswing.ident.diagnose.heldout import HeldOut, held_out
 from freeswing.ident.diagnose.lengths.wrong_places import Kinematics
@@ -296,8 +301,7 @@ def _with_own_noise(found: LikelihoodFit, runs: list[PreparedRun]) -> Likelihood
 def _share_explained(search: Search, last: Refit) -> float:
     """Share of what forces had to explain, once lengths had settled the geometry."""
     first = next(one.before for one in search.rounds if not one.by_lengths)
-    count = float(first.evidence.counts.sum())
-    return (first.held_out - last.held_out) / max(first.held_out - count, 1e-9)
+    return left_out(first, search.noise_scales).share(last.score.held_out)
 
 
 def _ladder(

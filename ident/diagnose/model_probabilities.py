@@ -62,6 +62,46 @@ def log_predictive(squares: Array, counts: Array, independent: Array) -> Array:
     return above + 0.5 * np.maximum(-excess, 0.0)
 
 
+@dataclass(frozen=True, slots=True)
+class LeftOut:
+    """Runs that were left out, and what a prediction of them is worth.
+
+    Squares of runs far above the noise differ by hundreds, and one of them would decide for all.
+    Their log densities, the size of what is missing being unknown, compare runs of any size.
+
+    Attributes:
+        squares: of each run under the model that stands, (r,).
+        counts: how many numbers each run measured, (r,).
+        independent: how many of them what is missing moves independently, (r,).
+        least: excess over the noise, as a share of the noise, below which a share means nothing.
+    """
+
+    squares: Array
+    counts: Array
+    independent: Array
+    least: float
+
+    def gains(self, squares: Array) -> Array:
+        """Gain in log density of each run where its squares are these instead, (r,)."""
+        now, then = (
+            log_predictive(one, self.counts, self.independent) for one in (squares, self.squares)
+        )
+        return now - then
+
+    def share(self, squares: Array) -> float:
+        """Share of the excess over the noise that is taken away: the runs' geometric mean.
+
+        Source:
+            MacKay 2003, Information Theory, Inference, and Learning Algorithms, ch. 28: by the
+            densities of `log_predictive`.
+        """
+        whole = -log_predictive(self.squares, self.counts, self.independent).sum()
+        floor = log_predictive((1.0 + self.least) * self.counts, self.counts, self.independent)
+        excess = 2.0 * max(float(whole), -float(floor.sum())) / self.independent.sum()
+        taken = 2.0 * float(self.gains(squares).sum()) / self.independent.sum()
+        return float(np.expm1(-taken) / np.expm1(-excess))
+
+
 def log_evidence(rival: Rival, counts: Array, independent: Array, weights: Array) -> Array:
     """Log evidence of a model under each set of weights of the runs, (d,).
 

@@ -196,6 +196,10 @@ def plausible(refitted: Refit, key: str) -> list[str]:
                 f"{parameter.name} = {value:.4g} lies outside its plausible range "
                 f"{parameter.low:g} to {parameter.high:g}"
             )
+    amounts = [(p, v) for p, v in zip(parameters, values, strict=True) if p.amplitude]
+    if amounts and all(p.low == p.start and value < p.low for p, value in amounts):
+        told = ", ".join(f"{p.name} = {value:.4g}" for p, value in amounts)
+        complaints.append(f"{told}: below {amounts[0][0].low:g}, which no such effect can have")
     sizes = np.array([p.scale for p in parameters])
     shares = np.abs(values - [p.start for p in parameters]) / sizes
     if effect_named(name).stage == "kinematics" and shares.max(initial=0.0) < NEGLIGIBLE:

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from freeswing.ident.diagnose.decision import ACCEPTED, CONFOUNDED_DIFFERENCE, included
-from freeswing.ident.diagnose.refit import Refit, colour_of
+from freeswing.ident.diagnose.decision import ACCEPTED, CONFOUNDED_DIFFERENCE, included, left_out
+from freeswing.ident.diagnose.refit import Refit
 
 # Of the BIC without an effect to second order, below which leaving it out is worth a fit.
 LARGEST_RISE = 10.0
@@ -45,7 +45,6 @@ def superfluous(current: Refit, kept: Sequence[str]) -> str:
 
 def is_no_worse(fewer: Refit, more: Refit, name: str, noise_scales: np.ndarray) -> bool:
     """Whether a fit without an effect is as good as the one with it, its unknowns counted."""
-    colour = colour_of(more.fit, noise_scales)
-    by_held_out = (fewer.held_out - more.held_out) / colour
+    by_held_out = 2.0 * float(left_out(fewer, noise_scales).gains(more.score.held_out).sum())
     by_evidence = included(fewer, more, name, noise_scales)
     return by_evidence <= ACCEPTED and by_held_out < CONFOUNDED_DIFFERENCE

@@ -145,11 +145,11 @@ class Search:
         tried: dict[str, Refit] = {}
         asked: list[str] = []
         while True:
-            more = promising(current, linear, colour, asked, bool(self.rounds))
+            more = promising(current, linear, colour, self.noise_scales, asked, bool(self.rounds))
             tried |= self._refits(current, screens, more, index, colour)
             asked += more
             decision = decided(current, linear, tried, bool(self.rounds), colour, self.noise_scales)
-            if not more or settles(decision, current):
+            if not more or settles(decision, current, self.noise_scales):
                 break
         if decision.winner is None:
             return Round(current, decision)

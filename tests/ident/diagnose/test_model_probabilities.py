@@ -5,6 +5,7 @@ import pytest
 
 from freeswing.ident.diagnose.model_probabilities import (
     CHANCE_OF_EFFECT,
+    LeftOut,
     Rival,
     log_evidence,
     log_predictive,
@@ -36,7 +37,8 @@ def rivals(seed, columns, truth, share=None):
         together = np.concatenate([values, right[..., None]], axis=2)
         n = values.shape[2]
         prior = np.column_stack([np.eye(n), np.zeros(n)])
-        found.append(Rival(np.linalg.qr(together, mode="r"), prior, int(n > 0)))
+        triangles = np.asarray(np.linalg.qr(together, mode="r"))
+        found.append(Rival(triangles, prior, int(n > 0)))
     return found
 
 
@@ -103,3 +105,26 @@ def test_at_the_noise_half_the_squares_count_and_above_it_their_ratio():
     assert below == pytest.approx(np.full(RUNS, 4.0))
     far = log_predictive(200 * COUNTS, COUNTS, FEW) - log_predictive(100 * COUNTS, COUNTS, FEW)
     assert far == pytest.approx(np.full(RUNS, -10.0 * np.log(2.0)), rel=0.02)
+
+
+def test_no_single_run_decides_for_all_of_those_left_out() -> None:
+    """A day in the laboratory: stretch takes most of five runs, and one stands 180 times the noise.
+
+    In sums of squares the gain was within the scatter from run to run.
+    """
+    counts, independent = np.full(6, 3592.0), np.full(6, 40.0)
+    before = counts * np.array([6.6, 183.2, 40.4, 242.5, 48.9, 172.1])
+    after = counts * np.array([2.8, 302.2, 19.4, 23.9, 19.1, 23.4])
+    runs = LeftOut(before, counts, independent, 0.005)
+    gains, squares = runs.gains(after), before - after
+    scatter = np.sqrt(6.0) * np.array([gains.std(ddof=1), squares.std(ddof=1)])
+    assert gains.sum() > 2.0 * scatter[0], gains
+    assert squares.sum() < 2.0 * scatter[1], squares
+    assert runs.share(after) == pytest.approx(0.7, abs=0.1)
+
+
+@pytest.mark.parametrize("size", [0.01, 1.0, 1e3])
+def test_the_share_of_runs_that_are_alike_is_that_of_their_excess(size: float) -> None:
+    counts = np.full(4, 1000.0)
+    runs = LeftOut((1.0 + size) * counts, counts, np.full(4, 50.0), 0.005)
+    assert runs.share((1.0 + 0.3 * size) * counts) == pytest.approx(0.7, rel=1e-9)
