@@ -182,16 +182,21 @@ def diagnose(
     notes += search.kinematics.notes() if search.kinematics else []
     last, accepted, rest = _believed(search, last, fitted, full, notes)
     last, held = _kept_from_dynamics(last, rest, noise_scales, notes)
-    ladder = _ladder(search, accepted, last, checked, free, _part(progress, 0.85, 0.95))
-    final = _with_own_noise(last.fit, fitted)
     begun = search.rounds[0].before if accepted else last
-    first = final if not accepted else _with_own_noise(begun.fit, fitted)
+    with search.pool_of() as pool:
+        ladder = _ladder(search, accepted, last, checked, free, pool)
+        if progress:
+            progress("before and after", 0.85)
+        # Held-out runs are on their way in other processes.
+        final = _with_own_noise(last.fit, fitted)
+        first = final if not accepted else _with_own_noise(begun.fit, fitted)
+        rungs = ladder()
     spread = honest_covariance(final, last)
     groups = rivals_of(accepted)
     if progress:
         progress("diagnosis", 1.0)
     return Diagnosis(
-        ladder,
+        rungs,
         last_words(search.rounds, last.effects if accepted else (), barred, names),
         groups,
         first,
@@ -310,21 +315,20 @@ def _ladder(
     last: Refit,
     runs: list[PreparedRun],
     free: tuple[str, ...] | None,
-    progress: Progress | None,
-) -> tuple[Rung, ...]:
-    """Each model of the search on the validation runs, as recorded.
+    pool: Executor | None,
+) -> Callable[[], tuple[Rung, ...]]:
+    """Each model of the search on the validation runs, as recorded: begun, and waited for later.
 
     The search fits without the errors of the cameras' calibration: its inertias belong to samples
     that still contain them.
     """
     stages: list[Refit] = [search.rounds[0].before, *(one.after for one in accepted[:-1])]
     stages += [last] if accepted else []
-    if progress:
-        progress("before and after", 0.0)
     models = [Stage(one.model, one.inertia, one.values) for one in (stage.fit for stage in stages)]
-    with search.pool_of() as pool:
-        seen = held_out(models, runs, free, pool)
-    return tuple(Rung(claims(one.effects), held) for one, held in zip(stages, seen, strict=True))
+    seen = held_out(models, runs, free, pool)
+    return lambda: tuple(
+        Rung(claims(one.effects), held) for one, held in zip(stages, seen(), strict=True)
+    )
 
 
 def _parameters(found: LikelihoodFit, covariance: Array) -> list[dict[str, Any]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
@@ -102,14 +102,16 @@ def held_out(
     runs: list[PreparedRun],
     free: tuple[str, ...] | None,
     pool: Executor | None = None,
-) -> Iterator[HeldOut]:
+) -> Callable[[], tuple[HeldOut, ...]]:
     """Confront validation runs with models that grew out of each other: one result a model.
+
+    It is begun at once, and waited for where what comes back is called.
 
     Args:
         stages: the models.
         runs: validation runs.
         free: the coordinates measured, or None for full poses.
-        pool: takes runs side by side; None: one after another.
+        pool: takes runs side by side; None: one after another, when they are asked for.
     """
     calls = [
         pool.submit(_one, stages, run, free).result
@@ -117,8 +119,7 @@ def held_out(
         else partial(_one, stages, run, free)
         for run in runs
     ]
-    by_run = [call() for call in calls]
-    return (HeldOut(under) for under in zip(*by_run, strict=True))
+    return lambda: tuple(HeldOut(under) for under in zip(*(call() for call in calls), strict=True))
 
 
 def _one(
