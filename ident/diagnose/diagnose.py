@@ -156,8 +156,7 @@ def diagnose(
     prepared = taut if 2 * len(taut.runs) > len(prepared.runs) else prepared
     full = all(set(run.signals.coordinates) == set(POSE_COORDINATES) for run in prepared.runs)
     free = None if full else prepared.free
-    fitted = _of_role(prepared.runs, "identify")
-    checked = _of_role(prepared.runs, "validate")
+    fitted, checked = (_of_role(prepared.runs, role) for role in ("identify", "validate"))
     refuse_few(fitted)
     if not checked:
         raise DataError(NOTHING_TO_CHECK)
@@ -183,18 +182,16 @@ def diagnose(
     last, accepted, rest = _believed(search, last, fitted, full, notes)
     last, held = _kept_from_dynamics(last, rest, noise_scales, notes)
     begun = search.rounds[0].before if accepted else last
+    _tell(progress, "before and after", 0.85)
     with search.pool_of() as pool:
         ladder = _ladder(search, accepted, last, checked, free, pool)
-        if progress:
-            progress("before and after", 0.85)
         # Held-out runs are on their way in other processes.
         final = _with_own_noise(last.fit, fitted)
-        first = final if not accepted else _with_own_noise(begun.fit, fitted)
+        first = _with_own_noise(begun.fit, fitted) if accepted else final
         rungs = ladder()
     spread = honest_covariance(final, last)
     groups = rivals_of(accepted)
-    if progress:
-        progress("diagnosis", 1.0)
+    _tell(progress, "diagnosis", 1.0)
     return Diagnosis(
         rungs,
         last_words(search.rounds, last.effects if accepted else (), barred, names),
@@ -255,6 +252,11 @@ def _believed(
 def _follows_badly(last: Refit, rest: Unexplained) -> bool:
     """Whether something that follows the motion is still missing."""
     return rest.present or excess_of(last) > LARGEST_EXCESS_LEFT
+
+
+def _tell(progress: Progress | None, label: str, fraction: float) -> None:
+    if progress:
+        progress(label, fraction)
 
 
 def _part(progress: Progress | None, low: float, high: float) -> Progress | None:
