@@ -25,6 +25,8 @@ from freeswing.ident.signals.prepare import guessed_inertia
 
 # Told lengths come from a tape or from counted turns, good to a few mm; 20 mm is another cable's.
 LENGTH_DIFFERENCE_M = 0.02
+# A bench's wires and their ends are measured to 1 mm.
+BENCH_DIFFERENCE_M = 0.005
 # Of what was wrong, that may be left once they are exchanged: geometry as it usually is known.
 LEFT_OVER = 0.2
 # Another order that rests hardly farther off leaves open which one it is.
@@ -32,8 +34,15 @@ NEXT_BEST = 2.0
 MOST_PLACES = 4  # cables of which every order is tried: 24 orders, each a search of 0.1 s
 
 
-def refuse_exchanged_lengths(swings: Sequence[SwingRun], robot: Robot) -> None:
+def refuse_exchanged_lengths(
+    swings: Sequence[SwingRun], robot: Robot, least_m: float = LENGTH_DIFFERENCE_M
+) -> None:
     """Refuse runs whose cable_lengths_m fit their samples once some of them are exchanged.
+
+    Args:
+        swings: the runs.
+        robot: whose cables.
+        least_m: by which lengths are off, by the poses, before they may be another cable's.
 
     Raises:
         DataError: naming the runs, the cables and by how much.
@@ -44,7 +53,7 @@ def refuse_exchanged_lengths(swings: Sequence[SwingRun], robot: Robot) -> None:
         if lengths is None:
             order, told = exchanged_at_rest(swing, robot, order)
         else:
-            told = exchanged_sentence(swing, robot, lengths)
+            told = exchanged_sentence(swing, robot, lengths, least_m)
         if told:
             found.append(f"run {swing.name}: {told}")
     if found:
@@ -66,13 +75,16 @@ def pose_lengths(swing: SwingRun, robot: Robot) -> Array | None:
     return lengths.mean(axis=0) if np.isfinite(lengths).all() else None
 
 
-def exchanged_sentence(swing: SwingRun, robot: Robot, lengths_m: Array) -> str:
+def exchanged_sentence(
+    swing: SwingRun, robot: Robot, lengths_m: Array, least_m: float = LENGTH_DIFFERENCE_M
+) -> str:
     """Which of a run's stated lengths are other cables', empty where they are not.
 
     Args:
         swing: the run.
         robot: whose cables.
         lengths_m: by the poses, (n,).
+        least_m: off by less they are no other cable's.
     """
     stated = swing.lengths_m
     if stated is None or len(stated) != len(lengths_m):
@@ -82,7 +94,7 @@ def exchanged_sentence(swing: SwingRun, robot: Robot, lengths_m: Array) -> str:
     moved = np.flatnonzero(places != np.arange(len(places)))
     left = np.abs(lengths_m - stated[places])
     worst = float(off.max())
-    if not len(moved) or worst < LENGTH_DIFFERENCE_M or left.max() > LEFT_OVER * worst:
+    if not len(moved) or worst < least_m or left.max() > LEFT_OVER * worst:
         return ""
     return (
         f"{_named(robot, moved)} are exchanged: by the poses they are "

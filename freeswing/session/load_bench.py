@@ -10,9 +10,10 @@ import numpy as np
 from freeswing.cdpr.files.documents import InputError
 from freeswing.cdpr.files.signal_csv import coordinates_in, header_of, read_signals
 from freeswing.cdpr.measured.target import Target
-from freeswing.cdpr.measured.trajectory import angle_noise
+from freeswing.cdpr.measured.trajectory import Trajectory, angle_noise
 from freeswing.cdpr.robot import POSE_COORDINATES, Robot
 from freeswing.ident.bench.runs import Bench, BenchRun, Signal
+from freeswing.ident.runs import SwingRun
 from freeswing.session.load_swings import load_trajectory
 from freeswing.session.marker_runs import read_marker_runs
 from freeswing.session.session_file import Run, Session
@@ -80,6 +81,21 @@ def load_bench(session: Session, robot: Robot, target: Target | None) -> Bench:
                 f"of the trajectory files, which hold {', '.join(sorted(seen))}"
             )
     return Bench(runs, session.channels, session.loads, _mass_std(session.robot))
+
+
+def coordinate_swings(bench: Bench) -> list[SwingRun]:
+    """Runs that measure coordinates of the pose, as runs of those alone."""
+    return [swing for run in bench.runs if (swing := _as_swing(run)) is not None]
+
+
+def _as_swing(run: BenchRun) -> SwingRun | None:
+    """A run's coordinates alone; None where it measures channels only."""
+    columns = {signal.column: signal.values for signal in run.signals}
+    if not run.coordinates:
+        return None
+    values = np.stack([columns[name] for name in run.coordinates], axis=1)
+    trajectory = Trajectory(run.times_s, run.coordinates, values, provenance=run.name)
+    return SwingRun(run.name, run.role, trajectory, run.lengths_m, run.lengths_std_m, run.window_s)
 
 
 def _load_run(

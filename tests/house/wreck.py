@@ -183,7 +183,7 @@ HELD = (
     ),
     Held(
         "freeswing/session/exchanged_lengths.py",
-        ("LENGTH_DIFFERENCE_M", "LEFT_OVER"),
+        ("LENGTH_DIFFERENCE_M", "BENCH_DIFFERENCE_M", "LEFT_OVER"),
         "tests/freeswing/session/test_exchanged_lengths.py",
     ),
     Held("ident/diagnose/search.py", ("MOST_ROUNDS",), "tests/ident/diagnose/test_search.py"),

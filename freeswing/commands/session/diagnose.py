@@ -83,6 +83,7 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
 
 def _make_bench(session: Session, console: Console, robot: Robot, only: list[str] | None) -> Made:
     """The same of a bench: all its runs in one fit."""
+    from freeswing.doctor.bench_runs import refuse_wrong_bench_runs
     from freeswing.ident.bench.diagnose.diagnose import diagnose_bench
     from freeswing.ident.bench.diagnose.document import bench_document
     from freeswing.report.bench_words import diagnosis_lines
@@ -93,6 +94,7 @@ def _make_bench(session: Session, console: Console, robot: Robot, only: list[str
     from freeswing.session.made import Made
 
     bench = load_bench(session, robot, load_target(session))
+    refuse_wrong_bench_runs(bench, robot)
     found = diagnose_bench(bench, robot, console.progress, only)
     document = Diagnosis.from_json(bench_document(found))
     for line in diagnosis_lines(document):

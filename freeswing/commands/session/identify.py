@@ -121,6 +121,7 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
 
 def _make_bench(session: Session, console: Console, robot: Robot) -> Made:
     """The same of a bench: all its runs in one fit."""
+    from freeswing.doctor.bench_runs import refuse_wrong_bench_runs
     from freeswing.ident.bench.identify_bench import identify_bench
     from freeswing.report.bench_words import bench_lines
     from freeswing.results.identification import Identification
@@ -129,7 +130,9 @@ def _make_bench(session: Session, console: Console, robot: Robot) -> Made:
     from freeswing.session.load_swings import load_target
     from freeswing.session.made import Made
 
-    told = identify_bench(load_bench(session, robot, load_target(session)), robot).document()
+    bench = load_bench(session, robot, load_target(session))
+    refuse_wrong_bench_runs(bench, robot)
+    told = identify_bench(bench, robot).document()
     document = Identification.from_json({**told, "entries_m": robot.entries_m})
     for line in bench_lines(document):
         console.say(line)

@@ -14,9 +14,13 @@ from freeswing.cdpr.files.problems import DataError
 from freeswing.cdpr.files.robot_file import read_robot
 from freeswing.cdpr.files.trajectory_csv import write_csv
 from freeswing.cdpr.measured.trajectory import Trajectory
+from freeswing.cdpr.robot import POSE_COORDINATES, Cable, Robot
+from freeswing.doctor.bench_runs import refuse_wrong_bench_runs
+from freeswing.ident.bench.runs import Bench, BenchRun, Signal
 from freeswing.ident.runs import SwingRun
 from freeswing.main import main
 from freeswing.session.exchanged_lengths import (
+    BENCH_DIFFERENCE_M,
     exchanged_at_rest,
     exchanged_sentence,
     pose_lengths,
@@ -157,3 +161,40 @@ def test_lengths_as_they_are_rest_where_they_were_measured(free_alone: Path) -> 
     refuse_exchanged_lengths(wrong, robot)  # merely wrong: another matter
     unknown = replace(robot, platform=replace(robot.platform, com_m=None))
     refuse_exchanged_lengths(swings, unknown)
+
+
+@pytest.mark.parametrize(("apart_m", "named"), [(0.0045, False), (0.0055, True)])
+def test_two_wires_of_a_bench_in_each_others_place(apart_m: float, named: bool) -> None:
+    """A plate on three wires, the first a little longer than the second, told the other way."""
+    ring = np.array([[0.25, 0.0, 0.0], [-0.1, 0.2, 0.0], [-0.1, -0.2, 0.0]])
+    longer = np.array([apart_m, 0.0, 0.0])
+    cables = tuple(
+        Cable(str(k + 1), end + np.array([0.0, 0.0, 1.2 + longer[k]]), 0.0, end)
+        for k, end in enumerate(ring)
+    )
+    times = np.arange(200) / 50.0
+    poses = np.zeros((200, 6))
+    poses[:, 5] = 0.01 * np.sin(4.0 * times)
+    signals = tuple(Signal(n, poses[:, k]) for k, n in enumerate(POSE_COORDINATES))
+    told = 1.2 + longer[[1, 0, 2]]
+    bench = Bench((BenchRun("a", "identify", times, signals, told, 1e-3),))
+    robot = Robot("plate", cables)
+    if named:
+        with pytest.raises(DataError, match=r"lengths of cables 1 and 2 are exchanged"):
+            refuse_wrong_bench_runs(bench, robot)
+    else:
+        refuse_wrong_bench_runs(bench, robot)
+    assert BENCH_DIFFERENCE_M < 0.02
+    refuse_wrong_bench_runs(replace(bench, runs=(replace(bench.runs[0], lengths_m=None),)), robot)
+
+
+def test_a_benchs_recording_given_twice() -> None:
+    """Yaw alone is compared too; channels alone are nobody's coordinates."""
+    times = np.arange(200) / 50.0
+    yaw = np.random.default_rng(1).normal(size=200)
+    run = BenchRun("a", "identify", times, (Signal("chi", yaw),), np.full(4, 1.5))
+    again = replace(run, name="b")
+    with pytest.raises(DataError, match="runs a and b hold the same samples"):
+        refuse_wrong_bench_runs(Bench((run, again)), ROBOT)
+    dots = tuple(replace(one, signals=(Signal("dot_px", yaw),)) for one in (run, again))
+    refuse_wrong_bench_runs(Bench(dots), ROBOT)

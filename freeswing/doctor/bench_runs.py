@@ -1,0 +1,22 @@
+"""Runs of a bench that no fit could show to be wrong."""
+
+from __future__ import annotations
+
+from freeswing.cdpr.robot import Robot
+from freeswing.doctor.quaternions import refuse_mistaken_quaternions
+from freeswing.ident.bench.runs import Bench
+from freeswing.session.exchanged_lengths import BENCH_DIFFERENCE_M, refuse_exchanged_lengths
+from freeswing.session.load_bench import coordinate_swings
+from freeswing.session.repeated_runs import refuse_repeated
+
+
+def refuse_wrong_bench_runs(bench: Bench, robot: Robot) -> None:
+    """Refuse a recording given twice, mistaken quaternions and lengths of one another's wires.
+
+    Raises:
+        DataError: naming the runs, what is wrong and what to do.
+    """
+    swings = coordinate_swings(bench)
+    refuse_repeated(swings)
+    refuse_mistaken_quaternions(swings, robot)
+    refuse_exchanged_lengths(swings, robot, BENCH_DIFFERENCE_M)
