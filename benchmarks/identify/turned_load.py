@@ -45,7 +45,7 @@ def entries_of(seed: int, duration_s: float) -> tuple[list[float], list[float]]:
 
 def main() -> None:
     """Run all seeds."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--seeds", type=int, default=5)
     parser.add_argument("--duration-s", type=float, default=10.0)
     options = parser.parse_args()

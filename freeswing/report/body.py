@@ -61,6 +61,15 @@ def body_about_com(parameters: Sequence[Parameter]) -> BodyAboutCom | None:
     return BodyAboutCom(com, tensor, _symmetric(std[3:]) + shift, principal, axes)
 
 
+def is_told(body: BodyAboutCom) -> bool:
+    """Whether every moment is known to better than itself: axes of others are chance's.
+
+    Two or three parallel wires tell Izz, and of the other moments next to nothing.
+    """
+    half = HALF_WIDTH_95 * np.diag(body.tensor_std_m2)
+    return bool(np.all(half < np.diag(body.tensor_m2)) or np.isnan(half).any())
+
+
 def tensor_rows(body: BodyAboutCom, mass_kg: float | None) -> list[dict[str, str]]:
     """The six entries of the tensor, over the mass and, where it is known, in kg m2."""
     rows = []
@@ -100,7 +109,7 @@ def hanging(
 ) -> Markup:
     """The body's ellipsoid where a run hung, with its cables: from the side and from above."""
     placed = [one for one in swings if one.equilibrium is not None]
-    if not placed or not _is_possible(body):
+    if not placed or not _is_possible(body) or not is_told(body):
         return Markup()
     pose = placed[0].equilibrium
     place = np.array(pose.position_m, dtype=np.float64) if pose else np.zeros(3)

@@ -206,8 +206,10 @@ def _waves_fitted(view: Sight, waves: Array, seen: Array, group: list[int]) -> t
         rows.append(part * weight[:, None])
         right.append(np.where(view.known[:, k], view.values[:, k], 0.0) * weight)
     design = np.vstack(rows)
-    ridge = np.sqrt(RIDGE * n) * np.abs(design[:, : 2 * count]).max(initial=0.0)
-    held = np.hstack([ridge * np.eye(2 * count), np.zeros((2 * count, len(group)))])
+    # Of each wave's own size: a coordinate that hardly moves has a weight of which a share holds
+    # all others at zero.
+    ridge = np.sqrt(RIDGE) * np.linalg.norm(design[:, : 2 * count], axis=0)
+    held = np.hstack([np.diag(ridge), np.zeros((2 * count, len(group)))])
     found = np.linalg.lstsq(
         np.vstack([design, held]), np.concatenate([*right, np.zeros(2 * count)]), rcond=None
     )[0]

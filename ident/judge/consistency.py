@@ -56,7 +56,10 @@ class Consistency:
         return f"least second moment of mass {self.least_moment_m2:.2g} +- {self.std_m2:.2g} m2"
 
     def sentence(self) -> str:
-        """For people; empty where a body can have the inertia as it was found."""
+        """For people; empty where a body can have the inertia as it was found.
+
+        What samples do not tell may have any value: two or three wires leave most of a tensor open.
+        """
         if self.cost is not None:
             return (
                 "held to the inertia of a possible body, which raises the weighted squared error "
@@ -65,6 +68,12 @@ class Consistency:
             )
         if self.is_possible:
             return ""
+        if not self.is_refuted:
+            return (
+                f"no body can have this inertia to the last digit ({self.size()}), but one within "
+                "its deviations can: what is told to less than itself is told by chance, all else "
+                "stands (--consistent holds it to possible bodies)"
+            )
         return (
             f"no body can have this inertia ({self.size()}): hold it to possible bodies "
             "(--consistent), or look for what the model misses (diagnose)"

@@ -7,7 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from freeswing.report.body import body_about_com, hanging, principal_rows, tensor_rows
+from freeswing.report.body import (
+    body_about_com,
+    hanging,
+    is_told,
+    principal_rows,
+    tensor_rows,
+)
 from freeswing.report.material import Material
 from freeswing.report.panels.ladder import told_once
 from freeswing.report.space import in_space
@@ -40,7 +46,7 @@ class Answer:
             "mass": mass_sentence(material, mass_kg),
             "parameters": _shown([parameter_row(entry) for entry in parameters]),
             "tensor": [] if body is None else tensor_rows(body, mass_kg),
-            "principal": [] if body is None else principal_rows(body, mass_kg),
+            "principal": principal_rows(body, mass_kg) if body and is_told(body) else [],
             "drawing": "" if body is None else hanging(body, material.robot, swings, entries),
             "space": in_space(material.robot, swings, motions),
         }

@@ -16,6 +16,7 @@ from freeswing.ident.bench.solve import Solved
 from freeswing.ident.bench.swing import IZZ
 from freeswing.ident.bench.told.budget import bent_std
 
+HALF_WIDTH_95 = 1.959964  # deviations: a value that is zero within them is not essential
 TELLS_NOTHING = 1.0  # deviation of the squared amplitude over itself: it may as well be zero
 RESTS_ON_PRIOR = 0.5  # of the prior's variance: with more left than that, more was known than seen
 
@@ -111,7 +112,7 @@ def platform_rows(solved: Solved) -> list[dict[str, Any]]:
                 "value": float(values[k]) if seen else None,
                 "std": std if seen else None,
                 "std_percent": 100.0 * std / abs(float(values[k])) if seen else None,
-                "essential": seen,
+                "essential": seen and HALF_WIDTH_95 * std < abs(float(values[k])),
                 "identifiable": seen,
             }
         )

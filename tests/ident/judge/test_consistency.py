@@ -18,6 +18,7 @@ from freeswing.ident.estimate import Estimate
 from freeswing.ident.identify import IdentifySettings, identify
 from freeswing.ident.judge.consistency import (
     LEAST_EXTENT_M,
+    Consistency,
     consistency,
     is_possible,
     least_moment,
@@ -104,6 +105,15 @@ def test_what_is_possible_stays():
     assert (found == TRUE_INERTIA).all(), f"moved by {found - TRUE_INERTIA}"
     said = consistency(TRUE_INERTIA, np.diag((0.01 * TRUE_INERTIA) ** 2)).sentence()
     assert said == "", said
+
+
+@pytest.mark.parametrize(("deviations", "refuted"), [(2.9, False), (3.1, True)])
+def test_only_what_samples_exclude_is_called_wrong(deviations: float, refuted: bool) -> None:
+    """A slightly conical trifilar tells Izz, and of all else next to nothing."""
+    found = Consistency(-1e-3 * deviations, 1e-3)
+    assert found.is_refuted == refuted
+    assert ("one within its deviations can" in found.sentence()) != refuted
+    assert ("look for what the model misses" in found.sentence()) == refuted
 
 
 Pair = tuple[Estimate, Estimate]
