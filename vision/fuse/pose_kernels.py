@@ -242,7 +242,7 @@ def _whiten(white: Array, found: Linear, m: int, free: int, r: Array, j: Array) 
 
 
 @numba.njit(cache=True, nogil=True)
-def _unlinearised(count: int) -> Linear:
+def _unlinearised(count: int | np.int64) -> Linear:
     """Zeros, and points one metre away."""
     return Linear(
         np.zeros((count, 8)), np.zeros((count, 8, 6)), np.zeros((count, 8)), np.ones((count, 4, 3))
@@ -309,7 +309,7 @@ def solve_instant(
     turn, step = np.empty((3, 3)), np.zeros(6)
     covariance = np.zeros((6, 6))
     normal, scores, condition = np.zeros((free, free)), np.zeros(0), 0.0
-    spare = _Spare(_unlinearised(1), np.empty(8), np.empty((8, 6)))
+    spare = _Spare(_unlinearised(np.int64(1)), np.empty(8), np.empty((8, 6)))
     for iteration in range(passes):
         bound = limit * 100.0 if iteration == 0 else limit
         pose = MovingPose(rotation, position, start.motion)

@@ -189,7 +189,8 @@ class Renderer:
         upper = coarse[r0][:, c0] * (1 - fc) + coarse[r0][:, c0 + 1] * fc
         lower = coarse[r0 + 1][:, c0] * (1 - fc) + coarse[r0 + 1][:, c0 + 1] * fc
         texture = upper * (1 - fr) + lower * fr
-        return (self.look.background + 1.5 * self.look.texture * texture).astype(np.float32)
+        grey = self.look.background + 1.5 * self.look.texture * texture
+        return grey.astype(np.float32, order="C")  # kernels are compiled once an order
 
     def _by_depth(self, time_s: float) -> list[Patch]:
         def depth(patch: Patch) -> tuple[int, float]:
