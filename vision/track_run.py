@@ -11,7 +11,12 @@ from numpy.typing import NDArray
 
 from freeswing.calib.camera.camera import Camera
 from freeswing.cdpr.measured.trajectory import Trajectory
-from freeswing.vision.fuse.calibration_share import CalibrationNoise, RunShare, run_share
+from freeswing.vision.fuse.calibration_share import (
+    CalibrationNoise,
+    RunShare,
+    frame_causes,
+    run_share,
+)
 from freeswing.vision.fuse.fuse_cameras import Fit, free_of
 from freeswing.vision.fuse.poses import Poses
 from freeswing.vision.fuse.run_views import CameraViews
@@ -65,18 +70,21 @@ def track_run(
     watch: Watch,
     settings: Settings,
     noise: CalibrationNoise | None = None,
+    frame: Array | None = None,
 ) -> RunTrack:
     """Fuses a run's sightings and corrects the rig.
 
     The trajectory's covariances are those of its scatter. What the calibration's own uncertainty
-    adds is common to the whole run and stated apart, where `noise` tells it.
+    adds is common to the whole run and stated apart, where `noise` tells it; so is what `frame`
+    leaves open of the platform's frame: covariance of its shift (m) and turn (rad), (6, 6).
     """
     views = [CameraViews(camera, paths) for camera, paths in sources]
     counts = tuple(_count(view) for view in views)
     corrected = correct_rig(views, watch, settings.survey_std_m, look=settings.correct_rig)
     poses, lone = recorded_by_two(corrected.poses, corrected.views)
     known = int(poses.known.sum())
-    share = run_share(poses, corrected.after, corrected.views, watch, noise, corrected.doubt)
+    shared = _shared(poses, frame, corrected.doubt)
+    share = run_share(poses, corrected.after, corrected.views, watch, noise, shared)
     deviations = np.sqrt(np.diagonal(poses.covariances, axis1=1, axis2=2))
     steps = np.diff(poses.times_s)
     return RunTrack(
@@ -95,6 +103,13 @@ def track_run(
         (*corrected.remarks, *lone, *_problems(counts, corrected.after, watch)),
         layout_sums(poses, corrected.after, corrected.views, watch),
     )
+
+
+def _shared(poses: Poses, frame: Array | None, doubt: Array | None) -> Array | None:
+    """Causes that runs have in common beside the calibration's, (n, 6, m); None without any."""
+    causes = [] if frame is None else [frame_causes(poses, frame)]
+    causes += [] if doubt is None else [doubt[:, :, None]]
+    return np.concatenate(causes, axis=2) if causes else None
 
 
 def recorded_by_two(poses: Poses, views: Sequence[CameraViews]) -> tuple[Poses, tuple[str, ...]]:

@@ -80,7 +80,7 @@ def run_share(
     views: Sequence[CameraViews],
     watch: Watch,
     noise: CalibrationNoise | None,
-    doubt: Array | None = None,
+    shared: Array | None = None,
 ) -> RunShare | None:
     """The share of a run's poses, from instants spread over it; None where none is told.
 
@@ -90,9 +90,10 @@ def run_share(
         views: its cameras.
         watch: what was looked for.
         noise: the calibration's, None where it is not known.
-        doubt: one cause more, what cameras that contradict each other leave open, (n, 6).
+        shared: causes more that the run has in common with others, such as the platform's frame or
+            what cameras that contradict each other leave open, by instants, (n, 6, m).
     """
-    if noise is None and doubt is None:
+    if noise is None and shared is None:
         return None
     known = np.flatnonzero(poses.known)
     if not len(known):
@@ -108,8 +109,8 @@ def run_share(
             slopes = _pose_slopes(block, poses, views, fit.noise, noise.names, mine, free_of(watch))
             found.append(slopes @ roots)
     slopes = np.concatenate(found) if found else np.zeros((len(chosen), 6, 0))
-    if doubt is not None:
-        slopes = np.concatenate([slopes, doubt[chosen, :, None]], axis=2)
+    if shared is not None:
+        slopes = np.concatenate([slopes, shared[chosen]], axis=2)
     about = int(known[len(known) // 2])
     origin, turn = poses.positions_m[about], poses.rotations[about]
     terms = error_terms(
@@ -121,6 +122,22 @@ def run_share(
         PoseErrors(origin, turn, modes),
         np.sqrt(np.mean(terms**2, axis=0)),
     )
+
+
+def frame_causes(poses: Poses, covariance: Array) -> Array:
+    """What an error of the platform's frame does to each pose, one column a cause, (n, 6, 6).
+
+    Args:
+        poses: of a run.
+        covariance: of a small shift (m) and turn (rad) of that frame in itself, (6, 6).
+
+    Source:
+        Murray, Li, Sastry 1994, A Mathematical Introduction to Robotic Manipulation, ch. 2: errors
+        of a frame as small screws.
+    """
+    values, vectors = np.linalg.eigh(covariance)
+    roots = vectors * np.sqrt(values.clip(0.0))
+    return np.concatenate([poses.rotations @ roots[:3], poses.rotations @ roots[3:]], axis=1)
 
 
 def common_errors(shares: Sequence[RunShare | None]) -> list[PoseErrors | None]:

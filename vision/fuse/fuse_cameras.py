@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from freeswing.vision.fuse.blocks import blocks
 from freeswing.vision.fuse.linearised_block import block_poses, lags, seen_by
-from freeswing.vision.fuse.noise import Noise, NoiseSums, whitened
+from freeswing.vision.fuse.noise import Noise, NoiseSums, alike, whitened
 from freeswing.vision.fuse.pose_kernels import Linear, Solved, linearise_block, solve_block
 from freeswing.vision.fuse.poses import Poses, motion_of_poses, unknown_poses
 from freeswing.vision.fuse.run_views import Block, CameraViews
@@ -118,7 +118,7 @@ def fuse(
         )
         noise = Noise.plain(account.floors())
         if parts is not None:
-            noise = replace(noise, turned_px=parts.turned_px())
+            noise = replace(noise, turned_px=alike(parts.turned_px()))
     return poses, account.fit()
 
 

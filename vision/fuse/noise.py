@@ -197,6 +197,15 @@ class NoiseSums:
         return np.where(surely_turned(sizes, spread * usual), np.sqrt(sizes), 0.0)
 
 
+def alike(turned_px: Array) -> Array:
+    """The largest for all cameras: poses follow one that is turned, whose own residuals hide it.
+
+    Source:
+        Huber, Ronchetti 2009, Robust Statistics, ch. 1: of several claims the least sure.
+    """
+    return np.full(len(turned_px), turned_px.max(initial=0.0))
+
+
 def surely_turned(variances: Array, deviations: Array) -> Mask:
     """Which variances stand out of their own deviations.
 

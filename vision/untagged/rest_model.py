@@ -50,13 +50,14 @@ class RestModel:
         points_m: platform frame, (n, 3).
         T_base_rest: platform to base at rest, by the named points, (4, 4).
         seen: by camera name: points, and their features at rest, in one order.
-        frame_std: how well the marks give its frame, of position (m) and small rotation, (6,).
+        frame_covariance: how well the marks give its frame: of position (m) and small rotation in
+            the base frame, (6, 6).
     """
 
     points_m: Array
     T_base_rest: Array
     seen: Mapping[str, tuple[Ints, Features]]
-    frame_std: Array
+    frame_covariance: Array
 
 
 def moving_part(rest: Image, frames: Sequence[Image]) -> NDArray[np.bool_]:
@@ -107,7 +108,7 @@ def rest_model(
         height, width = rest.shape
         inside = mask[np.clip(at[:, 1], 0, height - 1), np.clip(at[:, 0], 0, width - 1)]
         found.append(features.select(inside))
-    T_base_rest, frame_std = _named_frame(seen, untagged)
+    T_base_rest, covariance = _named_frame(seen, untagged)
     pixels, features_of = _tracks(seen, found)
     points = triangulate(seen, pixels)
     error = np.stack([_errors(c, points, p) for c, p in zip(seen, pixels, strict=True)])
@@ -128,7 +129,7 @@ def rest_model(
     for camera, own, feature in zip(seen, features_of, found, strict=True):
         rows = np.flatnonzero((own >= 0) & good)
         by_camera[camera.name] = (numbers[rows], feature.select(own[rows]))
-    return RestModel(inside, T_base_rest, by_camera, frame_std)
+    return RestModel(inside, T_base_rest, by_camera, covariance)
 
 
 def _errors(camera: Camera, points: Array, pixels: Array) -> Array:
@@ -159,7 +160,7 @@ def _tracks(cameras: Sequence[Camera], found: Sequence[Features]) -> tuple[Array
 
 
 def _named_frame(cameras: Sequence[Camera], untagged: Untagged) -> tuple[Array, Array]:
-    """T_base_platform at rest from the clicked named points, and its deviations, (6,)."""
+    """T_base_platform at rest from the clicked named points, and its covariance, (6, 6)."""
     clicks = _clicks(untagged, [camera.name for camera in cameras])
     names = [point.name for point in untagged.points]
     pixels = np.full((len(cameras), len(names), 2), np.nan)
@@ -182,8 +183,7 @@ def _named_frame(cameras: Sequence[Camera], untagged: Untagged) -> tuple[Array, 
     start = rigid(stated[known], places[known], str(untagged.clicks), own)
     camera_of, which = np.nonzero(np.isfinite(pixels[..., 0]))
     marks, std = pixels[camera_of, which], std_px[camera_of, which]
-    T, covariance = still_pose(cameras, camera_of, stated[which], marks, std, start)
-    return T, np.sqrt(np.diag(covariance))
+    return still_pose(cameras, camera_of, stated[which], marks, std, start)
 
 
 def rigid(stated: Array, places: Array, where: str, names: Sequence[str]) -> Array:

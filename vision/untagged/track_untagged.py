@@ -112,12 +112,16 @@ def track_untagged(
         points, rest = _refined(sources, watch, model, cameras, settings)
         watch = _watch(points)
     noise = read_calibration_noise(results / "calibration.json")
-    tracks = [_grown(track_run(name, views, watch, settings, noise)) for name, views in sources]
-    frame = np.sqrt(model.frame_std**2 + np.diag(rest))
+    frame = frame_of_platform(model.frame_covariance + rest, model.T_base_rest)
+    tracks = [
+        _grown(track_run(name, views, watch, settings, noise, frame)) for name, views in sources
+    ]
+    deviations = np.sqrt(np.diag(frame))
     told = (
         f"{len(model.points_m)} points of the platform; its frame is known to "
-        f"{1e3 * frame[:3].max():.3f} mm and {1e3 * frame[3:].max():.3f} mrad by the marked points "
-        "and the images at rest, which shifts all poses alike"
+        f"{1e3 * deviations[:3].max():.3f} mm and {1e3 * deviations[3:].max():.3f} mrad by the "
+        "marked points and the images at rest, which shifts all poses alike: what is identified "
+        "counts it"
     )
     remarks = {run.name: (told, *unmatched(run, cameras)) for run in filmed}
     tracks = [replace(t, problems=(*remarks[t.name], *t.problems)) for t in tracks]
@@ -125,6 +129,17 @@ def track_untagged(
     document = tracking_document(tracks, watch, change, refined=False)
     known = {track.name: track.trajectory for track in tracks if track.trajectory is not None}
     return Tracked(document, known, empty_run(tracks))
+
+
+def frame_of_platform(covariance: Array, T_base_rest: Array) -> Array:
+    """Covariance of the platform's frame in itself from that of its pose at rest, (6, 6).
+
+    Source:
+        JCGM 100:2008, Guide to the Expression of Uncertainty in Measurement, eq. (13):
+        propagation.
+    """
+    back = np.kron(np.eye(2), T_base_rest[:3, :3].T)
+    return np.asarray(back @ covariance @ back.T)
 
 
 def _watch(points_m: Array) -> Watch:

@@ -12,6 +12,7 @@ from freeswing.cdpr.rotation import exp_rotation
 from freeswing.vision.fuse.noise import (
     Noise,
     NoiseSums,
+    alike,
     least_sizes,
     surely_turned,
     turns_of,
@@ -103,6 +104,11 @@ def test_turned_tags_count_as_many_times_as_err_alike() -> None:
     plain = block.covariances + np.eye(8) * (0.01 / FOCAL) ** 2
     more = 16.0 * (0.02 / FOCAL) ** 2 * turns @ np.swapaxes(turns, 1, 2)
     np.testing.assert_allclose(whole, plain + more, rtol=1e-6, atol=1e-14)
+
+
+def test_what_turns_one_cameras_tags_counts_in_all() -> None:
+    assert alike(np.array([0.0, 0.01, 0.004])).tolist() == [0.01] * 3
+    assert alike(np.zeros(2)).tolist() == [0.0, 0.0]
 
 
 def test_sizes_are_never_negative() -> None:

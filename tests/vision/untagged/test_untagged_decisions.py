@@ -8,8 +8,10 @@ import pytest
 from freeswing.calib.camera.camera import Camera
 from freeswing.cdpr.files.documents import DataError, InputError
 from freeswing.cdpr.measured.target import Marker, Untagged, read_target
-from freeswing.cdpr.rotation import exp_rotation, transform
+from freeswing.cdpr.rotation import exp_rotation, log_rotation, transform
 from freeswing.main import main
+from freeswing.vision.fuse.calibration_share import frame_causes
+from freeswing.vision.fuse.poses import Poses
 from freeswing.vision.untagged.features import matched
 from freeswing.vision.untagged.look import LEAST_MATCHES, agreed_pose
 from freeswing.vision.untagged.refine import PointSums
@@ -22,6 +24,7 @@ from freeswing.vision.untagged.rest_model import (
     rigid,
 )
 from freeswing.vision.untagged.still_pose import still_pose
+from freeswing.vision.untagged.track_untagged import frame_of_platform
 from tests.vision.untagged import boxes
 
 STATED = np.array([[0.0, 0.0, 0.0], [0.2, 0.0, 0.0], [0.0, 0.3, 0.0], [0.1, 0.1, 0.2]])
@@ -134,6 +137,27 @@ def test_points_are_put_right_by_their_sightings() -> None:
         points = sums.moved()
     np.testing.assert_allclose(points[0], true[0], atol=1e-9)
     np.testing.assert_allclose(points[1], true[1] + 0.002, atol=1e-15)  # never seen: as it was
+
+
+def test_an_error_of_the_frame_goes_with_the_platform() -> None:
+    """Poses of a frame that is a little off at rest, against what each cause says it does."""
+    rng = np.random.default_rng(4)
+    root = 1e-5 * rng.normal(size=(6, 6))
+    rest = transform(exp_rotation(np.array([0.3, -0.4, 0.8])), boxes.HOME_M)
+    covariance = frame_of_platform(root @ root.T, rest)
+    places, turns = boxes.swing(np.linspace(0.0, 1.0, 7))
+    still = np.zeros((7, 12))
+    poses = Poses(np.arange(7.0), places, turns, np.zeros((0, 6, 6)), np.ones(7, bool), still)
+    causes = frame_causes(poses, covariance)
+    told = causes @ np.swapaxes(causes, 1, 2)
+    for k in range(7):
+        moved = np.zeros((6, 6))
+        for cause in root.T:
+            wrong = transform(exp_rotation(cause[3:]) @ rest[:3, :3], rest[:3, 3] + cause[:3])
+            frame = np.linalg.inv(rest) @ wrong
+            turn = log_rotation(turns[k] @ frame[:3, :3] @ turns[k].T)
+            moved += np.outer(error := np.concatenate([turns[k] @ frame[:3, 3], turn]), error)
+        np.testing.assert_allclose(told[k], moved, atol=1e-3 * np.abs(moved).max())
 
 
 def untagged(folder) -> Untagged:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from freeswing.cdpr.files.trajectory_files import read_trajectory
+from freeswing.cdpr.measured.pose_errors import read_pose_errors
 from freeswing.cdpr.rotation import log_rotation, matrix_from_angles
 from freeswing.main import main
 from tests.vision.untagged import boxes
@@ -57,3 +58,15 @@ def test_the_frame_is_as_good_as_is_told(tracked) -> None:
     common = np.abs(1e3 * errors.mean(axis=0))
     assert common[:3].max() < 3.0 * float(told[1]), (common, told[0])
     assert common[3:].max() < 3.0 * float(told[2]), (common, told[0])
+
+
+def test_identify_is_told_how_the_frame_may_be_off(tracked) -> None:
+    """Six causes that no calibration tells of: within three deviations of what all poses share."""
+    errors, _, document = tracked
+    told = read_pose_errors(document["runs"][0]["calibration_errors"])
+    assert len(told.modes) >= 6
+    places, turns = boxes.swing(np.arange(FRAMES) / boxes.RATE_HZ)
+    shifts = told.at(places, turns, np.zeros((FRAMES, 6)))
+    deviations = np.sqrt((shifts**2).sum(axis=2)).mean(axis=0)
+    assert (np.abs(errors.mean(axis=0)) < 3.0 * deviations).all(), (errors.mean(axis=0), deviations)
+    assert deviations[:3].max() < 1e-3, deviations
