@@ -10,7 +10,7 @@ from freeswing.cdpr.rotation import nearest_rotation, skew
 Array = NDArray[np.float64]
 
 FEWEST_POINTS = 3
-LEAST_SPREAD = 0.02
+LEAST_SPREAD = 0.02  # of the extent: nearer to a line the turn about it is 50 times worse told
 LEAST_SIZE_M = 1e-6
 
 

@@ -21,12 +21,12 @@ from freeswing.cdpr.rotation import matrix_from_quaternion, quaternion_from_matr
 
 Array = NDArray[np.float64]
 
-SMALLEST_M = 1e-4
+SMALLEST_M = 1e-4  # a tenth of a millimetre: neither printed nor seen
 LARGEST_TAG_M = 3.0  # a tag wider than a room's wall; 5 mm taken for metres is above it
-LARGEST_MARKER_M = 0.5
-QUATERNION_TOLERANCE = 1e-3
+LARGEST_MARKER_M = 0.5  # wider than any; 5 mm taken for metres is above it
+QUATERNION_TOLERANCE = 1e-3  # written with three decimals
 # Of named points' extent: nearer to one line they leave the turn about it to a click's error.
-LEAST_BREADTH = 0.1
+LEAST_BREADTH = 0.1  # of named points' extent: nearer to a line the turn about it is hardly told
 UNIT_CORNERS = 0.5 * np.array([[-1.0, 1, 0, 0], [1, 1, 0, 0], [1, -1, 0, 0], [-1, -1, 0, 0]])
 
 

@@ -6,12 +6,12 @@ import numpy as np
 
 from freeswing.cdpr.robot import Array
 
-LOWEST_PASS_HZ = 5.0
+LOWEST_PASS_HZ = 5.0  # swings of a heavy platform end below (FIDIM 2022, eq. 38)
 HIGHEST_SHARE = 0.12  # of the sampling rate
 _CAUTION = 10.0  # the noise's weight: measured best on simulated swings with 0.1 to 0.3 mm
 _FLOOR_FROM = 0.6  # of Nyquist: nothing but noise is expected above
 _CLEAR = 2.0  # times the noise floor from which a line counts as motion
-_LEAST_SAMPLES = 64
+_LEAST_SAMPLES = 64  # fewer make no spectrum: 0.64 s at 100 Hz
 
 
 def independent_numbers(series: Array) -> float:

@@ -70,6 +70,8 @@ FOOTAGE = "tests/calib/footage/test_footage_limits.py"
 LENS = "tests/calib/camera/test_lens_limits.py"
 BOARD = "tests/calib/board/test_board_limits.py"
 SCENE = "tests/calib/scene/test_scene_limits.py"
+MEASURED = "tests/cdpr/measured/test_measured_limits.py"
+BAND_LIMITS = "tests/ident/signals/test_band_limits.py"
 UNTAGGED = "tests/vision/untagged/test_untagged_limits.py"
 
 HELD = (
@@ -467,6 +469,27 @@ HELD = (
         ),
         UNTAGGED,
     ),
+    Held(
+        "cdpr/measured/target.py",
+        (
+            "SMALLEST_M", "LARGEST_TAG_M", "LARGEST_MARKER_M", "QUATERNION_TOLERANCE",
+            "LEAST_BREADTH",
+        ),
+        MEASURED,
+    ),
+    Held("cdpr/measured/rigid_fit.py", ("LEAST_SPREAD",), MEASURED),
+    Held("cdpr/measured/frame_change.py", ("MOST_MISFIT_M",), MEASURED),
+    Held(
+        "freeswing/doctor/recordings.py",
+        ("MOST_COPIES",),
+        "tests/freeswing/doctor/test_recording_limits.py",
+    ),
+    Held(
+        "ident/signals/band.py",
+        ("LOWEST_PASS_HZ", "HIGHEST_SHARE", "_LEAST_SAMPLES",),
+        BAND_LIMITS,
+    ),
+    Held("ident/judge/prediction.py", ("_ASTRAY",), BAND_LIMITS),
 )  # fmt: skip
 
 
