@@ -79,7 +79,7 @@ def track_run(
     leaves open of the platform's frame: covariance of its shift (m) and turn (rad), (6, 6).
     """
     views = [CameraViews(camera, paths) for camera, paths in sources]
-    counts = tuple(_count(view) for view in views)
+    counts = tuple(camera_count(view) for view in views)
     corrected = correct_rig(views, watch, settings.survey_std_m, look=settings.correct_rig)
     poses, lone = recorded_by_two(corrected.poses, corrected.views)
     known = int(poses.known.sum())
@@ -164,7 +164,8 @@ def _median(values: Array) -> float:
     return float(np.median(values)) if values.size else float("nan")
 
 
-def _count(view: CameraViews) -> CameraCount:
+def camera_count(view: CameraViews) -> CameraCount:
+    """Frames of a recording by what became of them."""
     status = view.status
     rejected = {
         STATUS_NAMES[code]: int(np.sum(status == code))
@@ -184,6 +185,18 @@ def _count(view: CameraViews) -> CameraCount:
 
 def _problems(counts: Sequence[CameraCount], fit: Fit, watch: Watch) -> list[str]:
     """What a reader should know, in words."""
+    said = count_problems(counts)
+    for (camera, thing), (number, first, worst) in fit.rejected.items():
+        if number >= 3:
+            said.append(
+                f"{counts[camera].name}: {watch.name(thing)} left out {number} times, first in "
+                f"frame {first}, up to {worst:.2f} px from where the other sightings put it"
+            )
+    return said
+
+
+def count_problems(counts: Sequence[CameraCount]) -> list[str]:
+    """Frames that showed nothing or are not there, in words."""
     said = []
     for count in counts:
         for reason, number in count.rejected.items():
@@ -191,10 +204,4 @@ def _problems(counts: Sequence[CameraCount], fit: Fit, watch: Watch) -> list[str
                 said.append(f"{count.name}: {number} of {count.frames} frames: {reason}")
         if count.dropped:
             said.append(f"{count.name}: {count.dropped} frames missing between the stamps")
-    for (camera, thing), (number, first, worst) in fit.rejected.items():
-        if number >= 3:
-            said.append(
-                f"{counts[camera].name}: {watch.name(thing)} left out {number} times, first in "
-                f"frame {first}, up to {worst:.2f} px from where the other sightings put it"
-            )
     return said

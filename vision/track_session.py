@@ -106,7 +106,7 @@ def track_session(
     if not filmed:
         raise InputError("no run of the session has a video; there is nothing to track")
     pairs = [(run.name, run_recordings(run, cameras)) for run in filmed]
-    remarks = {name: _examined(found, frame_rate_hz) for name, found in pairs}
+    remarks = {name: examined(found, frame_rate_hz) for name, found in pairs}
     for run in filmed:
         remarks[run.name] += unmatched(run, cameras)
     watch, said = examined_watch(watch, pairs[0][1])
@@ -169,7 +169,7 @@ def unmatched(run: RecordedRun, cameras: Sequence[Camera]) -> list[str]:
     return said + [f"{name}: has no recording in this run" for name in sorted(known - found)]
 
 
-def _examined(found: Sequence[tuple[Camera, Recording]], frame_rate_hz: float | None) -> list[str]:
+def examined(found: Sequence[tuple[Camera, Recording]], frame_rate_hz: float | None) -> list[str]:
     """What a run's recordings say of their times that a reader should know.
 
     Raises:

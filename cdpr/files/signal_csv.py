@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,7 +17,7 @@ from freeswing.cdpr.files.noise_columns import (
     noise_names,
 )
 from freeswing.cdpr.files.number_table import check_times, check_width, read_lines, read_numbers
-from freeswing.cdpr.files.trajectory_csv import column_name, question_unit
+from freeswing.cdpr.files.trajectory_csv import column_name, lines_of, question_unit
 from freeswing.cdpr.measured.trajectory import unwrapped
 from freeswing.cdpr.robot import POSE_COORDINATES, Array
 from freeswing.cdpr.rotation import angles_from_matrix, matrix_from_quaternion
@@ -105,6 +106,18 @@ def read_signals(path: Path | str, channels: tuple[str, ...] = ()) -> SignalTabl
         if not (std[known] > 0.0).all():
             raise InputError(f"{path}: std of {name}: every one must be > 0; or leave it out")
     return SignalTable(columns["t_s"], values, stds)
+
+
+def signal_pieces(table: SignalTable) -> Iterator[bytes]:
+    """Channel columns as CSV in pieces, each with its noise where that is known."""
+    header, parts = ["t_s"], [table.times_s]
+    for name, values in table.values.items():
+        header.append(name)
+        parts.append(values)
+    for name, std in table.stds.items():
+        header.append(f"std_{name}")
+        parts.append(std)
+    return lines_of(header, np.column_stack(parts))
 
 
 def _of_poses(columns: dict[str, Array]) -> dict[str, Array]:

@@ -93,10 +93,11 @@ def csv_pieces(trajectory: Trajectory) -> Iterator[bytes]:
         names, noise = noise_columns(trajectory)
         header += names
         parts.append(noise)
-    return _lines(header, np.concatenate(parts, axis=1))
+    return lines_of(header, np.concatenate(parts, axis=1))
 
 
-def _lines(header: list[str], rows: Array) -> Iterator[bytes]:
+def lines_of(header: list[str], rows: Array) -> Iterator[bytes]:
+    """A table (n, columns) with its header as CSV, some rows at a time."""
     yield (",".join(header) + "\n").encode()
     for first in range(0, len(rows), _ROWS_AT_ONCE):
         part = rows[first : first + _ROWS_AT_ONCE].tolist()

@@ -36,6 +36,33 @@ class CameraShare(Entry):
 
 
 @entry
+class PlanarView(Entry):
+    """The plane of a run by one camera from above.
+
+    Attributes:
+        place_m: the platform's point whose x and y the track gives.
+        lens_known: whether cameras.toml had the lens.
+        focal_px: of the lens, known or fitted.
+        focal_std_px: zero where it was known.
+        distance_m: of the plane along the optical axis.
+        lean_rad: of the plane's normal from the optical axis.
+        lean_std_rad: likewise.
+        systematic_std_mm: what plane and lens leave open of x and y, at most.
+        systematic_std_mrad: the same of chi.
+    """
+
+    place_m: tuple[float, ...] = ()
+    lens_known: bool = False
+    focal_px: float | None = None
+    focal_std_px: float | None = None
+    distance_m: float | None = None
+    lean_rad: float | None = None
+    lean_std_rad: float | None = None
+    systematic_std_mm: float | None = None
+    systematic_std_mrad: float | None = None
+
+
+@entry
 class TrackedRun(Entry):
     """One tracked run.
 
@@ -53,6 +80,7 @@ class TrackedRun(Entry):
         cameras: each.
         problems: sentences.
         calibration_errors: how the calibration may shift the poses.
+        planar: the plane, where one camera from above gave x, y and chi.
     """
 
     run: str
@@ -68,6 +96,7 @@ class TrackedRun(Entry):
     cameras: tuple[CameraShare, ...] = ()
     problems: tuple[str, ...] = ()
     calibration_errors: Any = None
+    planar: PlanarView | None = absent(default=None)
 
 
 @entry

@@ -24,6 +24,14 @@ def read_channels(reader: Reader) -> tuple[Channel, ...]:
     return channels
 
 
+def read_planar(reader: Reader) -> bool:
+    """`planar`: whether one camera from above filmed the runs."""
+    given = reader.raw("planar") if "planar" in reader else False
+    if not isinstance(given, bool):
+        reader.add("planar", "must be true or false")
+    return given is True
+
+
 def read_loads(reader: Reader) -> tuple[Load, ...]:
     """All `[[loads]]`; problems are added to the reader."""
     found = [_read_load(table) for table in reader.children("loads", required=False)]

@@ -14,10 +14,13 @@ from freeswing.cdpr.measured.trajectory import Trajectory, angle_noise
 from freeswing.cdpr.robot import POSE_COORDINATES, Robot
 from freeswing.ident.bench.runs import Bench, BenchRun, Signal
 from freeswing.ident.runs import SwingRun
-from freeswing.session.load_swings import load_trajectory
+from freeswing.results.files import read_document
+from freeswing.results.tracking import Tracking
+from freeswing.session.load_swings import load_trajectory, trajectory_path
 from freeswing.session.marker_runs import read_marker_runs
 from freeswing.session.session_file import Run, Session
 
+STRAIGHT_RAD = 0.05  # as well as one sets tags and wires square to each other
 PARALLEL_RAD = 0.02  # wires that lean towards each other by less hang parallel
 
 
@@ -72,7 +75,13 @@ def load_bench(session: Session, robot: Robot, target: Target | None) -> Bench:
             of wire lengths that is not the robot's.
     """
     columns = tuple(channel.column for channel in session.channels)
-    runs = tuple(_load_run(session, run, robot, target, columns) for run in session.runs)
+    places = planar_places(session)
+    if places:
+        _check_hangs_straight(session, robot)
+    runs = tuple(
+        _load_run(session, run, robot, target, columns, places.get(run.name))
+        for run in session.runs
+    )
     seen = {signal.column for run in runs for signal in run.signals}
     for channel in session.channels:
         if channel.column not in seen:
@@ -98,8 +107,44 @@ def _as_swing(run: BenchRun) -> SwingRun | None:
     return SwingRun(run.name, run.role, trajectory, run.lengths_m, run.lengths_std_m, run.window_s)
 
 
+def planar_places(session: Session) -> dict[str, np.ndarray]:
+    """Runs filmed by one camera from above, and the point of the platform that they follow."""
+    told = (
+        read_document(session.results / "tracking.json", Tracking) if session.video_runs else None
+    )
+    return {
+        run.run: np.array(run.planar.place_m)
+        for run in (() if told is None else told.runs)
+        if run.planar is not None
+    }
+
+
+def _check_hangs_straight(session: Session, robot: Robot) -> None:
+    """One camera from above shows the platform's axes at rest: the base frame's have to be these.
+
+    Raises:
+        InputError: where robot.toml has them turned against each other.
+    """
+    above = (robot.entries_m - robot.entries_m.mean(axis=0))[:, :2]
+    below = (robot.attachments_m - robot.attachments_m.mean(axis=0))[:, :2]
+    turn = np.arctan2(
+        np.sum(below[:, 0] * above[:, 1] - below[:, 1] * above[:, 0]), np.sum(below * above)
+    )
+    if abs(turn) > STRAIGHT_RAD:
+        raise InputError(
+            f"{session.robot}: the wires' upper ends are turned by {np.degrees(turn):.1f} degrees "
+            "against the lower ones: a film from above shows the platform's axes alone, so that "
+            "the base frame's have to be the platform's at rest; write entry_m in these"
+        )
+
+
 def _load_run(
-    session: Session, run: Run, robot: Robot, target: Target | None, columns: tuple[str, ...]
+    session: Session,
+    run: Run,
+    robot: Robot,
+    target: Target | None,
+    columns: tuple[str, ...],
+    place_m: np.ndarray | None = None,
 ) -> BenchRun:
     lengths = run.cable_lengths_m
     if lengths is not None and len(lengths) != robot.n_cables:
@@ -107,11 +152,15 @@ def _load_run(
             f"{session.path}: run {run.name}: cable_lengths_m has {len(lengths)} numbers, "
             f"the robot has {robot.n_cables} cables"
         )
-    if run.trajectory is not None and run.trajectory.suffix.lower() == ".csv":
-        table = read_signals(run.trajectory, columns)
+    path = trajectory_path(session, run)
+    if path.suffix.lower() == ".csv" and path.is_file():
+        table = read_signals(path, columns)
         times = table.times_s
         signals = tuple(
-            Signal(name, values, table.stds.get(name)) for name, values in table.values.items()
+            Signal(
+                name, values, table.stds.get(name), place_m if name in POSE_COORDINATES else None
+            )
+            for name, values in table.values.items()
         )
     else:
         trajectory = load_trajectory(session, run, robot, target, read_marker_runs(session, target))

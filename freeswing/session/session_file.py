@@ -24,6 +24,7 @@ from freeswing.session.bench_keys import (
     read_loads,
     read_payloads,
     read_placed,
+    read_planar,
 )
 from freeswing.session.mocap_frame import read_mocap_frame
 
@@ -117,6 +118,7 @@ class Session:
         loads: objects to be measured.
         T_base_recorded: frame of measured trajectories, (4, 4), None: it is the base frame.
         results: folder that takes everything the commands write.
+        planar: whether one camera from above filmed the runs (`track --planar`).
     """
 
     path: Path
@@ -131,6 +133,7 @@ class Session:
     channels: tuple[Channel, ...] = ()
     loads: tuple[Load, ...] = ()
     T_base_recorded: Array | None = None
+    planar: bool = False
 
     @property
     def folder(self) -> Path:
@@ -180,6 +183,7 @@ def read_session(path: Path | str, results: Path | str | None = None) -> Session
     channels, loads = read_channels(reader), read_loads(reader)
     frame = read_mocap_frame(reader.child("mocap", required=False))
     check_loads(reader, loads, [(run.name, run.loads) for run in runs])
+    planar = read_planar(reader)
     reader.finish()
     problems.raise_if_any(path)
     folder = results_folder(path.parent, results)
@@ -199,6 +203,7 @@ def read_session(path: Path | str, results: Path | str | None = None) -> Session
         channels,
         loads,
         frame,
+        planar,
     )
 
 

@@ -15,6 +15,7 @@ from freeswing.starter.kinds import KINDS
 MEASURED_BY = {
     "cameras": "two or more cameras or phones, printed tags",
     "phone": "one camera or phone, printed tags: less sure across its view",
+    "above": "one phone above a bench of two or three strings (trifilar, bifilar), printed tags",
     "mocap": "recordings of motion capture that exist (.trc .c3d .csv .tsv)",
 }
 MOST_CABLES = 5
@@ -65,7 +66,7 @@ def ask(known: Answers, console: Console | None = None) -> Answers:
 
 
 def _of_cameras(known: Answers, console: Console) -> Answers:
-    cameras = known.cameras or (("phone",) if known.measured_by == "phone" else ())
+    cameras = known.cameras or (("phone",) if known.measured_by in ("phone", "above") else ())
     while not cameras:
         told = Prompt.ask(
             "Names of the cameras, with commas", default="left,right", console=console

@@ -15,6 +15,7 @@ from freeswing.ident.bench.channel_blocks import channel_blocks
 from freeswing.ident.bench.channels import Channel
 from freeswing.ident.bench.chart import Chart
 from freeswing.ident.bench.considered import named_sway, reference
+from freeswing.ident.bench.from_rest import zero_blocks
 from freeswing.ident.bench.modal import SQUARE, ModalSwing
 from freeswing.ident.bench.objects import body_of, moments, specific
 from freeswing.ident.bench.runs import Bench, BenchRun, Load
@@ -91,7 +92,7 @@ def columns_of(run: BenchRun, channels: Sequence[Channel]) -> tuple[Column, ...]
             place = POSE_COORDINATES.index(signal.column)
             unit = UNIT_NOISE_M if place < 3 else UNIT_NOISE_RAD
             std = np.full(len(signal.values), unit) if signal.std is None else signal.std
-            found.append(Column(signal.column, signal.values, std, coordinate=place))
+            found.append(Column(signal.column, signal.values, std, place, place_m=signal.place_m))
         elif signal.column in by_column:
             channel = by_column[signal.column]
             spread = float(np.nanstd(signal.values)) or 1.0
@@ -272,10 +273,21 @@ def _unknowns(
         if channel.name in gains:
             named = named_sway(bench, runs, place)
             blocks += channel_blocks(channel, swings, glimpses, gains[channel.name], named)
+    blocks += zero_blocks(_places(swings), len(runs))
     scaled = reference(bench, runs)
     if scaled is not None:
         blocks.append(_amplitude(scaled))
     return Unknowns(tuple(blocks))
+
+
+def _places(swings: Sequence[BenchSwing]) -> dict[int, Array]:
+    """The point that a camera from above followed, by the coordinates that it gave."""
+    return {
+        column.coordinate: column.place_m
+        for swing in swings
+        for column in swing.columns
+        if column.coordinate is not None and column.place_m is not None
+    }
 
 
 def _amplitude(channel: Channel) -> Unknown:

@@ -113,7 +113,7 @@ def sight(
         else:
             places = column.channel.columns
             seen[row, places] = gains[column.channel.name][: len(places)]
-    direct = [column for column in columns if column.channel is None]
+    direct = [one for one in columns if one.channel is None and one.place_m is None]
     places = [column.coordinate for column in direct if column.coordinate is not None]
     means = np.array([np.nanmean(column.values) for column in direct])
     rest = rest_near(model, lengths_m, inertia, places, means, name)

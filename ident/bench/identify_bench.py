@@ -193,7 +193,7 @@ def _windowed(run: BenchRun) -> BenchRun:
 
 def _part(signal: Signal, inside: Array) -> Signal:
     std = None if signal.std is None else signal.std[inside]
-    return Signal(signal.column, signal.values[inside], std)
+    return replace(signal, values=signal.values[inside], std=std)
 
 
 def _notes(found: Solved, bench: Bench, robot: Robot) -> list[str]:

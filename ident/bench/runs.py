@@ -21,11 +21,14 @@ class Signal:
         column: its name in the file: a coordinate of the pose, or a channel's column.
         values: (n,), NaN where not measured.
         std: stated noise, (n,), or None.
+        place_m: the platform's point that a camera from above followed, (3,): x, y and chi then
+            count from an unknown zero; None: a coordinate of P in the base frame.
     """
 
     column: str
     values: Array
     std: Array | None = None
+    place_m: Array | None = None
 
     @property
     def is_coordinate(self) -> bool:

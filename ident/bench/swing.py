@@ -17,6 +17,7 @@ from freeswing.cdpr.simulation.free_swing import Motion, simulate
 from freeswing.cdpr.simulation.sensitivity import linearise
 from freeswing.ident.bench.channels import Channel
 from freeswing.ident.bench.chart import Chart
+from freeswing.ident.bench.from_rest import from_rest, from_rest_slope
 from freeswing.ident.bench.objects import moments, moments_slope, specific, specific_slope
 
 TOLERANCE_M = 1e-7  # a thousandth of the best tracks' noise
@@ -35,6 +36,7 @@ class Column:
         coordinate: its place in the pose; None for a channel.
         channel: the channel; None for a coordinate.
         factor: on the noise, from the residuals: their size, and their colour.
+        place_m: as `Signal.place_m`: the coordinate is that of this point, from an unknown zero.
     """
 
     name: str
@@ -43,6 +45,7 @@ class Column:
     coordinate: int | None = None
     channel: Channel | None = None
     factor: float = 1.0
+    place_m: Array | None = None
 
     @property
     def known(self) -> Array:
@@ -234,6 +237,8 @@ class BenchSwing:
     def predicted(self, column: Column, zetas: Array, values: Mapping[str, Array]) -> Array:
         """What a column would read along poses (n, 6), (n,)."""
         if column.channel is None:
+            if column.place_m is not None and column.coordinate is not None:
+                return from_rest(column.coordinate, zetas, self.rest, values)
             return np.asarray(zetas[:, column.coordinate])
         design = column.channel.design(zetas - self.rest)
         name = column.channel.name
@@ -248,6 +253,8 @@ class BenchSwing:
     ) -> tuple[Array, dict[str, Array]]:
         """Derivatives of a column by the pose (n, 6), and by the channel's own blocks."""
         if column.channel is None:
+            if column.place_m is not None and column.coordinate is not None:
+                return from_rest_slope(column.coordinate, zetas, self.rest, values)
             slope = np.zeros(zetas.shape)
             slope[:, column.coordinate] = 1.0
             return slope, {}

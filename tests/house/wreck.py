@@ -301,6 +301,7 @@ HELD = (
         ("_GATE_M", "_CLEAR", "_MATCH_M", "_RAYS_MEET_M", "_FORGET", "_START_EVERY"),
         LOOK,
     ),
+    Held("vision/planar/examine.py", ("SIZE_OFF",), "tests/vision/planar/test_plane_fit.py"),
     Held("vision/look/marker_pose.py", ("MOST_SPOTS", "_NEAR_M", "_EXACT_M", "_CLEAR"), LOOK),
     Held("vision/look/occlusion.py", ("_RIM_CELLS", "_READ_CELLS", "_LEAST_HEIGHT"), LOOK),
     Held(

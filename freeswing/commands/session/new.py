@@ -12,6 +12,7 @@ from freeswing.console import Console
 from freeswing.starter.kinds import KINDS
 
 if TYPE_CHECKING:
+    from freeswing.starter.filmed import Filmed
     from freeswing.starter.questions import Answers
 
 FILMED_RUNS = 6
@@ -39,6 +40,12 @@ def add_arguments(parser: ArgumentParser) -> None:
         nargs="+",
         metavar="NAME",
         help="cameras or phones; one is enough, two are far better (default left right)",
+    )
+    parser.add_argument(
+        "--above",
+        action="store_true",
+        help="one phone above a bench of two or three strings (--kind trifilar, bifilar): nothing "
+        "to calibrate",
     )
     parser.add_argument("--rate-hz", type=positive, help=f"frames a second ({USUAL_RATE_HZ:g})")
     parser.add_argument(
@@ -69,7 +76,8 @@ def run(options: Namespace, console: Console) -> None:
     if not 1 <= cables <= 5:
         raise InputError(f"--cables {cables}: 1 to 5 strings leave a free motion to record")
     name = folder.resolve().name
-    beside = _recorded if answers.recordings else _filmed
+    beside = _above if answers.measured_by == "above" else _filmed
+    beside = _recorded if answers.recordings else beside
     written = {
         "robot.toml": robot_toml(name, kind, cables, answers.mass_kg).encode("utf-8"),
         **beside(name, answers, options.paper, console),
@@ -99,13 +107,15 @@ def _answers(options: Namespace) -> Answers:
     for word in options.mocap or ():
         if not files_of([word]):
             raise InputError(f"--mocap {word}: no such file")
-    if recordings and options.cameras:
-        raise InputError("--mocap, --cameras: give one of them")
+    if recordings and (options.cameras or options.above):
+        raise InputError("--mocap, --cameras, --above: give one of them")
+    if options.above and len(options.cameras or ()) > 1:
+        raise InputError("--above: takes one camera; leave it out for several")
     said = Answers(
         kind=options.kind,
         cables=options.cables,
         mass_kg=options.mass_kg,
-        measured_by="mocap" if recordings else "cameras" if options.cameras else None,
+        measured_by=_measured_by(options, bool(recordings)),
         recordings=recordings,
         cameras=tuple(options.cameras or ()),
         rate_hz=options.rate_hz,
@@ -117,15 +127,46 @@ def _answers(options: Namespace) -> Answers:
     return ask(said) if is_asked and not quiet else said
 
 
-def _filmed(name: str, answers: Answers, paper: str, console: Console) -> dict[str, bytes]:
-    """target.toml, session.toml and what to print, by their names."""
+def _measured_by(options: Namespace, recorded: bool) -> str | None:
+    if recorded:
+        return "mocap"
+    if options.above:
+        return "above"
+    return "cameras" if options.cameras else None
+
+
+def _above(name: str, answers: Answers, paper: str, console: Console) -> dict[str, bytes]:
+    """target.toml, session.toml and the sheet to print, for one phone above a bench."""
     from freeswing.cdpr.files.documents import InputError
     from freeswing.printing.pages import pages_pdf
     from freeswing.starter import filmed
-    from freeswing.starter.markers import role
+    from freeswing.starter.above import KINDS_ABOVE, above_session
+
+    kind = answers.kind or USUAL_KIND
+    if kind not in KINDS_ABOVE:
+        raise InputError(
+            f"--above --kind {kind}: a film from above shows x, y and yaw alone, which are the "
+            f"swing of parallel strings: {', '.join(KINDS_ABOVE)}"
+        )
+    chosen = _chosen(answers, paper, ("phone",))
+    return {
+        "target.toml": filmed.tag_target(chosen).encode("utf-8"),
+        "session.toml": above_session(name, chosen, KINDS[kind].cables).encode("utf-8"),
+        "print.pdf": pages_pdf(filmed.pages(chosen)[:1], paper),
+    }
+
+
+def _chosen(answers: Answers, paper: str, cameras: tuple[str, ...]) -> Filmed:
+    """What was chosen, or is usual.
+
+    Raises:
+        InputError: where the tags do not fit on the paper.
+    """
+    from freeswing.cdpr.files.documents import InputError
+    from freeswing.starter import filmed
 
     chosen = filmed.Filmed(
-        answers.cameras or ("left", "right"),
+        answers.cameras or cameras,
         answers.rate_hz or USUAL_RATE_HZ,
         answers.tag_m or USUAL_TAG_M,
         paper,
@@ -136,6 +177,16 @@ def _filmed(name: str, answers: Answers, paper: str, console: Console) -> dict[s
             f"--tag-m {chosen.tag_m:g}: four of them do not fit on {paper}; at most {largest:.3f}, "
             "or --paper a3"
         )
+    return chosen
+
+
+def _filmed(name: str, answers: Answers, paper: str, console: Console) -> dict[str, bytes]:
+    """target.toml, session.toml and what to print, by their names."""
+    from freeswing.printing.pages import pages_pdf
+    from freeswing.starter import filmed
+    from freeswing.starter.markers import role
+
+    chosen = _chosen(answers, paper, ("left", "right"))
     runs = [(f"swing-{k + 1:02d}", role(k, FILMED_RUNS)) for k in range(FILMED_RUNS)]
     if len(chosen.cameras) == 1:
         console.say(
@@ -180,9 +231,10 @@ def _next(folder: Path, written: dict[str, bytes]) -> list[str]:
     """What is left to do, and the next command."""
     steps = []
     if "print.pdf" in written:
+        above = b"planar = true" in written["session.toml"]
         steps.append(
             f"print {folder / 'print.pdf'} at 100 % and measure its ruler; glue the platform's "
-            "sheet flat, hang the base tags upright"
+            f"sheet flat{'' if above else ', hang the base tags upright'}"
         )
     marked = [file for file in FILES if b"nan" in written.get(file, b"")]
     steps.append(f"replace every nan in {' and '.join(marked)} by what you measure")

@@ -37,6 +37,17 @@ def add_arguments(parser: ArgumentParser) -> None:
         help="follow the platform by what it looks like: [untagged] of target.toml",
     )
     parser.add_argument(
+        "--planar",
+        action="store_true",
+        help="one camera from above, its lens known or not: chi, x, y of tags or dots that lie in "
+        "the platform's plane; without target.toml two dots become two channels",
+    )
+    parser.add_argument(
+        "--write-channels",
+        action="store_true",
+        help="with --planar: put the two dots' [[channels]] into session.toml",
+    )
+    parser.add_argument(
         "--write-clocks",
         action="store_true",
         help="put the clocks that all runs agree on into cameras.toml",
@@ -65,13 +76,18 @@ def run(options: Namespace, console: Console) -> None:
     settings = {"correct_rig": not options.trust_cameras, "refine_layout": options.refine_layout}
     if options.no_tags:
         settings["no_tags"] = True
-        _refuse_drawing(options)
+        _refuse_drawing(options, "--no-tags")
+    if options.planar or session.planar:
+        settings["planar"] = True
+        _refuse_drawing(options, "--planar")
     with crew_of(options, session) as crew:
         result = TRACK.take(session, console, settings, crew)
     if options.view or options.overlay:
         _draw(session, console, view=options.view, overlay=options.overlay)
     if options.write_clocks:
         _write_clocks(session, console)
+    if options.write_channels:
+        _write_channels(session, console)
     console.say(str(result))
     console.show_file(result)
 
@@ -84,6 +100,8 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
     from freeswing.vision.settings import Settings
     from freeswing.vision.track_session import track_session
 
+    if settings.get("planar") or session.planar:
+        return _planar(session, console, crew)
     if not session.cameras.is_file():
         raise DataError(f"{session.cameras}: no such file; {_whence(session)}")
     target = load_target(session)
@@ -107,12 +125,81 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
     return _made(found, session, console)
 
 
-def _refuse_drawing(options: Namespace) -> None:
+def _planar(session: Session, console: Console, crew: Crew) -> Made:
+    """One camera from above: x, y, chi, or two channels."""
+    from freeswing.calib.camera.cameras_file import read_cameras
+    from freeswing.cdpr.files.signal_csv import signal_pieces
+    from freeswing.cdpr.files.trajectory_csv import csv_pieces
+    from freeswing.results.tracking import Tracking
+    from freeswing.session.load_swings import load_target
+    from freeswing.session.made import Made
+    from freeswing.vision.planar.track_planar import track_planar
+
+    found = track_planar(
+        session.video_runs,
+        read_cameras(session.cameras) if session.cameras.is_file() else None,
+        load_target(session),
+        results=session.results,
+        frame_rate_hz=session.frame_rate_hz,
+        workers=crew.processes,
+        executor=crew.executor,
+        progress=console.progress,
+    )
+    document = Tracking.from_json(found.document)
+    _summarise_planar(document, console)
+    for sentence in found.said:
+        console.say(f"  {sentence}")
+    named = {channel.column for channel in session.channels}
+    if found.channels and not set(next(iter(found.signals.values())).values) <= named:
+        console.say(f"\n{found.channels}")
+    tracks = [
+        *((name, partial(csv_pieces, one)) for name, one in found.trajectories.items()),
+        *((name, partial(signal_pieces, one)) for name, one in found.signals.items()),
+    ]
+    paths = tuple((session.tracks / f"{name}.csv", pieces) for name, pieces in tracks)
+    return Made((("tracking.json", document),), paths)
+
+
+def _summarise_planar(document: Tracking, console: Console) -> None:
+    from freeswing.report.words import number
+
+    for run in document.runs:
+        noise = ""
+        if run.planar is not None:
+            noise = f", x, y to {number(run.position_std_mm)} mm, "
+            noise += f"chi to {number(run.rotation_std_mrad)} mrad"
+        console.say(f"  {run.run}: {run.known} of {run.samples} frames{noise}")
+        for problem in run.problems:
+            console.say(f"    {problem}")
+
+
+def _write_channels(session: Session, console: Console) -> None:
+    """session.toml with the two dots' channels at its end; tracks made before are then old."""
+    from freeswing.cdpr.files.documents import InputError, replace_file
+    from freeswing.cdpr.files.signal_csv import header_of
+    from freeswing.vision.planar.two_dots import COLUMNS, channel_block
+
+    there = {channel.column for channel in session.channels}
+    made = [run for run in session.video_runs if (session.tracks / f"{run.name}.csv").is_file()]
+    header = header_of(session.tracks / f"{made[0].name}.csv") if made else ()
+    if COLUMNS[0] not in header:
+        raise InputError("--write-channels: two dots without target.toml make channels, no tags do")
+    if set(COLUMNS) <= there:
+        console.say(f"  {session.path}: has these channels already")
+        return
+    text = session.path.read_text(encoding="utf-8").rstrip("\n")
+    replace_file(session.path, f"{text}\n\n{channel_block()}".encode())
+    console.say(f"  {session.path}: two [[channels]] added")
+
+
+def _refuse_drawing(options: Namespace, with_flag: str) -> None:
     from freeswing.cdpr.files.documents import InputError
 
     flags = {"--view": options.view, "--overlay": options.overlay}
     for flag in (flag for flag, wanted in flags.items() if wanted):
-        raise InputError(f"{flag} draws tags and markers: leave it out with --no-tags")
+        raise InputError(
+            f"{flag} draws tags and markers of calibrated cameras: leave it out with {with_flag}"
+        )
 
 
 def _by_looks(
@@ -163,7 +250,8 @@ def _whence(session: Session) -> str:
         return "run freeswing calibrate first"
     return (
         "the session names no recordings of a board to calibrate from ([calibration]): give them, "
-        "or bring cameras.toml from another program by freeswing convert"
+        "or bring cameras.toml from another program by freeswing convert; one camera above a bench "
+        "needs none: freeswing track --planar, or planar = true in session.toml"
     )
 
 

@@ -262,3 +262,22 @@ def test_the_walk_ends_with_a_trustworthy_answer(tmp_path: Path) -> None:
     told = json.loads((SAMPLE / "truth" / "truth.json").read_text(encoding="utf-8"))["com_m"]
     # The sample leaves 0.02 mm of the centre of mass; the frame's turn is known to about 0.1 mrad.
     assert np.abs(turn_to_new_frame(folder).T @ com - told).max() < 3e-4, (com, told)
+
+
+def test_one_phone_above_a_bench_begins_with_a_sheet_to_glue(tmp_path: Path, capsys) -> None:
+    """Nothing to calibrate: with the numbers filled in the session can be read and tracked."""
+    folder = tmp_path / "cube"
+    begun = ["new", str(folder), "--kind", "trifilar", "--above", "--no-questions"]
+    assert main(begun) == 0
+    assert "base tags" not in capsys.readouterr().out
+    assert (folder / "print.pdf").stat().st_size > 1000
+    assert len(read_target(folder / "target.toml").tags) == 4
+    path = folder / "session.toml"
+    path.write_text(path.read_text(encoding="utf-8").replace("nan", "1.2"), encoding="utf-8")
+    session = read_session(folder)
+    assert session.planar
+    assert [len(run.payloads) for run in session.runs].count(1) == 4
+    sides = {float(run.payloads[0].position_m[0]) for run in session.runs if run.payloads}
+    assert sides == {1.2, -1.2}
+    assert main(["new", str(tmp_path / "other"), "--kind", "hook", "--above"]) == 2
+    assert "trifilar, bifilar" in capsys.readouterr().err

@@ -6,13 +6,14 @@ What the files do not say: drag, one wire 2 mm longer than told, a platform 5 % 
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from tests.oracle.mechanics.equilibrium import settle
-from tests.oracle.mechanics.newton_euler import simulate
+from tests.oracle.mechanics.newton_euler import Motion, simulate
 from tests.oracle.mechanics.world import Array, Body, World, plain_world
 from tests.oracle.recorded.session_files import write_samples
 from tests.oracle.recorded.sessions import tait_bryan
@@ -27,6 +28,7 @@ PLATFORM_KG_M2 = np.array([0.021, 0.024, 0.040])  # about its centre
 LOAD_KG, LOAD_KG_M2 = 0.8, np.array([0.0062, 0.0071, 0.0093])
 LOAD_COM_M = np.array([0.004, -0.006, 0.01])
 WEIGHT_KG, WEIGHT_M = 0.4, np.array([0.12, 0.0, -0.02])
+BOTH_SIDES_M = (WEIGHT_M, WEIGHT_M * [-1.0, 1.0, 1.0], WEIGHT_M * [0.0, 1.0, 1.0])  # and middle
 RATE_HZ = 50.0
 
 
@@ -74,6 +76,7 @@ def make_bench(
     duration_s: float = 10.0,
     counts: tuple[int, int, int] = (3, 3, 4),
     hidden: Hidden = USUAL,
+    weights_m: Sequence[Array] = (WEIGHT_M,),
 ) -> BenchTruth:
     """Write a bench session.
 
@@ -85,6 +88,7 @@ def make_bench(
         duration_s: of each run.
         counts: tare, known-weight and loaded runs.
         hidden: what the files do not say.
+        weights_m: where the known mass is put, one run after the other.
     """
     rng = np.random.default_rng(seed)
     (folder / "runs").mkdir(parents=True, exist_ok=True)
@@ -103,14 +107,15 @@ def make_bench(
     told = LOAD_COM_M + rng.normal(0.0, 0.001, 3)
     lines += [f"com_m = {told.tolist()}", "com_std_m = 0.001"]
     for k, kind in enumerate(kinds):
-        world = _world(wires, kind, hidden)
+        weight_m = weights_m[(k - counts[0]) % len(weights_m)]
+        world = _world(wires, kind, weight_m, hidden)
         name = f"{kind}-{k + 1:02d}"
         _record(folder / "runs" / f"{name}.csv", world, rng, seen, duration_s)
         lines += ["", "[[runs]]", f'name = "{name}"', 'role = "identify"']
         lines += [f"cable_lengths_m = {[WIRE_M] * wires}", "cable_lengths_std_m = 0.001"]
         lines += [f'trajectory = "runs/{name}.csv"']
         if kind == "weight":
-            lines.append(f"payload = {{ mass_kg = {WEIGHT_KG}, position_m = {WEIGHT_M.tolist()} }}")
+            lines.append(f"payload = {{ mass_kg = {WEIGHT_KG}, position_m = {weight_m.tolist()} }}")
         if kind == "loaded":
             lines.append('loads = ["object"]')
     (folder / "session.toml").write_text("\n".join([*lines, ""]))
@@ -150,7 +155,7 @@ def _moment(mass: float, com: Array, principal: Array) -> tuple[float, Array, Ar
     return mass, mass * com, np.diag(principal) + mass * spread
 
 
-def _world(wires: int, kind: str, hidden: Hidden) -> World:
+def _world(wires: int, kind: str, weight_m: Array, hidden: Hidden) -> World:
     from freeswing.cdpr.robot import Cable, Robot
 
     ends = _ends(wires)
@@ -160,7 +165,7 @@ def _world(wires: int, kind: str, hidden: Hidden) -> World:
     robot = Robot("bench", cables, np.array([0.0, 0.0, -GRAVITY]))
     parts = [_moment(DECLARED_KG * hidden.heavier, PLATFORM_COM_M, PLATFORM_KG_M2)]
     if kind == "weight":
-        parts.append(_moment(WEIGHT_KG, WEIGHT_M, np.zeros(3)))
+        parts.append(_moment(WEIGHT_KG, weight_m, np.zeros(3)))
     if kind == "loaded":
         parts.append(_moment(LOAD_KG, LOAD_COM_M, LOAD_KG_M2))
     mass = sum(part[0] for part in parts)
@@ -181,14 +186,25 @@ def _world(wires: int, kind: str, hidden: Hidden) -> World:
     )
 
 
-def _record(path: Path, world: World, rng: np.random.Generator, seen: str, span_s: float) -> None:
+def bench_swing(
+    wires: int, kind: str, rng: np.random.Generator, span_s: float, rate_hz: float = RATE_HZ
+) -> Motion:
+    """One swing of a bench, twisted by hand: `kind` is tare, weight or loaded."""
+    return _swing(_world(wires, kind, WEIGHT_M, USUAL), rng, span_s, rate_hz)
+
+
+def _swing(world: World, rng: np.random.Generator, span_s: float, rate_hz: float) -> Motion:
     rest = settle(world, np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
     twist = np.zeros(6)
     # A twist by hand: about 8 degrees of yaw, and a centimetre of sway that nobody wanted.
     twist[5] = rng.choice([-1.0, 1.0]) * rng.uniform(0.5, 0.7)
     twist[:2] = rng.normal(0.0, 0.02, 2)
     start = rest.position_m, rest.quaternion, span_s, _allowed(rest, twist)
-    motion = simulate(world, *start, RATE_HZ)
+    return simulate(world, *start, rate_hz)
+
+
+def _record(path: Path, world: World, rng: np.random.Generator, seen: str, span_s: float) -> None:
+    motion = _swing(world, rng, span_s, RATE_HZ)
     angles = tait_bryan(motion.quaternions)
     chi = angles[:, 2]
     times = motion.times_s[:, None]

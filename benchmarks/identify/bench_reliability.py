@@ -1,0 +1,120 @@
+"""How far benches of two or three wires are off, and how often their deviations hold.
+
+    python -m benchmarks.identify.bench_reliability OUT --seeds 20
+
+makes sessions by another simulator (tests/oracle/recorded/benches.py: undeclared drag, one wire
+2 mm long, a platform 5 % heavier than declared; 3 empty, 3 known-weight and 4 loaded runs),
+identifies each, and compares the object's Izz with what was put in. The known mass lies on both
+sides and in the middle, as the guide has it; `--one-side` leaves it where it is. A session that has
+a result in OUT/benches.json is not run again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.harness import Row, publish
+from freeswing.ident.bench.identify_bench import identify_bench
+from freeswing.session.load_bench import load_bench
+from freeswing.session.load_swings import load_robot
+from freeswing.session.session_file import read_session
+from tests.oracle.recorded.benches import BOTH_SIDES_M, WEIGHT_M, make_bench
+
+WANTED_PERCENT = {"poses": 0.5, "chi": 1.0, "track": 2.0}
+CLAIMED = 3.0  # deviations
+FIRST_SEED = 100
+WIRES = (3, 2)
+
+
+def one_bench(folder: Path, seed: int, wires: int, seen: str, one_side: bool) -> dict[str, Any]:
+    """One session's errors in per cent and in claimed deviations, with its processor time."""
+    weights = (WEIGHT_M,) if one_side else BOTH_SIDES_M
+    truth = make_bench(folder, seed, wires, seen, weights_m=weights)
+    session = read_session(folder)
+    robot = load_robot(session)
+    start = time.process_time()
+    told = identify_bench(load_bench(session, robot, None), robot).document()
+    seconds = time.process_time() - start
+    bodies = {o["name"]: {p["name"]: p for p in o["parameters"]} for o in told["objects"]}
+    row: dict[str, Any] = {"wires": wires, "seen": seen, "one_side": one_side, "seed": seed}
+    for name, found, true in (
+        ("object", bodies["object"]["Izz_kg_m2"], truth.load_izz),
+        ("platform", bodies["platform"]["Izz_P_kg_m2"], truth.platform_izz_p),
+        ("mass", bodies["platform"]["mass_kg"], truth.platform_kg),
+    ):
+        row[name] = _error(found["value"], found["std"], true)
+    warned = [note for note in told["notes"] if "RELY" in note or "rely" in note]
+    return {**row, "warned": warned, "seconds": seconds}
+
+
+def _error(value: float | None, std: float | None, true: float) -> dict[str, float | None]:
+    """In per cent and in deviations; None where the bench says that it cannot tell."""
+    if value is None or std is None:
+        return {"percent": None, "std_percent": None, "z": None}
+    return {
+        "percent": 100.0 * (value / true - 1.0),
+        "std_percent": 100.0 * std / true,
+        "z": (value - true) / std,
+    }
+
+
+def rows_of(kept: list[dict[str, Any]]) -> list[Row]:
+    """The figures by bench and by what was measured."""
+    found = []
+    for key in dict.fromkeys((one["wires"], one["seen"], one["one_side"]) for one in kept):
+        mine = [one for one in kept if (one["wires"], one["seen"], one["one_side"]) == key]
+        seen = [one["object"] for one in mine if one["object"]["z"] is not None]
+        off = np.array([abs(one["percent"]) for one in seen])
+        z = np.array([abs(one["z"]) for one in seen])
+        limit = WANTED_PERCENT[key[1]]
+        good = int(np.sum((off < limit) & (z < CLAIMED)))
+        name = f"{key[0]} wires, {key[1]}" + (", weights on one side" if key[2] else "")
+        claimed = np.median([one["std_percent"] for one in seen]) if seen else np.nan
+        note = f"of {len(mine)} within {limit:g} % and {CLAIMED:g} deviations"
+        found += [
+            Row(name, good, "seeds", note=note),
+            Row(f"{name}: largest error", float(off.max(initial=0.0)), "%"),
+            Row(f"{name}: rms error", float(np.sqrt(np.mean(off**2))) if seen else np.nan, "%"),
+            Row(f"{name}: claimed", float(claimed), "%", note="median deviation"),
+            Row(f"{name}: rms", float(np.sqrt(np.mean(z**2))) if seen else np.nan, "deviations"),
+            Row(f"{name}: time", float(np.median([one["seconds"] for one in mine])), "s"),
+        ]
+    return found
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Make, identify and compare; exit status 1 where a limit breaks."""
+    parser = argparse.ArgumentParser(description=str(__doc__).splitlines()[0])
+    parser.add_argument("out", type=Path)
+    parser.add_argument("--seeds", type=int, default=20)
+    parser.add_argument("--wires", type=int, choices=WIRES, action="append")
+    parser.add_argument("--seen", choices=tuple(WANTED_PERCENT), action="append")
+    parser.add_argument("--one-side", action="store_true", help="the known mass never moves")
+    parser.add_argument("--json", type=Path)
+    options = parser.parse_args(arguments)
+    options.out.mkdir(parents=True, exist_ok=True)
+    path = options.out / "benches.json"
+    kept: list[dict[str, Any]] = json.loads(path.read_text()) if path.exists() else []
+    done = {(one["wires"], one["seen"], one["one_side"], one["seed"]) for one in kept}
+    for seed in range(FIRST_SEED, FIRST_SEED + options.seeds):
+        for wires in options.wires or WIRES:
+            for seen in options.seen or WANTED_PERCENT:
+                key = (wires, seen, options.one_side, seed)
+                if key in done:
+                    continue
+                kept.append(one_bench(options.out / "-".join(map(str, key)), seed, *key[:3]))
+                path.write_text(json.dumps(kept, indent=1) + "\n")
+                told = kept[-1]["object"]
+                print(*key, {k: v and round(v, 3) for k, v in told.items()}, flush=True)
+    return publish("bench_reliability", rows_of(kept))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,1 @@
+"""One camera from above: a platform's motion in its own plane."""
