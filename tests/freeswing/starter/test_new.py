@@ -110,7 +110,7 @@ def one_long_recording(path: Path) -> tuple[float, float]:
     carried = start + (end - start) * share**2 * (3.0 - 2.0 * share) + jerk
     places = np.concatenate([first.positions_m, carried, second.positions_m])
     times = step * np.arange(len(places))
-    write_trc(path, MarkerRecording(times, first.names, places))
+    write_trc(path, MarkerRecording(np.asarray(times, np.float64), first.names, places))
     return step * len(first.times_s), step * (len(first.times_s) + len(carried))
 
 
