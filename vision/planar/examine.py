@@ -18,7 +18,6 @@ _EVERY, _FRAMES = 15, 6
 SIZE_OFF = 1.6  # times: paper scaled by a printer is off by a tenth, a mistaken tag by two
 ALONG = 0.9  # cosine between where the turning point is and where it should be
 LEAST_ARM = 0.5  # of a tag's side: a tag on the turning point tells nothing
-FREQUENCIES = 3  # of a trifilar bench's small oscillations; each series has its strongest two
 LEAST_SAMPLES = 80
 STEP_SHARE = 0.5  # a step must take away half of what oscillations leave
 STEP_STDS = 6.0  # and be so many times what is left
