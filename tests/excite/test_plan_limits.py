@@ -36,16 +36,16 @@ def test_sources_far_below_the_largest_are_not_told(share, told) -> None:
 
 
 def test_bodies_of_which_nothing_is_said_are_a_disc_and_a_small_object() -> None:
-    """A full disc as wide as the wires: m r^2 / 2; an object a third as wide, with a rim."""
+    """Full discs, m r^2 / 2: as wide as the wires, and 0.45 as wide."""
     ends = 0.3 * np.array([[1.0, 0.0, 0.0], [-0.5, 0.75**0.5, 0.0], [-0.5, -(0.75**0.5), 0.0]])
     robot = SimpleNamespace(
         attachments_m=ends, entries_m=ends + np.array([0.0, 0.0, 1.0]),
         platform=SimpleNamespace(mass_kg=2.0, specific_inertia_m2=None),
     )  # fmt: skip
     case = bench_table.bench_case(robot, None, None)
-    disc, ring = 0.5 * 2.0 * 0.3**2, 2.0 * (0.3 / 3.0) ** 2
+    disc, small = 0.5 * 2.0 * 0.3**2, 0.5 * 2.0 * (0.45 * 0.3) ** 2
     assert case.izz_kg_m2 == pytest.approx(disc, rel=0.1)
-    assert case.load_izz_kg_m2 == pytest.approx(ring, rel=0.15)
+    assert case.load_izz_kg_m2 == pytest.approx(small, rel=0.15)
 
 
 @pytest.mark.parametrize(("cost", "share"), [(9.5, 1.0), (10.5, 0.0)])
