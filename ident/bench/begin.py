@@ -206,9 +206,10 @@ def _waves_fitted(view: Sight, waves: Array, seen: Array, group: list[int]) -> t
         rows.append(part * weight[:, None])
         right.append(np.where(view.known[:, k], view.values[:, k], 0.0) * weight)
     design = np.vstack(rows)
-    # Of each wave's own size: a coordinate that hardly moves has a weight of which a share holds
-    # all others at zero.
-    ridge = np.sqrt(RIDGE) * np.linalg.norm(design[:, : 2 * count], axis=0)
+    # Of each wave's own size: a coordinate that hardly moves has a weight of which a share would
+    # hold all others at zero. A wave that no column sees stays within a sway.
+    sizes = np.linalg.norm(design[:, : 2 * count], axis=0)
+    ridge = np.sqrt(RIDGE) * np.hypot(sizes, np.sqrt(n) / SWAY_M)
     held = np.hstack([np.diag(ridge), np.zeros((2 * count, len(group)))])
     found = np.linalg.lstsq(
         np.vstack([design, held]), np.concatenate([*right, np.zeros(2 * count)]), rcond=None

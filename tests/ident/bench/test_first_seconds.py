@@ -1,0 +1,44 @@
+"""The first seconds of a run as small oscillations: which waves are followed, which are held."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from freeswing.cdpr.model.equations import build_model
+from freeswing.cdpr.model.statics import modes
+from freeswing.ident.bench.assemble import EFFECTS
+from freeswing.ident.bench.begin import glimpse, sight
+from freeswing.ident.bench.swing import Column
+from tests.ident.bench.test_swing_slopes import trifilar
+
+INERTIA = np.array([0.0, 0.0, -0.05, 0.02, 0.02, 0.035, 0.0, 0.0, 0.0])
+TIMES_S = np.arange(300) / 50.0
+LENGTHS_M = np.full(3, 1.2)
+
+
+def yaw_and(sway_m: float | None):
+    """A first look at a twist of 0.1 rad, x beside it or not measured."""
+    model = build_model(trifilar(), EFFECTS)
+    still = Column("chi", np.zeros(300), np.full(300, 1e-3), 5)
+    rest = sight(model, "a", LENGTHS_M, INERTIA, TIMES_S, (still,), {}).rest
+    hertz = modes(model, rest, INERTIA).frequencies_hz.max()
+    chi = 0.1 * np.cos(2.0 * np.pi * hertz * TIMES_S)
+    columns = [Column("chi", chi, np.full(300, 1e-3), 5)]
+    if sway_m is not None:
+        noise = np.random.default_rng(0).normal(0.0, sway_m, 300)
+        columns.insert(0, Column("x", noise, np.full(300, 1e-4), 0))
+    view = sight(model, "a", LENGTHS_M, INERTIA, TIMES_S, columns, {})
+    return glimpse(model, view, INERTIA)
+
+
+@pytest.mark.parametrize("sway_m", [1e-2, 1e-4, 1e-6])
+def test_yaw_is_followed_however_little_the_platform_sways(sway_m: float) -> None:
+    found = yaw_and(sway_m)
+    assert found.residuals[1] < 0.01, found.residuals  # a tenth of its amplitude
+    assert abs(found.zeta[5]) == pytest.approx(0.1, abs=0.01)
+
+
+def test_a_wave_that_no_column_sees_stays_small() -> None:
+    found = yaw_and(None)
+    assert np.abs(found.moved[:, :2]).max() < 0.02, np.abs(found.moved).max(axis=0)
