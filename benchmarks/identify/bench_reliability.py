@@ -61,7 +61,7 @@ def _error(value: float | None, std: float | None, true: float) -> dict[str, flo
     return {
         "percent": 100.0 * (value / true - 1.0),
         "std_percent": 100.0 * std / true,
-        "z": (value - true) / std,
+        "z": (value - true) / std if std > 0.0 else None,  # a mass that was trusted
     }
 
 
