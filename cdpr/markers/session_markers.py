@@ -37,7 +37,7 @@ Mask = NDArray[np.bool_]
 # result is better than one that claims tenths of a millimetre. Less is said as a warning (of one
 # recording of Bologna alone, 3.4 mm of one marker explains what 1.7 and 1.0 mm of two do).
 MOST_OPEN_M = 5e-3
-FEWEST_SAMPLES = 8
+FEWEST_SAMPLES = 8  # a mean layout and each marker's deviation to a quarter of itself
 
 
 @dataclass(frozen=True, slots=True)

@@ -73,6 +73,7 @@ SCENE = "tests/calib/scene/test_scene_limits.py"
 MEASURED = "tests/cdpr/measured/test_measured_limits.py"
 BAND_LIMITS = "tests/ident/signals/test_band_limits.py"
 UNTAGGED = "tests/vision/untagged/test_untagged_limits.py"
+CDPR = "tests/cdpr/test_cdpr_limits.py"
 
 HELD = (
     Held(
@@ -491,6 +492,31 @@ HELD = (
         BAND_LIMITS,
     ),
     Held("ident/judge/prediction.py", ("_ASTRAY",), BAND_LIMITS),
+    Held("cdpr/driven/drive.py", ("LEAST_DRIVEN",), CDPR),
+    Held("cdpr/effects/forces/tether.py", ("DEPTH",), CDPR),
+    Held("cdpr/files/drive_file.py", ("COULOMB_WIDTH_RAD_S",), CDPR),
+    Held("cdpr/mesh/nominal_inertia.py", ("LARGEST_PLATFORM_M",), CDPR),
+    Held("cdpr/mesh/separate_bodies.py", ("_INSIDE",), CDPR),
+    Held("cdpr/model/domain.py", ("LEAST_COSINE",), CDPR),
+    Held("cdpr/simulation/nearby.py", ("LARGEST_RATIO",), CDPR),
+    Held(
+        "cdpr/markers/layout.py",
+        ("FREEDOM", "RUN_STD_M", "TARGET_LEAST_STD_M", "WRONG_BY_M", "WRONG_SHARE", "TARGET_CLEAR"),
+        SPOTS,
+    ),
+    Held("cdpr/markers/rigidity.py", ("LEAST_VARIANCE_SHARE",), SPOTS),
+    Held("cdpr/markers/session_markers.py", ("FEWEST_SAMPLES",), SPOTS),
+    Held("cdpr/markers/spacing.py", ("FEWEST_TO_EXCHANGE",), SPOTS),
+    Held(
+        "cdpr/measured/quaternion_readings.py",
+        ("LEFT_OVER",),
+        "tests/freeswing/doctor/test_quaternions.py::test_what_is_left_by_the_right_reading",
+    ),
+    Held(
+        "freeswing/doctor/quaternions.py",
+        ("LENGTHS_OFF_M",),
+        "tests/freeswing/doctor/test_quaternions.py::test_what_is_left_by_the_right_reading",
+    ),
 )  # fmt: skip
 
 

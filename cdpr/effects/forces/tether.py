@@ -8,6 +8,7 @@ from freeswing.cdpr.effects.base import PAYLOAD, Effect, Instant, Parameter
 from freeswing.cdpr.model.body import Expression
 from freeswing.cdpr.robot import Robot
 
+# Of the entries' spread: about where platforms hang below them, so that the pull told is one felt.
 DEPTH = 0.7
 SMALLEST_PULL_M_S2 = 1e-9
 

@@ -1,4 +1,7 @@
 """What is decided of markers, on both sides of every limit, on made numbers."""
+# Stubs stand for what is not looked at.
+# pyright: reportArgumentType=false, reportOptionalMemberAccess=false
+# pyright: reportOptionalSubscript=false, reportReturnType=false
 
 from types import SimpleNamespace
 
@@ -8,6 +11,7 @@ import pytest
 from freeswing.cdpr.files.problems import DataError
 from freeswing.cdpr.markers import layout, rigidity, session_markers, spacing
 from freeswing.cdpr.markers.slow_residuals import slow_share
+from freeswing.cdpr.measured.marker_recording import MarkerRecording
 from freeswing.cdpr.measured.target import Marker, Target
 
 SQUARE = np.array([[0.1, 0.0, 0.0], [-0.1, 0.0, 0.0], [0.0, 0.2, 0.0], [0.0, -0.2, 0.05]])
@@ -121,3 +125,84 @@ def test_a_frame_is_open_by_five_millimetres_at_most(monkeypatch, open_m, refuse
             session_markers.common_layout(target, [run])
         return
     assert session_markers.common_layout(target, [run]) is told
+
+
+def ball(n: int) -> np.ndarray:
+    """Places on a ball of 0.2 m, evenly (n, 3)."""
+    height = (np.arange(n) + 0.5) / n * 2.0 - 1.0
+    turn = np.pi * (1.0 + np.sqrt(5.0)) * np.arange(n)
+    flat = np.sqrt(1.0 - height**2)
+    return 0.2 * np.stack([flat * np.cos(turn), flat * np.sin(turn), height], axis=1)
+
+
+def test_a_marker_that_is_four_scales_off_has_a_fifth_of_the_weight():
+    """Student's law with four degrees of freedom: 4 of 4 + 16."""
+    places = ball(200)
+    off = places.copy()
+    off[0] += [0.0, 4e-3, 0.0]
+    weights = layout.align(off, places, 1e-3).weights
+    assert weights[0] / np.median(weights) == pytest.approx(0.2, rel=0.04)
+
+
+def test_one_run_alone_has_the_usual_change_from_run_to_run():
+    found = layout.session_layout(SQUARE, [SQUARE + 0.1], 1e-6)
+    assert found.run_std_m == pytest.approx(0.3e-3, rel=0.05)
+
+
+def test_a_drawing_is_good_to_a_fiftieth_of_a_millimetre():
+    found = layout.align_to_target(ball(5) + 0.1, ball(5))
+    assert np.allclose(1.0 / np.sqrt(found.weights[found.weights > 0.0]), 2e-5, rtol=0.05)
+
+
+def off_by(off_m: float) -> layout.Alignment:
+    """Four markers measured beside a drawing, one of whose numbers is wrong."""
+    places = np.array([[0.3, 0.0, 0.0], [-0.3, 0.0, 0.0], [0.0, 0.3, 0.0], [0.0, -0.3, 0.3]])
+    wrong = places.copy()
+    wrong[3, 2] += off_m
+    return layout.align_to_target(places, wrong)
+
+
+@pytest.mark.parametrize(("off_m", "left_out"), [(2.19e-3, False), (2.255e-3, True)])
+def test_a_number_of_a_drawing_is_wrong(off_m, left_out):
+    """It is one of twenty and wrong by 2 cm at most, where the others agree to 0.02 mm.
+
+    Likelihoods with and without it are alike at 2.22 mm, and differ by 6 log(off).
+    """
+    assert (off_by(off_m).weights[3] == 0.0) == left_out
+
+
+@pytest.mark.parametrize(("off_m", "open_too"), [(4.85e-3, True), (5.37e-3, False)])
+def test_that_no_number_is_wrong_stays_open_up_to_odds_of_150(off_m, open_too):
+    """6 log(5.11 / 2.22) is 5: log likelihoods that far apart."""
+    assert (off_by(off_m).rival_m > 0.0) == open_too
+
+
+def test_without_its_own_noise_a_marker_is_taken_for_half_as_uncertain_as_the_others():
+    rng = np.random.default_rng(3)
+    points = np.tile(ball(7), (300, 1, 1))
+    points[:, 1:] += 1e-4 * rng.normal(size=(300, 6, 3))
+    std = rigidity.rigidity(ball(7), points).std_m
+    usual = np.median(np.r_[0.0, std[1:] ** 2])
+    assert std[0] ** 2 / usual == pytest.approx(0.25, rel=0.02)
+
+
+@pytest.mark.parametrize(("samples", "enough"), [(7, False), (8, True)])
+def test_eight_samples_with_three_markers(samples, enough):
+    target = Target((), tuple(Marker(f"m{k}", place, 0.01) for k, place in enumerate(SQUARE)))
+    points = np.tile(SQUARE, (12, 1, 1))
+    points[samples:, :2] = np.nan
+    names = target.marker_names
+    recording = MarkerRecording(0.01 * np.arange(12.0), names, points)
+    if enough:
+        assert len(session_markers.examine(recording, target).rigidity.layout_m) == 4
+        return
+    with pytest.raises(DataError, match="no sample shows three markers"):
+        session_markers.examine(recording, target)
+
+
+@pytest.mark.parametrize(("n", "found"), [(3, None), (4, (1, 0, 2, 3))])
+def test_labels_of_four_markers_show_an_exchange(n, found):
+    """Three alike in two distances may as well be another platform."""
+    places = np.array([[0.0, 0.0, 0.0], [0.3, 0.0, 0.0], [0.0, 0.5, 0.0], [0.2, 0.1, 0.4]])[:n]
+    points = np.tile(places[[1, 0, *range(2, n)]], (20, 1, 1))
+    assert spacing.renamed(places, points) == found

@@ -73,6 +73,24 @@ def test_what_is_right_and_what_is_merely_wrong_is_not_named() -> None:
     assert mistaken_quaternions(far, ROBOT) == ("", "")
 
 
+@pytest.mark.parametrize(
+    ("off_m", "left_m", "named"),
+    [
+        (0.0205, 0.001, True),
+        (0.0195, 0.001, False),
+        (0.1, 0.0195, True),
+        (0.1, 0.0205, False),
+    ],
+)
+def test_what_is_left_by_the_right_reading(monkeypatch, off_m, left_m, named) -> None:
+    """Lengths off by 2 cm, of which the right reading leaves a fifth at most."""
+    off = iter([off_m, left_m, off_m, off_m])
+    monkeypatch.setattr("freeswing.doctor.quaternions._lengths_off", lambda *_: next(off))
+    monkeypatch.setattr("freeswing.doctor.quaternions.build_model", lambda _: None)
+    still = Trajectory.from_poses(np.arange(9.0), np.zeros((9, 3)), np.tile(np.eye(3), (9, 1, 1)))
+    assert bool(mistaken_quaternions(SwingRun("a", "identify", still), ROBOT)[0]) == named
+
+
 def test_a_driven_session_is_told_so_too(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
