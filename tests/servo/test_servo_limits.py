@@ -7,7 +7,7 @@ import pytest
 
 from freeswing.cdpr.files.problems import InputError
 from freeswing.servo.design import hinf, tuning
-from freeswing.servo.files.identified_file import _read
+from freeswing.servo.files.identified_file import identified
 from freeswing.servo.files.task_file import Task, read_task
 from freeswing.servo.loop import closed_loop
 from freeswing.servo.loop.closed_loop import Run
@@ -115,14 +115,14 @@ def test_a_modulus_margin_of_045_is_kept(monkeypatch, margin, index):
 
 @pytest.mark.parametrize(("least", "refused"), [(-0.9e-8, False), (-1.1e-8, True)])
 def test_correlations_are_negative_by_rounding_alone(least, refused):
-    rows = [{"name": name, "value": 1.0, "std": 0.1} for name in ("a", "b")]
-    joint = {"parameters": rows, "correlation": [[1.0, 1.0 - least], [1.0 - least, 1.0]]}
+    numbers = [SimpleNamespace(name=name, value=1.0, std=0.1, tied=()) for name in ("a", "b")]
+    joint = numbers, np.array([[1.0, 1.0 - least], [1.0 - least, 1.0]])
     model = SimpleNamespace(names=("a", "b"), robot=SimpleNamespace(name="r"))
     if refused:
         with pytest.raises(ValueError, match="make no covariance"):
-            _read(joint, model)
+            identified(*joint, model)
         return
-    assert _read(joint, model).values.tolist() == [1.0, 1.0]
+    assert identified(*joint, model).values.tolist() == [1.0, 1.0]
 
 
 def task_text(end_s: str, position: float) -> str:
