@@ -7,6 +7,7 @@ eight places); derivatives by them go out in the same order.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -19,6 +20,7 @@ NEWTON_STEPS = 30
 CONVERGED = 1e-12
 _LEAST_DETERMINANT = 1e-6
 SOLVED = 1e-9
+_NEIGHBOUR = 0.01  # step to a neighbouring pixel of any lens here: rays farther apart start anew
 
 
 @numba.njit(cache=True, nogil=True)
@@ -147,41 +149,94 @@ def lens_jacobians(is_fisheye: bool, full: Array, points: Array) -> tuple[Array,
     return pixels, d_point, d_full
 
 
+class _Bent(NamedTuple):
+    """A ray (x, y, 1) through the unit lens: its image, and that by x and y (v by x is u by y)."""
+
+    u: float
+    v: float
+    ux: float
+    uy: float
+    vy: float
+
+
+@numba.njit(cache=True, nogil=True, forceinline=True)
+def _bent(full: Array, x: float, y: float) -> _Bent:
+    """As `perspective` at depth 1 with its slopes by x and y, focal lengths of one."""
+    p1, p2 = full[6], full[7]
+    k1, k2, k3, k4, k5, k6 = full[4], full[5], full[8], full[9], full[10], full[11]
+    r2 = x * x + y * y
+    below = 1.0 / (1.0 + r2 * (k4 + r2 * (k5 + r2 * k6)))
+    gain = (1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))) * below
+    slope = k1 + r2 * (2.0 * k2 + 3.0 * k3 * r2) - gain * (k4 + r2 * (2.0 * k5 + 3.0 * k6 * r2))
+    slope *= below
+    cross = 2.0 * x * y * slope + 2.0 * (p1 * x + p2 * y)
+    return _Bent(
+        x * gain + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
+        y * gain + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y,
+        gain + 2.0 * x * x * slope + 2.0 * p1 * y + 6.0 * p2 * x,
+        cross,
+        gain + 2.0 * y * y * slope + 6.0 * p1 * y + 2.0 * p2 * x,
+    )
+
+
+@numba.njit(cache=True, nogil=True, forceinline=True)
+def _step(bent: _Bent, ex: float, ey: float) -> tuple[float, float]:
+    """Newton's step of a ray whose image is (ex, ey) away."""
+    determinant = bent.ux * bent.vy - bent.uy * bent.uy
+    if abs(determinant) < _LEAST_DETERMINANT:
+        determinant = _LEAST_DETERMINANT
+    sx, sy = bent.vy * ex - bent.uy * ey, bent.ux * ey - bent.uy * ex
+    return sx / determinant, sy / determinant
+
+
+@numba.njit(cache=True, nogil=True)
+def _unbent(
+    full: Array, xd: float, yd: float, x: float, y: float, limit: float
+) -> tuple[bool, float, float]:
+    """Whether Newton's steps from a start end at a ray with this image, and the ray."""
+    for _ in range(NEWTON_STEPS):
+        bent = _bent(full, x, y)
+        sx, sy = _step(bent, xd - bent.u, yd - bent.v)
+        x, y = x + sx, y + sy
+        length = math.sqrt(x * x + y * y)
+        if length > limit:
+            x, y = x * limit / length, y * limit / length
+        if abs(sx) <= CONVERGED and abs(sy) <= CONVERGED:
+            break
+    bent = _bent(full, x, y)
+    solved = math.hypot(xd - bent.u, yd - bent.v) < SOLVED
+    return solved and math.hypot(x, y) < limit, x, y
+
+
 @numba.njit(cache=True, nogil=True)
 def perspective_rays(distorted: Array, full: Array, limit: float) -> Array:
     """Undistorted x/z, y/z (n, 2) of distorted ones (n, 2); NaN where no ray of the lens is.
 
-    Newton on the two-dimensional distortion, started and kept inside the radius `limit` up to
-    which the lens is one to one. `full` has focal lengths of one and no principal point.
+    Newton on the two-dimensional distortion, kept inside the radius `limit` up to which the lens
+    is one to one; from the ray before, carried on by its slopes, as pixels of a row are
+    neighbours, else from the distorted place. `full` has focal lengths of one and no principal
+    point.
 
     Source:
         Heikkila, Silven 1997, A four-step camera calibration procedure, section 4: the distortion
         has no inverse in closed form.
     """
     rays = np.empty_like(distorted)
-    point, value = np.ones(3), np.empty(2)
-    slope, d_full = np.empty((2, 3)), np.empty((2, 12))
+    found, x, y = False, 0.0, 0.0
     for k in range(len(distorted)):
         xd, yd = distorted[k, 0], distorted[k, 1]
-        shorter = min(1.0, 0.9 * limit / max(math.hypot(xd, yd), 1e-12))
-        point[0], point[1] = shorter * xd, shorter * yd
-        for _ in range(NEWTON_STEPS):
-            perspective(full, point, True, value, slope, d_full)
-            a, b, c, d = slope[0, 0], slope[0, 1], slope[1, 0], slope[1, 1]
-            determinant = a * d - b * c
-            if abs(determinant) < _LEAST_DETERMINANT:
-                determinant = _LEAST_DETERMINANT
-            ex, ey = xd - value[0], yd - value[1]
-            sx, sy = (d * ex - b * ey) / determinant, (a * ey - c * ex) / determinant
-            x, y = point[0] + sx, point[1] + sy
-            shorter = min(1.0, limit / max(math.hypot(x, y), 1e-12))
-            point[0], point[1] = shorter * x, shorter * y
-            if abs(sx) <= CONVERGED and abs(sy) <= CONVERGED:
-                break
-        perspective(full, point, False, value, slope, d_full)
-        solved = math.hypot(xd - value[0], yd - value[1]) < SOLVED
-        if solved and math.hypot(point[0], point[1]) < limit:
-            rays[k] = point[:2]
+        if found:
+            bent = _bent(full, x, y)
+            sx, sy = _step(bent, xd - bent.u, yd - bent.v)
+            near = math.hypot(sx, sy) < _NEIGHBOUR
+            found = False
+            if near and math.hypot(x + sx, y + sy) < limit:
+                found, x, y = _unbent(full, xd, yd, x + sx, y + sy, limit)
+        if not found:
+            shorter = min(1.0, 0.9 * limit / max(math.hypot(xd, yd), 1e-12))
+            found, x, y = _unbent(full, xd, yd, shorter * xd, shorter * yd, limit)
+        if found:
+            rays[k, 0], rays[k, 1] = x, y
         else:
             rays[k] = math.nan
     return rays

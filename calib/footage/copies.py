@@ -13,6 +13,8 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from freeswing.calib.footage.change_kernels import bends, largest_tile_change
+
 Image = NDArray[np.uint8]
 Array = NDArray[np.float64]
 
@@ -38,13 +40,7 @@ one moment have 0.3 to 0.5 (1.0 would be pure noise), two moments in one frame 1
 
 def largest_change(before: Image, image: Image) -> float:
     """Mean absolute change of the tile that changed most."""
-    height, width = (size // _TILE * _TILE for size in image.shape)
-    change = np.abs(
-        image[:height:2, :width:2].astype(np.int16) - before[:height:2, :width:2].astype(np.int16)
-    )
-    half = _TILE // 2
-    tiles = change.reshape(height // _TILE, half, width // _TILE, half).sum(axis=(1, 3))
-    return float(tiles.max(initial=0)) / half**2
+    return largest_tile_change(before, image, _TILE) / (_TILE // 2) ** 2
 
 
 Frame = tuple[int, str, Image]
@@ -104,11 +100,5 @@ def _judged(
 
 def comb_ratio(before: Image, image: Image) -> float:
     """How torn the moving parts of a frame are, NaN where too little moves."""
-    now = image.astype(np.int16)
-    moved = np.abs(now - before.astype(np.int16)) > _MOVED_GREY
-    inside = moved[2:-2]
-    if int(inside.sum()) < _LEAST_MOVED:
-        return float("nan")
-    near = np.abs(2 * now[2:-2] - now[1:-3] - now[3:-1])
-    far = np.abs(2 * now[2:-2] - now[:-4] - now[4:])
-    return float(near[inside].sum() / max(int(far[inside].sum()), 1))
+    count, near, far = bends(before, image, int(_MOVED_GREY))
+    return float(near / max(far, 1)) if count >= _LEAST_MOVED else float("nan")

@@ -9,16 +9,21 @@ the four corners. The covariance is that of the pixel noise which the fit itself
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from freeswing.calib.camera import lens_models
 from freeswing.calib.camera.camera import Camera
-from freeswing.calib.tags.corner_kernels import TagImage
 from freeswing.calib.tags.gaussian_tables import TABLES
-from freeswing.calib.tags.pattern_fit import Search, fit_pattern
-from freeswing.calib.tags.tag_map import corners_of_map
+from freeswing.calib.tags.tag_kernel import (
+    BLACK,
+    COVARIANCE,
+    PIXELS,
+    RAYS,
+    fit_guess,
+)
 from freeswing.calib.tags.tag_patterns import tag_cells
 
 Array = NDArray[np.float64]
@@ -28,13 +33,6 @@ FIRST_BLURS_PX = (2.0, 1.2, 0.8)
 NEAR_BLURS_PX = (0.8,)
 ALL_PIXELS = 10_000_000
 _NO_GUESS = np.zeros(3)
-_LEAST_EXPLAINED = 0.75
-_LEAST_CONTRAST = 8.0
-# Cells narrower than 2.8 blur widths see their neighbours' neighbours, which the kernel leaves
-# out: rendered tags at grazing angles then show a bias of about 0.05 px a blur width.
-_CROWDED_CELLS = 2.8
-_CROWDED_PX = 0.05
-_TOO_CROWDED = 1.2
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,10 +61,17 @@ class TagFit:
 
 
 def lens_rays(camera: Camera) -> Array:
-    """Undistorted x/z, y/z of every pixel of the camera, (h, w, 2); keep it, it takes a while."""
-    width, height = camera.size_px
-    grid = np.stack(np.meshgrid(np.arange(width), np.arange(height)), axis=-1)
-    return np.ascontiguousarray(camera.normalise(grid.astype(np.float64)))
+    """Undistorted x/z, y/z of every pixel of the camera, (h, w, 2); not to be written to.
+
+    They take a while and are kept for the last lenses.
+    """
+    return _lens_rays(camera.model, tuple(camera.params.tolist()), camera.size_px)
+
+
+@lru_cache(maxsize=2)
+def _lens_rays(model: str, params: tuple[float, ...], size_px: tuple[int, int]) -> Array:
+    rays = lens_models.normalise(model, pixel_rays(size_px), np.array(params))
+    return np.ascontiguousarray(rays)
 
 
 def pixel_rays(size_px: tuple[int, int]) -> Array:
@@ -89,35 +94,6 @@ def rimmed_cells(
         cells[[0, 0, -1, -1], [0, -1, 0, -1]] = 0.0
     cells.flags.writeable = False
     return cells
-
-
-def square_map(rays: Array, side: float) -> Array:
-    """Homography from undistorted (x, y, 1) to cells, corners TL TR BR BL at 0 ... side, (3, 3).
-
-    Raises:
-        ValueError: when three corners lie on a line.
-
-    Source:
-        Hartley, Zisserman 2004, Multiple View Geometry in Computer Vision, sec. 4.1.
-    """
-    (x0, y0), (x1, y1), (x2, y2), (x3, y3) = rays
-    sx, sy = x0 - x1 + x2 - x3, y0 - y1 + y2 - y3
-    dx1, dy1, dx2, dy2 = x1 - x2, y1 - y2, x3 - x2, y3 - y2
-    determinant = dx1 * dy2 - dx2 * dy1
-    if abs(determinant) < 1e-14:
-        raise ValueError(f"corners {rays.tolist()} are on a line; a tag needs four apart")
-    g = (sx * dy2 - dx2 * sy) / determinant
-    h = (dx1 * sy - sx * dy1) / determinant
-    rays_from_unit = np.array(
-        [
-            [x1 - x0 + g * x1, x3 - x0 + h * x3, x0],
-            [y1 - y0 + g * y1, y3 - y0 + h * y3, y0],
-            [g, h, 1.0],
-        ]
-    )
-    inverse = np.linalg.inv(rays_from_unit)
-    inverse[:2] *= side
-    return inverse
 
 
 def fit_tag(
@@ -147,54 +123,24 @@ def fit_tag(
         before: black, contrast, blur in px and noise of the same tag in the frame before, for a
             prediction good to some tenths of a pixel; `blurs_px` then starts with that blur.
     """
-    n = cells.shape[0] - 2
-    height, width = image.shape
-    low, high = corners_px.min(axis=0), corners_px.max(axis=0)
-    if not np.isfinite(low + high).all() or (high < 2).any() or low[0] > width - 3:
-        return None
-    rim = (high - low).max() / n * 1.5 + 1.0
-    left, top = np.maximum(np.floor(low - rim), 0).astype(np.int64)
-    right = min(int(high[0] + rim) + 2, width)
-    bottom = min(int(high[1] + rim) + 2, height)
-    if right - left < 8 or bottom - top < 8:
-        return None
-    u = min(max(int(corners_px[:, 0].mean()), 1), width - 2)
-    v = min(max(int(corners_px[:, 1].mean()), 1), height - 2)
-    ray_step = np.column_stack(
-        [(rays[v, u + 1] - rays[v, u - 1]) / 2, (rays[v + 1, u] - rays[v - 1, u]) / 2]
+    guess = np.empty((2, 4, 2))
+    guess[0], guess[1] = corner_rays, corners_px
+    found = fit_guess(
+        image,
+        rays,
+        guess,
+        cells,
+        np.array(blurs_px),
+        _NO_GUESS if before is None else np.array([before[0], before[1], before[3]]),
+        np.array([noise, most_pixels], dtype=np.float64),
+        TABLES,
     )
-    try:
-        start = square_map(corner_rays, float(n))
-    except (ValueError, np.linalg.LinAlgError):
+    pixels = int(found[PIXELS])
+    if not pixels:
         return None
-    box = np.array([left, top, right, bottom], dtype=np.int64)
-    guess = np.array([before[0], before[1], before[3]]) if before else _NO_GUESS
-    fitted = fit_pattern(
-        TagImage(image, rays, ray_step, cells, box, *TABLES),
-        start,
-        Search(np.array(blurs_px), noise, float(most_pixels), guess),
-    )
-    black, contrast, blur_px = (float(number) for number in fitted.state)
-    if fitted.explained < _LEAST_EXPLAINED or contrast < _LEAST_CONTRAST:
-        return None
-    found, spread, narrowest = corners_of_map(fitted.pattern_from_ray, fitted.covariance, n)
-    area = ray_step[0, 0] * ray_step[1, 1] - ray_step[0, 1] * ray_step[1, 0]
-    pixel_ray = float(np.sqrt(abs(area)))
-    crowded = _CROWDED_CELLS - narrowest / pixel_ray / n / blur_px
-    if crowded > _TOO_CROWDED:
-        return None
-    if crowded > 0.0:
-        spread = spread + (_CROWDED_PX * crowded * pixel_ray) ** 2 * np.eye(8)
-    return TagFit(
-        found,
-        spread,
-        black,
-        contrast,
-        blur_px,
-        fitted.noise,
-        fitted.explained,
-        int(fitted.pixels),
-    )
+    black, contrast, blur_px, least, explained = found[BLACK:PIXELS].tolist()
+    corners, covariance = found[RAYS].reshape(4, 2), found[COVARIANCE].reshape(8, 8)
+    return TagFit(corners, covariance, black, contrast, blur_px, least, explained, pixels)
 
 
 def to_pixels(camera: Camera, rays: Array, covariance: Array) -> tuple[Array, Array]:

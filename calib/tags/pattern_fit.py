@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.calib.tags.corner_kernels import UNKNOWNS, Pass, TagImage, accumulate, new_arrays
-from freeswing.calib.tags.tag_map import compose
+from freeswing.calib.tags.edge_pass import new_work, pass_over
+from freeswing.calib.tags.edge_pixels import LEAST_CELL, edge_pixels
+from freeswing.calib.tags.tag_map import blur_at_centre, compose
 
 Array = NDArray[np.float64]
 
@@ -24,6 +26,33 @@ LEAST_CONTRAST = 10.0
 ANY_RESIDUAL = 1e6
 FARTHEST = 2.0  # the longest step, in half sides of the tag
 SETTLING, SETTLED = 0.02, 0.006  # steps from which all pixels take part, and from which it is done
+TOO_NARROW = -1.0
+SHARP = 0.5  # px; no lens is sharper, but the blur of a fit may pass by smaller values
+MOST_EDGE_PASSES = 20  # one or two from a prediction, three from a search, more where covered
+EDGE_SETTLED = 0.12
+"""A step of so many blur widths is the last along the edges: what it leaves to its third order,
+d^3 / 12, is then 1.4e-4 of the blur's width, 2 % of a corner's deviation at the best."""
+EDGE_LOST = 0.5  # after a longer one other pixels are near the edges
+OUTLYING = 0.02
+"""Where more of the pixels than this lie beyond four noise levels (6e-5 do by chance), part of the
+tag is covered: weights then have to settle too, at the residuals' own noise level."""
+COVERED_SETTLED, COVERED_SCALE = 0.02, 1.3
+FIRST_BLACK, FIRST_CONTRAST = 40.0, 160.0  # where nothing is predicted
+LEAST_CONTRAST = 10.0
+ANY_RESIDUAL = 1e6
+FARTHEST = 2.0  # the longest step, in half sides of the tag
+SETTLING, SETTLED = 0.02, 0.006  # steps from which all pixels take part, and from which it is done
+TOO_NARROW = -1.0
+SHARP = 0.5  # px; no lens is sharper, but the blur of a fit may pass by smaller values
+MOST_EDGE_PASSES = 20  # one or two from a prediction, three from a search, more where covered
+EDGE_SETTLED = 0.12
+"""A step of so many blur widths is the last along the edges: what it leaves to its third order,
+d^3 / 12, is then 1.4e-4 of the blur's width, 2 % of a corner's deviation at the best."""
+EDGE_LOST = 0.5  # after a longer one other pixels are near the edges
+LENIENT = 3.0
+"""A pass whose noise level was above so many times what its residuals then have has let outliers
+speak (the tag was covered in part before) and is not the last. Levels predicted are twice the last
+noise and 2."""
 
 
 class Search(NamedTuple):
@@ -33,7 +62,8 @@ class Search(NamedTuple):
         blurs: widths held on the first passes, which widen the catch; then the blur is free,
             started at the last of them.
         noise: least standard deviation of a pixel.
-        most_pixels: about so many of the box take part in the last pass, spread evenly.
+        most_pixels: about so many take part in the last pass, along the edges; evenly from the
+            whole box where cells are narrow.
         guess: black, contrast and noise of a good prediction (contrast 0: none): the first pass is
             then also the last, if it moves little.
     """
@@ -80,6 +110,15 @@ def _noise_from(histogram: NDArray[np.int64], count: float) -> float:
 
 
 @numba.njit(cache=True, nogil=True)
+def _outlying(seen: Pass, scale: float) -> float:
+    """Share of the pixels whose residual is beyond four noise levels."""
+    count = 0
+    for k in range(min(int(16.0 * scale) + 1, 255), 256):
+        count += seen.histogram[k]
+    return count / seen.pixels
+
+
+@numba.njit(cache=True, nogil=True)
 def _levels(seen: Pass, state: Array) -> Array:
     """The state with black and contrast by linear least squares at the first guess of the place."""
     normal, right, found = seen.normal, seen.right, state.copy()
@@ -111,7 +150,7 @@ def _solvable(seen: Pass, held: bool) -> tuple[Array, Array]:
 
 
 @numba.njit(cache=True, nogil=True)
-def _moved(state: Array, change: NDArray[np.floating]) -> tuple[Array, float]:
+def _moved(state: Array, change: Array) -> tuple[Array, float]:
     """The state after a step; and how its blur changed, by half of itself at the most."""
     blur = state[2]
     blur_change = min(max(change[BLUR], -0.3 * blur), 0.5 * blur)
@@ -137,6 +176,111 @@ def _length(change: Array) -> float:
     return largest
 
 
+class _Step(NamedTuple):
+    """A pass's result.
+
+    Attributes:
+        h: the map after it.
+        state: black, contrast, blur in px after it.
+        normal: matrix that was solved.
+        size: of the step, in half sides of the tag.
+        blur_step: of the blur over the blur.
+        scale: noise level for the next pass.
+        variance: of a pixel, of what the step leaves to first order.
+        explained: share of the grey values' variance.
+    """
+
+    h: Array
+    state: Array
+    normal: Array
+    size: float
+    blur_step: float
+    scale: float
+    variance: float
+    explained: float
+
+
+@numba.njit(cache=True, nogil=True)
+def _step(seen: Pass, h: Array, state: Array, half: float, noise: float, free: bool) -> _Step:
+    """Gauss-Newton's step of a pass, the blur `free` or held."""
+    at_least = state[2] <= LEAST_BLUR and seen.right[BLUR] < 0.0
+    normal, right = _solvable(seen, not free or at_least)
+    change = np.empty(UNKNOWNS)
+    change[:] = np.linalg.solve(normal, right)
+    moved, blur_change = _moved(state, change)
+    largest = _length(change)
+    if largest > FARTHEST:
+        change[:8] *= FARTHEST / largest
+    scale = max(_noise_from(seen.histogram, seen.pixels), 0.5 * noise, LEAST_ERROR * moved[1])
+    after = max(seen.squares - float(change @ right), 0.0)
+    return _Step(
+        compose(h, change, half),
+        moved,
+        normal,
+        largest,
+        abs(blur_change) / moved[2],
+        scale,
+        after / max(seen.weights - UNKNOWNS, 1.0),
+        1.0 - after / max(seen.spread, 1e-9),
+    )
+
+
+@numba.njit(cache=True, nogil=True)
+def _given(step: _Step, least: float, pixels: float, last: float) -> PatternFit:
+    """The fit of a last step; `least` is the smallest variance of a pixel."""
+    covariance = np.empty((8, 8))
+    covariance[:] = np.linalg.inv(step.normal)[:8, :8] * max(step.variance, least)
+    noise = math.sqrt(step.variance)
+    return PatternFit(step.h, covariance, step.state, noise, step.explained, pixels, last)
+
+
+@numba.njit(cache=True, nogil=True)
+def _failed(h: Array, state: Array, noise: float, pixels: float, last: float) -> PatternFit:
+    return PatternFit(h, np.zeros((8, 8)), state, noise, 0.0, pixels, last)
+
+
+@numba.njit(cache=True, nogil=True)
+def _is_wide(tag: TagImage, h: Array, blur: float) -> bool:
+    """Whether a pixel near one edge of the print is too far from the next to see it."""
+    half = (tag.cells.shape[0] - 2) / 2.0
+    across, down = blur_at_centre(h, tag.ray_step, half, max(blur, SHARP))
+    return LEAST_CELL * max(across, down) < 1.0
+
+
+@numba.njit(cache=True, nogil=True)
+def _fit_edges(tag: TagImage, h: Array, state: Array, search: Search, scale: float) -> PatternFit:
+    """Gauss-Newton on the pixels along the edges, from a map within some tenths of a pixel.
+
+    Its pixels are `TOO_NARROW` where the blur turns out too wide for the cells.
+    """
+    half = (tag.cells.shape[0] - 2) / 2.0
+    work, stale = new_work(), True
+    pixels = np.empty((0, 0, 0))
+    count, noise, last = 0.0, 0.0, 1e9
+    for _ in range(MOST_EDGE_PASSES):
+        if stale:
+            pixels = edge_pixels(tag, h, state[2], search.most_pixels)
+        seen = pass_over(tag, pixels, h, state, scale, work)
+        count = seen.pixels
+        if count < 4 * UNKNOWNS:
+            return _failed(h, state, 0.0, count, last)
+        blur = state[2]
+        across, down = blur_at_centre(h, tag.ray_step, half, blur)
+        step = _step(seen, h, state, half, search.noise, True)
+        settled = EDGE_SETTLED
+        if _outlying(seen, step.scale) > OUTLYING:
+            settled = COVERED_SETTLED if scale < COVERED_SCALE * step.scale else 0.0
+        h, state, scale, noise = step.h, step.state, step.scale, math.sqrt(step.variance)
+        blurs = step.size * half / min(across, down)
+        last = max(step.size, 0.5 * step.blur_step)
+        if blurs < settled and step.blur_step < EDGE_SETTLED:
+            return _given(step, search.noise * search.noise, count, last)
+        stale = blurs > EDGE_LOST or step.blur_step > EDGE_LOST
+        if not _is_wide(tag, h, state[2]):
+            return _failed(h, state, noise, TOO_NARROW, last)
+    return _failed(h, state, noise, count, last)
+
+
 @numba.njit(cache=True, nogil=True)
 def fit_pattern(tag: TagImage, pattern_from_ray: Array, search: Search) -> PatternFit:
     """Gauss-Newton from coarse to fine, from a first guess of the pattern's map (3, 3)."""
@@ -144,12 +288,18 @@ def fit_pattern(tag: TagImage, pattern_from_ray: Array, search: Search) -> Patte
     half = (tag.cells.shape[0] - 2) / 2.0
     blurs, guess = search.blurs, search.guess
     state = np.array([FIRST_BLACK, FIRST_CONTRAST, blurs[0]])
-    covariance, change, arrays = np.zeros((8, 8)), np.zeros(UNKNOWNS), new_arrays()
+    arrays = new_arrays()
     fine, coarse = _strides(tag.box, search.most_pixels)
     scale, predicted = ANY_RESIDUAL, guess[1] > 0.0
+    narrow = False
     if predicted:
         state[0], state[1] = guess[0], guess[1]
         scale = 2.0 * guess[2] + 2.0
+        if _is_wide(tag, h, state[2]):
+            fitted = _fit_edges(tag, h, state, search, scale)
+            if fitted.pixels != TOO_NARROW:
+                return fitted
+            narrow = True
     held = len(blurs) - 1
     noise, pixels, last = 0.0, 0.0, 1e9
     for iteration in range(held + MOST_FREE_PASSES):
@@ -157,32 +307,22 @@ def fit_pattern(tag: TagImage, pattern_from_ray: Array, search: Search) -> Patte
         if iteration <= held:
             state[2] = blurs[iteration]
         settled = free and last < SETTLING
+        if settled and not narrow and _is_wide(tag, h, state[2]):
+            fitted = _fit_edges(tag, h, state, search, scale)
+            if fitted.pixels != TOO_NARROW:
+                return fitted
+            narrow = True
         at_once = predicted and iteration == 0
         stride = fine if settled or at_once or iteration > held + 3 else coarse
         if iteration == 0 and not predicted:
             state = _levels(accumulate(tag, h, state, stride, ANY_RESIDUAL, arrays), state)
         seen = accumulate(tag, h, state, stride, scale, arrays)
         if seen.pixels < 4 * UNKNOWNS:
-            return PatternFit(h, covariance, state, 0.0, 0.0, pixels, last)
-        at_least = state[2] <= LEAST_BLUR and seen.right[BLUR] < 0.0
-        normal, right = _solvable(seen, not free or at_least)
-        change[:] = np.linalg.solve(normal, right)
-        state, blur_change = _moved(state, change)
-        largest = _length(change)
-        if largest > FARTHEST:
-            change[:8] *= FARTHEST / largest
-        h = compose(h, change, half)
-        last = max(largest, 0.5 * abs(blur_change) / state[2] if free else 0.0)
-        scale = max(
-            _noise_from(seen.histogram, seen.pixels), 0.5 * search.noise, LEAST_ERROR * state[1]
-        )
-        # What the step leaves, to first order.
-        after = max(seen.squares - float(change @ right), 0.0)
-        variance = after / max(seen.weights - UNKNOWNS, 1.0)
-        noise, pixels = math.sqrt(variance), seen.pixels
+            return _failed(h, state, 0.0, pixels, last)
+        step = _step(seen, h, state, half, search.noise, free)
+        h, state, scale = step.h, step.state, step.scale
+        last = max(step.size, 0.5 * step.blur_step if free else 0.0)
+        noise, pixels = math.sqrt(step.variance), seen.pixels
         if free and stride == fine and last < SETTLED:
-            explained = 1.0 - float(after) / max(seen.spread, 1e-9)
-            inverse = np.linalg.inv(normal)
-            covariance[:] = inverse[:8, :8] * max(variance, search.noise * search.noise)
-            return PatternFit(h, covariance, state, noise, explained, pixels, last)
-    return PatternFit(h, covariance, state, noise, 0.0, pixels, last)
+            return _given(step, search.noise * search.noise, pixels, last)
+    return _failed(h, state, noise, pixels, last)

@@ -29,6 +29,38 @@ def blur_at_centre(h: Array, ray_step: Array, half: float, blur: float) -> tuple
 
 
 @numba.njit(cache=True, nogil=True)
+def map_of_square(rays: Array, side: float) -> Array:
+    """Homography from undistorted (x, y, 1) to cells, corners TL TR BR BL at 0 ... side, (3, 3).
+
+    Zeros when three corners lie on a line.
+
+    Source:
+        Hartley, Zisserman 2004, Multiple View Geometry in Computer Vision, sec. 4.1.
+    """
+    found = np.zeros((3, 3))
+    x0, x1, x2, x3 = rays[0, 0], rays[1, 0], rays[2, 0], rays[3, 0]
+    y0, y1, y2, y3 = rays[0, 1], rays[1, 1], rays[2, 1], rays[3, 1]
+    sx, sy = x0 - x1 + x2 - x3, y0 - y1 + y2 - y3
+    dx1, dy1, dx2, dy2 = x1 - x2, y1 - y2, x3 - x2, y3 - y2
+    determinant = dx1 * dy2 - dx2 * dy1
+    if not abs(determinant) > 1e-14:
+        return found
+    g = (sx * dy2 - dx2 * sy) / determinant
+    h = (dx1 * sy - sx * dy1) / determinant
+    a, b, c = x1 - x0 + g * x1, x3 - x0 + h * x3, x0
+    d, e, f = y1 - y0 + g * y1, y3 - y0 + h * y3, y0
+    whole = a * (e - f * h) - b * (d - f * g) + c * (d * h - e * g)
+    if not abs(whole) > 1e-300:
+        return found
+    found[0, 0], found[0, 1], found[0, 2] = e - f * h, c * h - b, b * f - c * e
+    found[1, 0], found[1, 1], found[1, 2] = f * g - d, a - c * g, c * d - a * f
+    found[2, 0], found[2, 1], found[2, 2] = d * h - e * g, b * g - a * h, a * e - b * d
+    found /= whole
+    found[:2] *= side
+    return found
+
+
+@numba.njit(cache=True, nogil=True)
 def compose(pattern_from_ray: Array, e: NDArray[np.floating], half: float) -> Array:
     """The pattern's map after the small homography `e`, which acts on (q - half) / half.
 

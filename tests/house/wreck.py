@@ -43,6 +43,7 @@ class Held:
     tests: str
 
 
+EDGES = "tests/calib/tags/test_edge_pixels.py"
 LOOK = "tests/vision/look/test_look_limits.py"
 FUSE = "tests/vision/fuse/test_fuse_limits.py"
 RIG = "tests/vision/rig/test_rig_limits.py"
@@ -318,6 +319,8 @@ HELD = (
         ),
         LOOK,
     ),
+    Held("calib/tags/edge_pixels.py", ("LEAST_CELL",), EDGES),
+    Held("calib/tags/pattern_fit.py", ("EDGE_SETTLED",), EDGES),
     Held("vision/fuse/fuse_cameras.py", ("LEAST_FLOOR_PX", "_REJECT"), FUSE),
     Held("vision/fuse/calibration_share.py", ("_LEFT_OUT",), FUSE),
     Held("vision/fuse/noise.py", ("ALIKE", "SURE_SIGMAS"), "tests/vision/fuse/test_noise.py"),

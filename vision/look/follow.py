@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from freeswing.calib.camera import lens_models
 from freeswing.calib.camera.camera import Camera
 from freeswing.calib.tags.corners import (
     FIRST_BLURS_PX,
@@ -22,6 +23,7 @@ from freeswing.calib.tags.corners import (
 )
 from freeswing.vision.look.detect import TagFinder, detect_tags
 from freeswing.vision.look.markers import Blob, find_blobs
+from freeswing.vision.look.near_kernels import expected_tags
 from freeswing.vision.look.occlusion import Plates
 from freeswing.vision.look.single_pose import Pose, extrapolate, refine_pose, start_pose
 from freeswing.vision.look.watched_target import Watch
@@ -32,7 +34,7 @@ Image = NDArray[np.uint8]
 Look = tuple[float, float, float, float]
 """Black, contrast, blur in px and noise of a tag when it was last seen."""
 
-MOST_PIXELS = 5000
+MOST_PIXELS = 2500
 
 USED, NOTHING, COVERED, OVEREXPOSED, REPEATED, UNSTAMPED = range(6)
 STATUS_NAMES = (
@@ -89,9 +91,11 @@ class Follower:
     _rays: Array = field(init=False, repr=False)
     _finder: TagFinder = field(init=False, repr=False)
     _plates: Plates = field(init=False, repr=False)
+    _lens: tuple[bool, Array, Array] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         self._rays = lens_rays(self.camera)
+        self._lens = _lens_numbers(self.camera)
         cells = [rimmed_cells(family, number).shape[0] - 2 for family, number in self.watch.tags]
         self._plates = Plates.of(self.watch.tag_corners_m, np.array(cells, dtype=float))
         self._finder = TagFinder.of((*self.watch.tags, *self.watch.base_tags))
@@ -124,24 +128,16 @@ class Follower:
         return self.misses < _EAGER_SEARCHES or self.misses % _SEARCH_EVERY == 0
 
     def _look_near(self, image: Image, pose: Pose) -> dict[int, TagFit]:
-        corners = np.matmul(self.watch.tag_corners_m, pose[0].T) + pose[1]
-        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 0] - corners[:, 3])
-        centres = corners.mean(axis=1)
-        slant = np.einsum("ni,ni->n", normals, centres) / (
-            np.linalg.norm(normals, axis=1) * np.linalg.norm(centres, axis=1)
+        seen, guesses = expected_tags(
+            self.watch.tag_corners_m, pose[0], pose[1], *self._lens, _FACING
         )
-        seen = (
-            (slant < -_FACING) & self.camera.sees(corners).all(axis=1) & ~self._plates.hidden(*pose)
-        )
+        seen &= ~self._plates.hidden(*pose)
         found: dict[int, TagFit] = {}
-        if not seen.any():
-            return found
-        pixels = self.camera.project(corners[seen])
-        guesses = corners[seen][:, :, :2] / corners[seen][:, :, 2:]
-        for k, guess, guess_px in zip(np.flatnonzero(seen), guesses, pixels, strict=True):
-            fit = self._fit(image, int(k), guess, guess_px, near=len(self.past) >= _KEPT_POSES)
+        near = len(self.past) >= _KEPT_POSES
+        for k in np.flatnonzero(seen).tolist():
+            fit = self._fit(image, k, guesses[k, 0], guesses[k, 1], near=near)
             if fit is not None:
-                found[int(k)] = fit
+                found[k] = fit
         return found
 
     def _fit(
@@ -242,6 +238,13 @@ class Follower:
         if float(coarse.std()) < _DARK_SPREAD:
             return COVERED
         return NOTHING
+
+
+def _lens_numbers(camera: Camera) -> tuple[bool, Array, Array]:
+    """What `expected_tags` wants of a camera."""
+    model, params = camera.model, camera.params
+    view = np.array([lens_models.radius_limit(model, params), *camera.size_px], dtype=np.float64)
+    return model == lens_models.FISHEYE, lens_models.full_parameters(model, params), view
 
 
 def _blob_sighting(blob: Blob) -> Sighting:

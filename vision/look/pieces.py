@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 FRAMES_A_PIECE = 400
 # 400 frames of a hundred tags are 27 MB; a larger piece, or a packed one, is none of ours.
 MOST_PIECE_BYTES = 256 * 2**20
-_VERSION = b"freeswing-sightings/3"
+_VERSION = b"freeswing-sightings/4"
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from freeswing.calib.board.recordings import Image, Recording, read_frames
 from freeswing.calib.camera.camera import Camera
+from freeswing.calib.footage.ahead import ahead
 from freeswing.calib.footage.copies import WARM_UP, with_copies
 from freeswing.calib.footage.frame_times import frame_times, needed
 from freeswing.cdpr.files.documents import InputError
@@ -59,9 +60,8 @@ def collect_sightings(
         return paths
     done = len(paths) * FRAMES_A_PIECE
     warm_up = min(done, WARM_UP)
-    frames = islice(
-        with_copies(islice(read_frames(recording), done - warm_up, None)), warm_up, None
-    )
+    decoded = islice(read_frames(recording), done - warm_up, None)
+    frames = ahead(islice(with_copies(decoded), warm_up, None))
     follower: Follower | None = None
     while batch := list(islice(frames, 1)):
         if follower is None:

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.cdpr.rotation import exp_rotation
-from freeswing.vision.fuse.pose_kernels import MovingPose, Seen, carried_on, solve_instant
+from freeswing.vision.fuse.pose_kernels import carried_on
+from freeswing.vision.look.near_kernels import refined_pose
 
 Array = NDArray[np.float64]
 Pose = tuple[Array, Array]
 """R_camera_platform (3, 3) and the platform's origin in the camera frame (3,)."""
 
-_HOME = np.eye(4)[None]
 _ROBUST_LIMIT = 25.0
 _PASSES = 10
 
@@ -56,21 +56,16 @@ def whitening(covariances: Array) -> Array:
 
 def refine_pose(start: Pose, points: Array, rays: Array, covariances: Array) -> Pose | None:
     """Least squares over all tags of one image; None when it does not determine a pose."""
-    n = len(points)
-    seen = Seen(
-        np.array([0, n]),
-        _HOME,
-        np.zeros(n, dtype=np.int64),
+    known, rotation, position = refined_pose(
         np.ascontiguousarray(points),
         np.ascontiguousarray(rays),
-        np.zeros((n, 4)),
-        np.full(n, 4, dtype=np.int64),
+        np.ascontiguousarray(covariances),
+        start[0],
+        start[1],
+        _ROBUST_LIMIT,
+        _PASSES,
     )
-    pose = MovingPose(start[0], start[1], np.zeros(12))
-    found = solve_instant(seen, whitening(covariances), 0, pose, 6, _ROBUST_LIMIT, _PASSES)
-    if found.condition == 0.0 or not np.isfinite(found.position).all():
-        return None
-    return found.rotation, found.position
+    return (rotation, position) if known else None
 
 
 def extrapolate(past: Sequence[tuple[float, Pose]], time_s: float) -> Pose | None:

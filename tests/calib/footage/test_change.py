@@ -1,0 +1,32 @@
+"""Changes between frames: compiled sums against the same by whole arrays."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from freeswing.calib.footage.copies import comb_ratio, largest_change
+
+
+@pytest.mark.parametrize("shape", [(64, 96), (75, 101)])
+def test_sums_are_those_of_whole_arrays(shape) -> None:
+    random = np.random.default_rng(4)
+    before, image = random.integers(0, 256, (2, *shape)).astype(np.uint8)
+    height, width = (size // 16 * 16 for size in shape)
+    change = np.abs(image.astype(int) - before.astype(int))[:height:2, :width:2]
+    tiles = change.reshape(height // 16, 8, width // 16, 8).sum(axis=(1, 3))
+    assert largest_change(before, image) == tiles.max() / 64
+    now = image.astype(int)
+    moved = np.abs(now - before)[2:-2] > 24
+    near = np.abs(2 * now[2:-2] - now[1:-3] - now[3:-1])[moved].sum()
+    far = np.abs(2 * now[2:-2] - now[:-4] - now[4:])[moved].sum()
+    assert comb_ratio(before, image) == pytest.approx(near / far, rel=1e-12)
+
+
+def test_little_motion_tells_nothing_of_combs() -> None:
+    before = np.full((40, 40), 90, np.uint8)
+    image = before.copy()
+    image[10:20, 10:29] = 200
+    assert np.isnan(comb_ratio(before, image)), "190 pixels moved"
+    image[10:20, 10:31] = 200
+    assert np.isfinite(comb_ratio(before, image)), "210 pixels moved"
