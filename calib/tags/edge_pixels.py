@@ -23,9 +23,9 @@ from freeswing.calib.tags.corner_kernels import TagImage
 
 Array = NDArray[np.float64]
 
+# Cells of a narrower width, in blur widths: pixels near one edge then see the next one too (the
+# missing part of it is S(-3.5) = 0.0002 of the contrast two blur widths from an edge).
 LEAST_CELL = 5.5
-"""Cells of a narrower width, in blur widths: pixels near one edge then see the next one too (the
-missing part of it is S(-3.5) = 0.0002 of the contrast two blur widths from an edge)."""
 REACH = 2.0
 """Pixels within so many blur widths of an edge hold erf(2) = 99.5 % of what all pixels tell."""
 MARGIN_PX = 0.3  # by which a prediction may be off without losing pixels
