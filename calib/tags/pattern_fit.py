@@ -29,30 +29,14 @@ SETTLING, SETTLED = 0.02, 0.006  # steps from which all pixels take part, and fr
 TOO_NARROW = -1.0
 SHARP = 0.5  # px; no lens is sharper, but the blur of a fit may pass by smaller values
 MOST_EDGE_PASSES = 20  # one or two from a prediction, three from a search, more where covered
-# A step of so many blur widths is the last along the edges: what it leaves to its third order,
-# d^3 / 12, is then 1.4e-4 of the blur's width, 2 % of a corner's deviation at the best.
 EDGE_SETTLED = 0.12
+"""A step of so many blur widths is the last along the edges: what it leaves to its third order,
+d^3 / 12, is then 1.4e-4 of the blur's width, 2 % of a corner's deviation at the best."""
 EDGE_LOST = 0.5  # after a longer one other pixels are near the edges
 OUTLYING = 0.02
 """Where more of the pixels than this lie beyond four noise levels (6e-5 do by chance), part of the
 tag is covered: weights then have to settle too, at the residuals' own noise level."""
 COVERED_SETTLED, COVERED_SCALE = 0.02, 1.3
-FIRST_BLACK, FIRST_CONTRAST = 40.0, 160.0  # where nothing is predicted
-LEAST_CONTRAST = 10.0
-ANY_RESIDUAL = 1e6
-FARTHEST = 2.0  # the longest step, in half sides of the tag
-SETTLING, SETTLED = 0.02, 0.006  # steps from which all pixels take part, and from which it is done
-TOO_NARROW = -1.0
-SHARP = 0.5  # px; no lens is sharper, but the blur of a fit may pass by smaller values
-MOST_EDGE_PASSES = 20  # one or two from a prediction, three from a search, more where covered
-EDGE_SETTLED = 0.12
-"""A step of so many blur widths is the last along the edges: what it leaves to its third order,
-d^3 / 12, is then 1.4e-4 of the blur's width, 2 % of a corner's deviation at the best."""
-EDGE_LOST = 0.5  # after a longer one other pixels are near the edges
-LENIENT = 3.0
-"""A pass whose noise level was above so many times what its residuals then have has let outliers
-speak (the tag was covered in part before) and is not the last. Levels predicted are twice the last
-noise and 2."""
 
 
 class Search(NamedTuple):
@@ -257,7 +241,7 @@ def _fit_edges(tag: TagImage, h: Array, state: Array, search: Search, scale: flo
     work, stale = new_work(), True
     pixels = np.empty((0, 0, 0))
     count, noise, last = 0.0, 0.0, 1e9
-    for _ in range(MOST_EDGE_PASSES):
+    for turn in range(MOST_EDGE_PASSES):
         if stale:
             pixels = edge_pixels(tag, h, state[2], search.most_pixels)
         seen = pass_over(tag, pixels, h, state, scale, work)
@@ -269,7 +253,10 @@ def _fit_edges(tag: TagImage, h: Array, state: Array, search: Search, scale: flo
         step = _step(seen, h, state, half, search.noise, True)
         settled = EDGE_SETTLED
         if _outlying(seen, step.scale) > OUTLYING:
-            settled = COVERED_SETTLED if scale < COVERED_SCALE * step.scale else 0.0
+            steady = scale < COVERED_SCALE * step.scale
+            # Pixels that go in and out of the law keep some prints of a sharp film from settling.
+            settled = EDGE_SETTLED if turn == MOST_EDGE_PASSES - 1 else COVERED_SETTLED
+            settled = settled if steady else 0.0
         h, state, scale, noise = step.h, step.state, step.scale, math.sqrt(step.variance)
         blurs = step.size * half / min(across, down)
         last = max(step.size, 0.5 * step.blur_step)
