@@ -28,6 +28,7 @@ from freeswing.homing.rest_readings import RestModel
 
 Array = NDArray[np.float64]
 
+# Of the weight: what a cable that has gone slack still pulls by its own; at rest it never pushes.
 _SLACK_PULL = 0.02
 
 

@@ -18,8 +18,8 @@ from freeswing.servo.loop.regulator import Regulator
 from freeswing.servo.robot_now import Here, Motors, Survey, pose6, pose7
 from freeswing.servo.synthesis.state_space import Array
 from freeswing.servo.tensions.loop_kernels import NEAREST, Currents, distribute
+from freeswing.servo.tensions.robot_wrenches import OBJECTIVE_N
 
-OBJECTIVE_N = 10.0  # T_obj of the paper's section 5.3
 # A platform this far from where it is asked to be is lost, not late.
 LOST_M = 1.0
 # The encoders' differences are smoothed over about this long before they count as rates.

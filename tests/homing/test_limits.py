@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from freeswing.cdpr.files.documents import DataError
-from freeswing.homing import best_fit, home, swivel_advice
+from freeswing.homing import acquisition, best_fit, home, swivel_advice
 from freeswing.homing.acquisition import PERFECT, simulate_acquisition
 from freeswing.homing.best_fit import PLAIN, ROBUST
 from freeswing.homing.homing_document import _suspects
@@ -135,3 +136,27 @@ def test_an_axis_is_turned_for_one_per_cent(monkeypatch, share, turned) -> None:
     monkeypatch.setattr(swivel_advice, "_with_axis", lambda *_: other)
     found, _ = swivel_advice.better_axes(robot, ReadingNoise(), lambda *_: None)
     assert (found is other) == turned
+
+
+def test_start_tensions_of_an_unknown_mass_hold_it_one_and_a_half_times() -> None:
+    """Leaning cables pull aside as well: 150 N carry 100 N."""
+    robot = SimpleNamespace(
+        gravity_m_s2=np.array([0.0, 0.0, -9.8]), platform=SimpleNamespace(mass_kg=None)
+    )
+    assert 95.0 < home._weight_N(robot, np.full(3, 50.0)) < 105.0
+
+
+def test_a_slack_cable_still_pulls_by_a_fiftieth_of_the_weight(monkeypatch) -> None:
+    """Tensions that repeat to a thousand newtons would push as often as they pull."""
+    settled, asked = acquisition._settle, []
+
+    def settle(energy, pulls, *pushes):
+        asked.append(pulls)
+        return settled(energy, asked[0], *pushes)
+
+    monkeypatch.setattr(acquisition, "_settle", settle)
+    robot, rng = bologna_3(), np.random.default_rng(0)
+    rough = replace(PERFECT, repeatability_N=1000.0)
+    simulate_acquisition(robot, START_N, LARGEST_N, 9, rough, rng)
+    assert asked[0].min() > 0.05
+    assert 0.018 < asked[1].min() < 0.022

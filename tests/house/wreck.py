@@ -59,6 +59,7 @@ SEARCH = "tests/ident/drive/test_drive_search_limits.py"
 LIKELIHOOD = "tests/ident/likelihood/test_likelihood_limits.py"
 FILES = "tests/cdpr/files/test_file_limits.py"
 SERVO = "tests/servo/test_servo_limits.py"
+LAWS = "tests/servo/test_law_limits.py"
 
 FIDIM = "tests/ident/fidim/test_fidim_limits.py"
 MARKERS = "tests/freeswing/doctor/test_marker_limits.py"
@@ -141,6 +142,15 @@ HELD = (
     Held("cdpr/files/drive_csv.py", ("NORM_TOLERANCE",), FILES),
     Held("cdpr/files/drive_file.py", ("LARGEST_FRAME_M", "LARGEST_DRUM_M"), FILES),
     Held("cdpr/files/robot_file.py", ("MOST_DRIVEN", "AXIS_TOLERANCE"), FILES),
+    Held("servo/design/family.py", ("BEYOND_MODES",), LAWS),
+    Held("servo/design/lqg.py", ("FILTER_RATIO",), LAWS),
+    Held("servo/design/pid.py", ("FILTER",), LAWS),
+    Held("servo/files/wrench_file.py", ("NORM_TOLERANCE",), LAWS),
+    Held("servo/loop/closed_loop.py", ("RATE_FILTER_S",), LAWS),
+    Held("servo/loop/regulator.py", ("OUTPUT_NOISE",), LAWS),
+    Held("servo/loop/trials.py", ("LATE_S",), LAWS),
+    Held("servo/synthesis/search.py", ("BACK_OFF",), LAWS),
+    Held("servo/tensions/robot_wrenches.py", ("OBJECTIVE_N",), LAWS),
     Held("servo/loop/judge.py", ("HELD_M", "HELD_RAD", "SETTLED_S"), SERVO),
     Held("servo/loop/closed_loop.py", ("LOST_M",), SERVO),
     Held("servo/design/hinf.py", ("NOTHING",), SERVO),
@@ -371,7 +381,8 @@ HELD = (
     Held("calib/verdict/truth_checks.py", ("CHANCE",), "tests/calib/verdict/test_grades.py"),
     Held("calib/rig/triangulation.py", ("_LEAST_ANGLE_RAD",), "tests/calib/rig/test_rejections.py"),
     Held("homing/best_fit.py", ("_FAR_OFF",), HOMING),
-    Held("homing/home.py", ("_DOUBTFUL_FIT",), HOMING),
+    Held("homing/home.py", ("_DOUBTFUL_FIT", "_WEIGHTS_OF_A_GUESS"), HOMING),
+    Held("homing/acquisition.py", ("_SLACK_PULL",), HOMING),
     Held("homing/homing_document.py", ("_SUSPECT_WEIGHT",), HOMING),
     Held("homing/fit_start_pose.py", ("LOSS_LIMIT", "GOOD_FIT"), HOMING),
     Held(
