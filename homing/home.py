@@ -32,8 +32,8 @@ Progress = Callable[[str, float], None]
 
 # Chi-square a degree of freedom: more than unlucky readings leave.
 _DOUBTFUL_FIT = 4.0
-# Start tensions of a platform of unknown mass, together: what `default_tensions` asks for too, cables
-# that lean by about 48 degrees.
+# Start tensions together, by the weight: what `default_tensions` asks for too. Cables that lean by
+# about 48 degrees.
 _WEIGHTS_OF_A_GUESS = 1.5
 
 

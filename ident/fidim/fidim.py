@@ -21,7 +21,7 @@ from freeswing.ident.fidim.total_least_squares import (
 WELL_IDENTIFIED_PERCENT = 10.0  # FIDIM 2022, after eq. (34)
 NEAR_ZERO = 0.1  # of the largest of its kind: such a value may go (sec. 3.2: not essential)
 GOOD_COST = 100.0  # FIDIM 2022, after eq. (42)
-OPTIMAL_COST = 10.0
+OPTIMAL_COST = 10.0  # told beside the above; no verdict depends on it
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,8 +22,10 @@ from freeswing.cdpr.robot import Array, frozen_array
 from freeswing.ident.signals.derivatives import Signals
 from freeswing.ident.signals.motions import free_motion
 
+# Noise beyond which the inverse of its variance would weigh one column nine times another.
 UNEVEN = 3.0
 _SWEEPS = 12
+# About the period of a swing: errors of the model come back with it.
 _CORRELATED_S = 1.0
 
 

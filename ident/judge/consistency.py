@@ -17,7 +17,7 @@ import numpy as np
 
 from freeswing.cdpr.robot import INERTIA_NAMES, Array
 
-LEAST_EXTENT_M = 1e-3
+LEAST_EXTENT_M = 1e-3  # root mean square, from a plane: a sheet of 3.5 mm; platforms are thicker
 _BARRIERS = 10.0 ** np.arange(1, -9, -1)
 _NEWTON_STEPS = 60
 _SIGNIFICANT = 3.0  # standard deviations

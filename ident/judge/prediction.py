@@ -18,6 +18,7 @@ from freeswing.ident.likelihood.session_estimates import started
 from freeswing.ident.signals.band import independent_numbers
 from freeswing.ident.signals.prepare import PreparedRun
 
+# Ten samples a period at the 5 Hz where swings of a platform end (`band.LOWEST_PASS_HZ`).
 PREDICTED_HZ = 50.0
 _AS_GOOD = 1.1  # times the error under a model before: no reason for another, careful start
 _ASTRAY = 0.05  # residual over motion beyond which a fit deserves a second, careful start

@@ -34,8 +34,10 @@ from freeswing.ident.signals.window import free_window
 
 Processing = Literal["centred", "authors"]
 _ANGLES = ("phi", "theta", "chi")
-_UNUSUAL = 8.0  # times the median extrapolation error that a step must exceed
-_LEAST_OUTPUTS = 10
+# Times the median extrapolation error that a step must exceed: 5.4 deviations, which normal errors
+# exceed once in ten million samples.
+_UNUSUAL = 8.0
+_LEAST_OUTPUTS = 10  # one more than the nine parameters
 _LEVER_M = 0.2  # makes angles comparable to metres where only their relative size matters
 
 

@@ -25,6 +25,8 @@ FOLLOWS = 0.35
 # quarter of it moves the platform as much as what is to be identified does. Later passes let go
 # half more than what the stretch already holds.
 GROWN = 0.25
+# A hand that lets go is smoothed into what follows, below what ends the free motion: a third of
+# `_LOCAL_S` is left out.
 _MARGIN_S = 0.1
 _MOST_MODES = 3
 _RATE_HZ = 25.0  # enough for signals that stop at 10 Hz

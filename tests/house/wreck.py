@@ -92,7 +92,9 @@ HELD = (
     Held("cdpr/markers/session_markers.py", ("MOST_OPEN_M",), SPOTS),
     Held("ident/fidim/fidim.py", ("WELL_IDENTIFIED_PERCENT", "NEAR_ZERO", "GOOD_COST"), FIDIM),
     Held("ident/fidim/total_least_squares.py", ("LEAST_GAP", "SMALLEST_RATIO"), FIDIM),
-    Held("ident/judge/consistency.py", ("_SIGNIFICANT",), FIDIM),
+    Held("ident/judge/consistency.py", ("_SIGNIFICANT", "LEAST_EXTENT_M"), FIDIM),
+    Held("ident/fidim/fidim_stage.py", ("REACH",), FIDIM),
+    Held("ident/fidim/weighted_least_squares.py", ("UNEVEN", "_CORRELATED_S"), FIDIM),
     Held(
         "freeswing/doctor/markers.py",
         ("TARGET_OFF_M", "LARGE_JUMP_M", "LESS_TRUST", "LAYOUT_CHANGE_M"),
@@ -123,7 +125,11 @@ HELD = (
     Held("freeswing/results/driven/drive.py", ("LARGEST_SHARE",), CHOICE),
     Held("ident/likelihood/calibration_modes.py", ("UNLIKELY",), LIKELIHOOD),
     Held("ident/likelihood/fit_swings.py", ("COLOURED", "LOW_BAND_HZ"), LIKELIHOOD),
-    Held("ident/likelihood/payload_runs.py", ("LEAST_SIGNIFICANCE",), LIKELIHOOD),
+    Held(
+        "ident/likelihood/payload_runs.py",
+        ("LEAST_SIGNIFICANCE", "OWN_INERTIA_STD_M2"),
+        LIKELIHOOD,
+    ),
     Held("ident/likelihood/between_runs.py", ("LEAST_RUNS",), LIKELIHOOD),
     Held(
         "ident/likelihood/raw_samples.py",
@@ -230,10 +236,15 @@ HELD = (
     ),
     Held(
         "ident/signals/window.py",
-        ("REFERENCE_S", "FOLLOWS", "GROWN"),
+        ("REFERENCE_S", "FOLLOWS", "GROWN", "_MARGIN_S"),
         "tests/ident/signals/test_limits.py",
     ),
     Held("ident/signals/motions.py", ("LENGTH_LIMIT_M",), "tests/ident/signals/test_limits.py"),
+    Held(
+        "ident/signals/derivatives.py",
+        ("_UNUSUAL", "_LEAST_OUTPUTS"),
+        "tests/ident/signals/test_limits.py",
+    ),
     Held(
         "ident/diagnose/decision.py",
         (
@@ -502,10 +513,10 @@ HELD = (
     ),
     Held(
         "ident/signals/band.py",
-        ("LOWEST_PASS_HZ", "HIGHEST_SHARE", "_LEAST_SAMPLES",),
+        ("LOWEST_PASS_HZ", "HIGHEST_SHARE", "_LEAST_SAMPLES", "_CAUTION", "_FLOOR_FROM", "_CLEAR"),
         BAND_LIMITS,
     ),
-    Held("ident/judge/prediction.py", ("_ASTRAY",), BAND_LIMITS),
+    Held("ident/judge/prediction.py", ("_ASTRAY", "PREDICTED_HZ"), BAND_LIMITS),
     Held("cdpr/driven/drive.py", ("LEAST_DRIVEN",), CDPR),
     Held("cdpr/effects/forces/tether.py", ("DEPTH",), CDPR),
     Held("cdpr/files/drive_file.py", ("COULOMB_WIDTH_RAD_S",), CDPR),

@@ -44,7 +44,7 @@ SLOPES_AT, PARTS = 40, 5
 # What stands beside the geometry: the centre of mass is anywhere, a constant specific force is as
 # large as a base that is off by two hundredths of a radian makes it.
 COM_M, FORCE_M_S2 = 0.05, 0.2
-BESIDE = 6
+BESIDE = 6  # three coordinates each
 # Less probable than this by chance: two witnesses that contradict each other, or equilibria that no
 # geometry explains. A torsion spring that moved a point by 4 mm left 0.08, a tether nothing.
 CONTRADICTED = 0.1

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from freeswing.ident.fidim import fidim as module
+from freeswing.ident.fidim import fidim_stage, weighted_least_squares
 from freeswing.ident.fidim.fidim import near_zero
 from freeswing.ident.fidim.total_least_squares import TotalLeastSquares
 from freeswing.ident.judge.comparison import between_runs
-from freeswing.ident.judge.consistency import Consistency
+from freeswing.ident.judge.consistency import Consistency, least_moment, nearest_possible
 
 
 def solved(**changes):
@@ -60,3 +61,53 @@ def test_two_runs_tell_no_spread_and_three_do():
     without = np.tile(np.arange(3.0)[:, None], (1, 9))
     assert between_runs(without[:2]).tolist() == [0.0] * 9
     assert (between_runs(without) > 0.5).all()
+
+
+@pytest.mark.parametrize(("off", "slack"), [(1.9, []), (2.1, ["a"])])
+def test_a_cable_pushes_where_all_within_two_deviations_say_so(monkeypatch, off, slack):
+    """The estimate's first number is so many deviations below where the cable goes slack."""
+    monkeypatch.setattr(fidim_stage, "lowest_tension", lambda model, motion, one: (one[0], "1"))
+    solution = SimpleNamespace(covariance=1e-4 * np.eye(9))
+    inertias = fidim_stage.within_reach(
+        SimpleNamespace(solution=solution, values=np.r_[-0.01 * off, np.zeros(8)])
+    )
+    run = SimpleNamespace(name="a", full=True, run=SimpleNamespace(payload=None))
+    found = fidim_stage._slack_runs(None, SimpleNamespace(runs=[run]), inertias, True)
+    assert list(found) == slack
+
+
+@pytest.mark.parametrize(("ratio", "said"), [(2.85, 0), (3.15, 1)])
+def test_columns_three_times_as_noisy_as_others_are_told(monkeypatch, ratio, said):
+    heard = []
+    monkeypatch.setattr(fidim_stage, "unevenness", lambda _: ratio)
+    monkeypatch.setattr(fidim_stage, "_mass", lambda *_: None)
+    monkeypatch.setattr(fidim_stage, "calibration_share", lambda *_: 0.0)
+    monkeypatch.setattr(fidim_stage, "left_out", lambda *_: None)
+    monkeypatch.setattr(fidim_stage, "fidim_entry", lambda *words: heard.extend(words[2]))
+    monkeypatch.setattr(fidim_stage, "_as_runs_say", lambda *_: None)
+    monkeypatch.setattr(fidim_stage, "replace", lambda *_, **__: None)
+    raw = SimpleNamespace(essential=None, without_run=())
+    fidim_stage._completed(None, None, [], raw, True, "published")
+    assert len(heard) == said, heard
+
+
+def test_errors_of_the_equations_repeat_within_a_second(monkeypatch):
+    """Errors that never change: their sum's variance grows by Bartlett's weights of a second."""
+    n, period_s = 20000, 0.01
+    W = np.zeros((n, 1, 10))
+    W[:, 0, :2] = 1.0
+    monkeypatch.setattr(weighted_least_squares, "_weights", lambda run, chi: np.ones((n, 1, 1)))
+    run = SimpleNamespace(W=W, period_s=period_s)
+    spread = weighted_least_squares._score_spread([run], np.eye(10)[0], np.zeros((10, 10)))
+    assert spread[0, 0] * n == pytest.approx(1.0 / period_s, rel=0.03)
+
+
+@pytest.mark.parametrize(("thick_mm", "kept"), [(0.95, False), (1.05, True)])
+def test_a_body_is_a_millimetre_thick(thick_mm, kept):
+    """Root mean square distance from a plane; a thinner one is made as thick as that."""
+    x, y, z = 0.02, 0.03, (1e-3 * thick_mm) ** 2
+    body = np.array([0.0, 0.0, 0.0, y + z, x + z, x + y, 0.0, 0.0, 0.0])
+    found = nearest_possible(body, 1e-6 * np.eye(9))
+    assert (found == body).all() == kept
+    if not kept:
+        assert np.sqrt(least_moment(found)[0]) == pytest.approx(1e-3, rel=0.03)

@@ -11,9 +11,9 @@ from freeswing.ident.likelihood import fit_swings, session_estimates
 from freeswing.ident.likelihood.between_runs import jackknife_std, widened
 from freeswing.ident.likelihood.calibration_modes import Calibrated
 from freeswing.ident.likelihood.fit_swings import low_band_factor
-from freeswing.ident.likelihood.payload_runs import mass_of
+from freeswing.ident.likelihood.payload_runs import Loads, mass_of
 from freeswing.ident.likelihood.raw_samples import prepare
-from freeswing.ident.runs import SwingRun
+from freeswing.ident.runs import Payload, SwingRun
 from tests.ident.swings import recorded, swing
 
 
@@ -97,3 +97,11 @@ def test_a_start_has_led_astray_where_half_the_motion_is_left(monkeypatch, astra
     starts = [np.zeros(9), np.ones(9)]
     found = session_estimates.from_starts(None, [], None, starts, (), None, None)[1]
     assert found is fits[taken]
+
+
+def test_a_payload_is_a_body_of_five_centimetres():
+    """What is believed of its moments about its own centre; of the platform's mass nothing."""
+    std = Loads.of([Payload(1.0, np.zeros(3))]).prior_std
+    assert std[0] == np.inf
+    radii = np.sqrt(std[1:])
+    assert ((radii > 0.048) & (radii < 0.052)).all(), radii

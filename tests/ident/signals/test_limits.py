@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from freeswing.cdpr.robot import POSE_COORDINATES
-from freeswing.ident.signals import prepare
+from freeswing.ident.signals import derivatives, prepare
 from freeswing.ident.signals.derivatives import SignalSettings, UnusableRunError
 from freeswing.ident.signals.motions import mean_lengths
 from freeswing.ident.signals.window import free_window
@@ -111,3 +111,33 @@ def test_free_coordinates_that_tell_the_pose(monkeypatch, amount, serves) -> Non
     assert told == amount
     assert (found.free is not None) == serves, found.why_not_free
     assert ("limit 20" in found.why_not_free) == (not serves), found.why_not_free
+
+
+def test_a_tenth_of_a_second_after_letting_go_is_left_out() -> None:
+    start, _ = window_of(np.zeros_like)
+    assert 0.09 < start < 0.11, start
+
+
+@pytest.mark.parametrize(("size_m", "jumps"), [(0.076, 0), (0.084, 1)])
+def test_a_jump_is_eight_times_the_usual_extrapolation_error(monkeypatch, size_m, jumps) -> None:
+    sizes = np.full((101, 1), 0.01)
+    sizes[50] = size_m
+    monkeypatch.setattr(derivatives, "jump_sizes", lambda _: (sizes, 1.0))
+    monkeypatch.setattr(derivatives, "white_noise_std", lambda _: np.zeros(1))
+    assert derivatives._jumps(sizes, ("x",), SignalSettings()).sum() == jumps
+
+
+@pytest.mark.parametrize(("n", "enough"), [(9, False), (10, True)])
+def test_more_samples_than_the_nine_parameters(monkeypatch, n, enough) -> None:
+    unbroken = np.arange(20) < n
+    monkeypatch.setattr(derivatives, "_unbroken", lambda *_: unbroken)
+    monkeypatch.setattr(derivatives, "_apply", lambda *_: (0.0, 0.0, 0.0))
+    monkeypatch.setattr(derivatives, "free_window", lambda *_: (1.0, 2.0))
+    run = SimpleNamespace(window_s=None, trajectory=SimpleNamespace(coordinates=("x",)))
+    grid, kernels = SimpleNamespace(times_s=np.arange(20.0)), SimpleNamespace(half=2)
+    asked = run, grid, np.zeros((20, 1)), np.zeros(20, bool), kernels
+    if enough:
+        assert derivatives._window(*asked) == (1.0, 2.0)  # type: ignore[arg-type]
+    else:
+        with pytest.raises(UnusableRunError, match="no unbroken stretch"):
+            derivatives._window(*asked)  # type: ignore[arg-type]
