@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 POINTS = {"entries": "anchor_offset", "attachments": "attachment_offset"}
 NOT_ASKED = ("current_time_constant_s", "coulomb_width_rad_s")
-LARGEST_LATENCY_S = 1.0
+LARGEST_LATENCY_S = 1.0  # cameras need tenths of it; what is above is written in ms
 SHORTEST_RUN = 50  # samples: less holds no motion of any platform at 1 kHz
 
 

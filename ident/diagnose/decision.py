@@ -43,7 +43,8 @@ RIVAL = 0.05
 CONFOUNDED_DIFFERENCE = 12.0
 LEAST_EXCESS = 0.005
 CONTRADICTED = 0.15
-# Inertias are anywhere within so many of their usual sizes.
+# Inertias are anywhere within so many of their usual sizes: a centre of mass within half a metre,
+# moments of a radius within 45 cm, those of platforms of a metre.
 INERTIA_RANGE = 10.0
 # Effects whose best mixture explains less than this of the excess are the nearest, not the cause.
 LEAST_SHARE_EXPLAINED = 0.75

@@ -9,7 +9,8 @@ import numpy as np
 from freeswing.ident.diagnose.decision import ACCEPTED, CONFOUNDED_DIFFERENCE, included, left_out
 from freeswing.ident.diagnose.refit import Refit
 
-# Of the BIC without an effect to second order, below which leaving it out is worth a fit.
+# Of the BIC without an effect to second order, below which leaving it out is worth a fit: beyond,
+# the evidence for it is very strong (Kass, Raftery 1995, Bayes Factors, sec. 3.2).
 LARGEST_RISE = 10.0
 
 

@@ -11,6 +11,7 @@ from freeswing.ident.likelihood.fit_swings import LikelihoodFit
 from freeswing.ident.likelihood.run_residuals import residuals
 from freeswing.ident.signals import band
 
+# Runs of 20 s hold three periods of it: what is slower is a drift and has no frequency.
 LOWEST_HZ = 0.15
 # No calibration or survey can be trusted below this: nothing is sought in such a residual.
 SMALLEST_RESIDUAL_M = 2e-5

@@ -49,6 +49,8 @@ FUSE = "tests/vision/fuse/test_fuse_limits.py"
 RIG = "tests/vision/rig/test_rig_limits.py"
 HOMING = "tests/homing/test_limits.py"
 DECISION = "tests/ident/diagnose/test_decision_limits.py"
+RESIDUALS = "tests/ident/diagnose/test_residual_limits.py"
+PLACES = "tests/ident/diagnose/lengths/test_lengths_limits.py"
 INCLUSION = "tests/ident/diagnose/lengths/test_inclusion.py"
 BENCH = "tests/ident/bench/test_bench_limits.py"
 BENCH_DIAGNOSE = "tests/ident/bench/test_bench_diagnose.py"
@@ -62,6 +64,8 @@ SERVO = "tests/servo/test_servo_limits.py"
 LAWS = "tests/servo/test_law_limits.py"
 
 FIDIM = "tests/ident/fidim/test_fidim_limits.py"
+MACHINE = "tests/freeswing/doctor/test_machine_limits.py"
+SESSION = "tests/freeswing/session/test_session_limits.py"
 MARKERS = "tests/freeswing/doctor/test_marker_limits.py"
 
 SPOTS = "tests/cdpr/markers/test_marker_decisions.py"
@@ -100,6 +104,14 @@ HELD = (
         ("TARGET_OFF_M", "LARGE_JUMP_M", "LESS_TRUST", "LAYOUT_CHANGE_M"),
         MARKERS,
     ),
+    Held("freeswing/doctor/machine.py", ("COMFORTABLE_GB",), MACHINE),
+    Held("freeswing/doctor/motion.py", ("TURNED_CHANGE_M", "TURNED_BETTER"), MACHINE),
+    Held("freeswing/session/bench_keys.py", ("UNIT_QUATERNION",), SESSION),
+    Held("freeswing/session/drive_session.py", ("LARGEST_LATENCY_S", "SHORTEST_RUN"), SESSION),
+    Held("freeswing/session/exchanged_lengths.py", ("NEXT_BEST",), SESSION),
+    Held("freeswing/session/load_bench.py", ("PARALLEL_RAD", "STRAIGHT_RAD"), SESSION),
+    Held("freeswing/session/new_recordings.py", ("EVERY_THIRD",), SESSION),
+    Held("freeswing/starter/markers.py", ("VALIDATE_EVERY",), SESSION),
     Held("freeswing/session/repeated_runs.py", ("STRETCH", "SHARED"), MARKERS),
     Held("freeswing/results/comparison.py", ("NOTABLE_Z",), MARKERS),
     Held(
@@ -256,6 +268,28 @@ HELD = (
         DECISION,
     ),
     Held("ident/diagnose/diagnose.py", ("LARGEST_EXCESS_LEFT",), DECISION),
+    Held("ident/diagnose/decision.py", ("INERTIA_RANGE",), RESIDUALS),
+    Held("ident/diagnose/removal.py", ("LARGEST_RISE",), RESIDUALS),
+    Held(
+        "ident/diagnose/spectrum.py",
+        ("LOWEST_HZ", "SMALLEST_RESIDUAL_M", "SMALLEST_RESIDUAL_RAD"),
+        RESIDUALS,
+    ),
+    Held(
+        "ident/diagnose/model_probabilities.py",
+        ("CHANCE_OF_EFFECT",),
+        "tests/ident/diagnose/test_model_probabilities.py",
+    ),
+    Held(
+        "ident/diagnose/lengths/inclusion.py",
+        ("CHANCE_OF_WRONG", "MOST_RIVALS", "COUNTS"),
+        PLACES,
+    ),
+    Held(
+        "ident/diagnose/lengths/length_rows.py",
+        ("LEAST_SIZE", "LEAST_SIZE_UNSTATED"),
+        PLACES,
+    ),
     Held("ident/diagnose/lengths/inclusion.py", ("ACCEPTED", "RIVAL"), INCLUSION),
     Held(
         "ident/diagnose/lengths/equilibria.py",

@@ -33,7 +33,7 @@ SEED = 20202
 ACCEPTED = 0.95
 # What is less probable replaces nothing.
 RIVAL = 0.05
-MOST_RIVALS = 3
+MOST_RIVALS = 3  # of more than three places to look at, none is told
 # Sets less probable than this move no mean.
 COUNTS = 2e-3
 

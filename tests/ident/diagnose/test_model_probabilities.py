@@ -128,3 +128,9 @@ def test_the_share_of_runs_that_are_alike_is_that_of_their_excess(size: float) -
     counts = np.full(4, 1000.0)
     runs = LeftOut((1.0 + size) * counts, counts, np.full(4, 50.0), 0.005)
     assert runs.share((1.0 + 0.3 * size) * counts) == pytest.approx(0.7, rel=1e-9)
+
+
+def test_one_effect_in_thirty_is_there_beforehand():
+    none, one = rivals(1, (3,), 0.0)
+    blind = Rival(one.triangles * np.array([0.0, 0.0, 0.0, 1.0]), one.prior, 1)
+    assert 28.0 < 1.0 / model_probabilities([none, blind], COUNTS, MANY)[1] < 32.0

@@ -1,0 +1,62 @@
+"""Which residuals are looked into, and how an effect leaves again: both sides of each limit."""
+# Stubs stand for what is not looked at.
+# pyright: reportArgumentType=false
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from freeswing.cdpr.effects.base import Parameter
+from freeswing.ident.diagnose import decision, spectrum
+from freeswing.ident.diagnose.removal import superfluous
+
+
+@pytest.mark.parametrize(
+    ("position_um", "angle_urad", "small"), [(19, 95, True), (21, 95, False), (19, 105, False)]
+)
+def test_residuals_that_no_calibration_can_be_trusted_to(position_um, angle_urad, small) -> None:
+    fit = SimpleNamespace(noise=1e-6 * np.array([position_um, angle_urad]))
+    assert spectrum.too_small(fit) == small
+
+
+@pytest.mark.parametrize(("slow_hz", "found_hz"), [(0.135, 1.0), (0.17, 0.17)])
+def test_what_is_slower_than_a_seventh_of_a_hertz_is_a_drift(monkeypatch, slow_hz, found_hz):
+    """Three times as large as a wave of 1 Hz."""
+    times = np.arange(1000) / 5.0
+    noise = 0.01 * np.random.default_rng(0).standard_normal(1000)
+    wave = 3.0 * np.sin(2.0 * np.pi * slow_hz * times) + np.sin(2.0 * np.pi * times) + noise
+    monkeypatch.setattr(spectrum, "residuals", lambda *_: wave[:, None])
+    run = SimpleNamespace(times_s=times, span_s=(0.0, 200.0))
+    fit = SimpleNamespace(samples=[run], motions=[None])
+    assert spectrum.common_frequency(fit, np.ones(2)) == pytest.approx(found_hz, abs=0.01)
+
+
+@pytest.mark.parametrize(("rise", "leaves"), [(9.3, True), (10.7, False)])
+def test_an_effect_worth_a_fit_without_it(rise, leaves) -> None:
+    """By its square in deviations, less what a thousand samples ask of an unknown."""
+    value = np.sqrt(rise + np.log(1000.0))
+    current = SimpleNamespace(
+        evidence=SimpleNamespace(counts=np.full(4, 250.0)), effects=("drag",),
+        values_of=lambda name: slice(0, 1),
+        fit=SimpleNamespace(
+            model=SimpleNamespace(parameters=(Parameter("size", -1.0, 1.0, 0.1),)),
+            unknowns=SimpleNamespace(block=lambda name: SimpleNamespace(mask=np.ones(1, bool))),
+            values=np.array([value]), covariance_of=lambda name: np.eye(1),
+        ),
+    )  # fmt: skip
+    assert superfluous(current, ()) == ("drag" if leaves else "")
+
+
+def test_a_platforms_inertia_is_one_of_a_metres_size(monkeypatch) -> None:
+    """Its centre of mass within half a metre, moments of a radius within 45 cm, products half."""
+    monkeypatch.setattr(decision, "value_priors", lambda *_: np.zeros((0, 10)))
+    linear = SimpleNamespace(triangles=np.zeros((1, 10, 10)))
+    one = SimpleNamespace(
+        fit=SimpleNamespace(free=np.ones(9, bool), model=None, values=None),
+        evidence=SimpleNamespace(subset=lambda columns: linear),
+    )
+    std = 1.0 / decision._rival(one, "").prior[:, :9].diagonal()
+    assert std == pytest.approx(np.repeat([0.5, 0.2, 0.1], 3), rel=0.05)
