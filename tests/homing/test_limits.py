@@ -1,4 +1,6 @@
 """When homing takes a fit, doubts it or gives it up: both sides of each limit."""
+# Stubs stand for what is not looked at.
+# pyright: reportArgumentType=false
 
 from __future__ import annotations
 

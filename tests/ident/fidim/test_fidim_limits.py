@@ -1,4 +1,6 @@
 """What FIDIM and its judges decide, on both sides of every limit, on made numbers."""
+# Stubs stand for what is not looked at.
+# pyright: reportArgumentType=false, reportOptionalCall=false
 
 from types import SimpleNamespace
 

@@ -1,4 +1,6 @@
 """What the likelihood decides, on both sides of every limit, without fitting anything."""
+# Stubs stand for what is not looked at.
+# pyright: reportArgumentType=false
 
 from dataclasses import replace
 from types import SimpleNamespace
