@@ -10,7 +10,7 @@ from freeswing.calib.camera.camera import Camera
 from freeswing.calib.camera.lens_models import Array
 from freeswing.calib.rig.views import Views
 
-GRID = 4
+GRID = 4  # fields a side, what `LEAST_FILLED` counts: a board at arm's length covers one or two
 _SIDES = ("left", "middle", "right")
 _HEIGHTS = ("top", "centre", "bottom")
 

@@ -24,8 +24,9 @@ from freeswing.cdpr.files.documents import DataError
 Progress = Callable[[str, float], None]
 
 MOST_FRAMES = 600
-BURST = 5
-LEAST_FLOW = 4
+BURST = 5  # frames: three tell a smooth motion, of these three middles are told
+LEAST_FLOW = 4  # corners: a median of fewer follows one that is misread
+# Of the way in two frames: hands turn a board about within ten frames, cuts jump.
 _LARGEST_BEND = 0.35
 _WORKERS = 2
 _LOOKED_AT_AGAIN, _EVERY = 6, 5

@@ -15,7 +15,7 @@ from freeswing.cdpr.files.documents import InputError
 FORMATS = ("freeswing", "opencv", "kalibr", "ros", "anipose", "colmap", "colmap-binary", "qualisys")
 Tell = Callable[[str], None]
 _LOOKED_AT_BYTES = 20_000
-_RIGID = 1e-3
+_RIGID = 1e-3  # files with four digits are off by 1e-4, a matrix of another kind by 0.1 and more
 _MODULES = {
     "opencv": "opencv_yaml",
     "kalibr": "kalibr",

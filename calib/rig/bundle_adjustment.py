@@ -31,8 +31,8 @@ _HARDLY_DAMPED = 1e-3  # a step so damped is as good as the full one
 # expected fall of the cost at which to stop, in units where one residual of 1 sigma counts 1/2
 CONVERGED = 1e-7
 ROUGHLY_CONVERGED = 1e-2
-_COMMON_FREEDOM = 30.0
-_LEAST_FREEDOM = 0.1
+_COMMON_FREEDOM = 30.0  # numbers: a deviation of so many is good to an eighth
+_LEAST_FREEDOM = 0.1  # of a camera's numbers: what is said free of all by counting is not
 MEDIAN_OF_RAYLEIGH = 1.1774100225154747  # median length of a 2-D error of unit standard deviation
 
 

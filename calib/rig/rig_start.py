@@ -14,9 +14,10 @@ from freeswing.calib.rig.views import FixedPoints, Views
 from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.rotation import invert
 
+# moment: the board's pose in both cameras is the way between them, all six numbers
 LEAST_SHARED = 1
 _MOST_CANDIDATES = 12
-_CAP_PX = 20.0
+_CAP_PX = 20.0  # more is a pose turned over, whatever it misses by: it has one vote like others
 
 
 @dataclass(frozen=True, slots=True)

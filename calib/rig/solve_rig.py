@@ -32,7 +32,7 @@ VIEW_OUTLIER_FLOOR_PX = 0.5  # below half a pixel nothing was misread, whatever 
 CORNER_SIGMAS = 6.0  # one in 1e8 by chance: none of a session's 1e5 corners
 # share of normal errors within the limit of a corner's on its own, as large for corners together
 CORNER_WITHIN = 1.0 - np.exp(-0.5 * CORNER_SIGMAS**2)
-_LEAST_CORNERS = 4
+_LEAST_CORNERS = 4  # three leave four poses of the board open
 LINE_TIME_SIGMAS = 5.0
 LEAST_READOUT_S = 5e-4
 _MOST_SWEEPS = 3

@@ -25,7 +25,7 @@ from freeswing.calib.rig.rig_start import board_groups, pose_from_points
 from freeswing.calib.rig.views import Views, joined_views
 
 _GAP_S = 100.0  # between recordings on the common timeline
-_MOST_MISS_PX = 3.0
+_MOST_MISS_PX = 3.0  # lenses known roughly leave a pixel or two, a tag misread tens
 MOST_RUNS = 2
 """Runs looked at: one of some hundred frames ties cameras to tenths of a millimetre."""
 

@@ -12,7 +12,7 @@ from freeswing.calib.camera.lens_models import PARAMETER_NAMES, Array
 from freeswing.calib.verdict.calibration_result import CameraCovariance
 from freeswing.cdpr.files.documents import DataError
 
-WORST_STD_RAD = 0.05
+WORST_STD_RAD = 0.05  # three degrees: people see that a frame does not stand upright by themselves
 _ROUNDS = 4
 _STEP = 1e-5
 _TURN: tuple[str, ...] = ("rx_rad", "ry_rad", "rz_rad")

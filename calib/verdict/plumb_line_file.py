@@ -14,7 +14,7 @@ from freeswing.calib.verdict.plumb_line import StringView, Vertical
 from freeswing.cdpr.files.documents import InputError, read_text
 from freeswing.cdpr.files.number_table import comma_separated
 
-CLICK_STD_PX = 0.5
+CLICK_STD_PX = 0.5  # where the file states none: people hit a thin string within the pixel
 _COLUMNS = ("camera", "u_px", "v_px")
 _MOST_BYTES = 1 << 24
 # A string this many click deviations long has its direction to 1/20 rad: shorter ones say nothing.

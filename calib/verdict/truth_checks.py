@@ -14,7 +14,7 @@ from freeswing.calib.rig.solve_rig import Rig
 from freeswing.calib.rig.triangulation import triangulate
 from freeswing.cdpr.rotation import nearest_rotation
 
-LEAST_HALF = 4
+LEAST_HALF = 4  # views of each camera: fewer do not fix its lens, and halves differ for that
 _VOLUME_POINTS = 200
 CHANCE = 0.999
 """Halves that differ by more than so many of those of honest deviations: these are too small."""

@@ -80,6 +80,10 @@ MEASURED = "tests/cdpr/measured/test_measured_limits.py"
 BAND_LIMITS = "tests/ident/signals/test_band_limits.py"
 UNTAGGED = "tests/vision/untagged/test_untagged_limits.py"
 CDPR = "tests/cdpr/test_cdpr_limits.py"
+START = "tests/vision/rig/test_start_limits.py"
+RIG_START = "tests/calib/rig/test_rig_start_limits.py"
+CALIB = "tests/calib/test_calib_limits.py"
+PLANAR = "tests/vision/planar/test_planar_limits.py"
 
 HELD = (
     Held(
@@ -576,6 +580,37 @@ HELD = (
         ("LENGTHS_OFF_M",),
         "tests/freeswing/doctor/test_quaternions.py::test_what_is_left_by_the_right_reading",
     ),
+    Held(
+        "vision/rig/alignment.py",
+        ("REACH_FRAMES", "SURE_SIGMAS", "_LEAST_COMPARED", "_SAME_START_S"),
+        START,
+    ),
+    Held("vision/rig/correct_rig.py", ("_LEAST_KNOWN",), START),
+    Held("vision/rig/pairs.py", ("_LEAST_OVERLAP",), START),
+    Held("vision/rig/rig_effects.py", ("_KEEP_SCORE",), START),
+    Held("vision/rig/stamp_jitter.py", ("LEAST_JITTER_S", "_LEAST_FRAMES", "_FLOOR_PX"), START),
+    Held("vision/rig/untied.py", ("_LEAST_TAGS", "_LEAST_KNOWN"), START),
+    Held("calib/rig/bundle_adjustment.py", ("_COMMON_FREEDOM", "_LEAST_FREEDOM"), RIG_START),
+    Held("calib/rig/rig_start.py", ("LEAST_SHARED", "_CAP_PX"), RIG_START),
+    Held("calib/rig/solve_rig.py", ("_LEAST_CORNERS",), RIG_START),
+    Held("calib/rig/swing_tie.py", ("_MOST_MISS_PX", "MOST_RUNS"), RIG_START),
+    Held("calib/board/coverage.py", ("GRID",), CALIB),
+    Held("calib/board/sightings.py", ("BURST", "LEAST_FLOW", "_LARGEST_BEND"), CALIB),
+    Held("calib/exchange/__init__.py", ("_RIGID",), CALIB),
+    Held("calib/exchange/anipose.py", ("FARTHEST_M",), CALIB),
+    Held("calib/exchange/qualisys.py", ("_NEAR_MIDDLE",), CALIB),
+    Held("calib/verdict/plumb_line.py", ("WORST_STD_RAD",), CALIB),
+    Held("calib/verdict/plumb_line_file.py", ("CLICK_STD_PX",), CALIB),
+    Held("calib/verdict/survey_check.py", ("MIRRORED", "LEAST_TRIANGULATED"), CALIB),
+    Held("calib/verdict/truth_checks.py", ("LEAST_HALF",), CALIB),
+    Held("vision/planar/dots.py", ("REACH", "LEAST_REACH", "LONGEST_GAP", "LEAST_SHARE"), PLANAR),
+    Held(
+        "vision/planar/examine.py",
+        ("ALONG", "LEAST_ARM", "LEAST_SAMPLES", "STEP_SHARE", "STEP_STDS", "LEAST_STEP", "EDGE"),
+        PLANAR,
+    ),
+    Held("vision/planar/fit_plane.py", ("FOCAL_STD", "BEND_STD", "LEAN_STD"), PLANAR),
+    Held("vision/planar/track_planar.py", ("LEAST_FRAMES",), PLANAR),
 )  # fmt: skip
 
 

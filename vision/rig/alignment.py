@@ -21,7 +21,7 @@ CLEARLY_BETTER = 1.5
 """An offset is looked for when poses fit so many times better there than as stamped."""
 SURE_SIGMAS = 4.0
 """A start is believed when frame for frame any other misses by so many deviations more."""
-_LEAST_COMPARED = 20
+_LEAST_COMPARED = 20  # frames: the deviation of their differences is then good to a sixth
 _SAME_START_S = 0.005
 """Starts that end so near are one: they were frames apart, and the clocks were put right."""
 IN_EARNEST = 3.0

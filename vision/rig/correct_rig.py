@@ -42,7 +42,7 @@ Array = NDArray[np.float64]
 # A rig has two dozen numbers that could be off, deviations are good to some ten percent, and what
 # is changed for nothing spoils every pose: six of them leave no room for chance.
 SIGMAS = 6.0
-_LEAST_KNOWN = 20
+_LEAST_KNOWN = 20  # poses: two dozen numbers of a rig do not follow from fewer
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,7 +23,7 @@ LEAST_OVERLAP_S = 1.0  # less than a swing is no motion to compare
 OVERLAP_SHARE = 0.5
 """Recordings of one run share at least so much of the shorter one: on less, a swing that nearly
 repeats itself fits itself by chance."""
-_LEAST_OVERLAP = 20
+_LEAST_OVERLAP = 20  # frames: fewer speeds correlate by 0.5 by chance once in forty lags
 _STEPS_A_FRAME = 2
 _NEARLY_BEST = 0.25
 """Lags whose speeds correlate worse than the best by more are not looked at by poses."""

@@ -42,6 +42,7 @@ MOVED_PX = 0.4
 LEAST_CLOCK_S = 5e-5
 # The same over an image of 200 rows and more.
 LEAST_LINE_S = 3e-7
+# twenty deviations: late clocks and knocks do so much, what does more is misread
 _KEEP_SCORE = 400.0
 _STEPS, _MOST_STEPS = 3, 20
 _SETTLED = 0.3

@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 
 LEAST_JITTER_S = 1e-4
 """At 1 m/s less moves the platform by less than 0.1 mm, and cameras' own errors look like it."""
-_LEAST_FRAMES = 20
+_LEAST_FRAMES = 20  # a median of so many steps is good to a fifth
 _FLOOR_PX = 0.03
 """What lenses leave from frame to frame; the fit's own floor may hold the very jitter."""
 _NORMAL_MAD = 1.4826

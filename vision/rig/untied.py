@@ -28,8 +28,8 @@ Array = NDArray[np.float64]
 KNOCKED_PX = 2.0
 """What lenses and calibrations leave between cameras is 0.05 to 0.5 px; a knock is several."""
 SURE_SIGMAS = 6.0  # of a change of six numbers: none by chance in 1e5 runs
-_LEAST_TAGS = 2
-_LEAST_KNOWN = 20
+_LEAST_TAGS = 2  # one alone leaves a camera its turn about the tag, and may have been bumped
+_LEAST_KNOWN = 20  # poses: fewer have no swing that a place could follow from
 
 
 def untied_shifts(
