@@ -15,7 +15,7 @@ from freeswing.cdpr.model.equations import build_model
 from freeswing.demo import mocap, rehearsal, truth
 from freeswing.demo.lessons import LESSONS
 from freeswing.demo.rehearsal import is_compiled, rehearse
-from freeswing.ident.diagnose.heldout import held_out
+from freeswing.ident.diagnose.heldout import Stage, held_out
 from freeswing.ident.identify import IdentifySettings, identify
 from freeswing.main import main
 from freeswing.session import stages
@@ -105,10 +105,10 @@ def test_held_out_swings_under_their_true_model(tmp_path: Path) -> None:
     held = [run for run in found.prepared.runs if run.run.role == "validate"]
     model = build_model(robot, (truth.EFFECT,))
     values = np.array(truth.EFFECT_VALUES)
-    runs = held_out(model, held, None, truth.TRUE_INERTIA, values)().runs
+    (true,) = held_out([Stage(model, truth.TRUE_INERTIA, values)], held, None)()
     ratios = {
         run.run: run.prediction.rmse_m / run.noise_floor_m
-        for run in runs
+        for run in true.runs
         if run.prediction and run.prediction.rmse_m
     }
     assert sorted(ratios) == ["check-01", "check-02"]

@@ -139,21 +139,21 @@ def moved_text(times_s: Array, poses: Array, run: str) -> str | None:
         (times_s > times_s[0] + EDGE * np.ptp(times_s))
         & (times_s < times_s[-1] - EDGE * np.ptp(times_s))
     )
-    found: tuple[float, float, Array] | None = None
-    scale = costs + 1e-30
+    still = costs <= 1e-30
+    found: tuple[Array, float, Array] | None = None
     for start in inside[:: max(1, len(inside) // 150)]:
         both = np.column_stack([base, times_s >= times_s[start]])
         answer = np.linalg.lstsq(both, poses, rcond=None)[0]
-        gains = 1.0 - np.sum((poses - both @ answer) ** 2, axis=0) / scale
-        best = float(gains.max())
-        if found is None or best > found[0]:
-            found = (best, float(times_s[start]), answer[-1])
-    if found is None or found[0] < STEP_SHARE:
+        left = np.sum((poses - both @ answer) ** 2, axis=0)
+        gains = np.where(still, 0.0, 1.0 - left / np.where(still, 1.0, costs))
+        if found is None or gains.max() > found[0].max():
+            found = (gains, float(times_s[start]), answer[-1])
+    if found is None:
         return None
-    gain, time_s, step = found
-    rest = np.sqrt((1.0 - gain) * costs / len(times_s))
-    spread = poses.std(axis=0)
-    big = (np.abs(step) > STEP_STDS * rest) & (np.abs(step) > LEAST_STEP * spread)
+    gains, time_s, step = found
+    rest = np.sqrt((1.0 - gains) * costs / len(times_s))
+    big = (gains > STEP_SHARE) & (np.abs(step) > STEP_STDS * rest)
+    big &= np.abs(step) > LEAST_STEP * poses.std(axis=0)
     if not big.any():
         return None
     return (
