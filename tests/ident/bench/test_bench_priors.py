@@ -42,7 +42,7 @@ def blocks() -> Unknowns:
     parameter = SimpleNamespace(prior_std=1.0, scale=1.0, amplitude=True)
     model = SimpleNamespace(robot=robot(), start_values=np.zeros(1), parameters=[parameter])
     chart = SimpleNamespace(numbers=lambda zeta, rates: np.zeros(6))
-    swing = SimpleNamespace(wires="wires.1", chart=chart)
+    swing = SimpleNamespace(wires="wires.1", chart=chart, columns=())
     first = SimpleNamespace(zeta=None, rates=None)
     one = run()
     return assemble._unknowns(model, Bench((one,)), [one], [swing], [first], Guess(BODY, {}), {})
