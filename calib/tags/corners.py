@@ -30,7 +30,6 @@ Array = NDArray[np.float64]
 Image = NDArray[np.uint8]
 
 FIRST_BLURS_PX = (2.0, 1.2, 0.8)
-NEAR_BLURS_PX = (0.8,)
 ALL_PIXELS = 10_000_000
 _NO_GUESS = np.zeros(3)
 
@@ -116,8 +115,8 @@ def fit_tag(
         corner_rays: first guess in the coordinates of `rays`, TL TR BR BL, (4, 2).
         corners_px: the same guess in pixels, (4, 2).
         cells: `rimmed_cells` of the tag.
-        blurs_px: blur widths from coarse to fine (`FIRST_BLURS_PX` catches a guess 2 px off,
-            `NEAR_BLURS_PX` is for a good prediction); the last also starts the free blur.
+        blurs_px: blur widths from coarse to fine (`FIRST_BLURS_PX` catches a guess 2 px off);
+            the last also starts the free blur.
         noise: least standard deviation of a pixel; the fit's own residual counts when larger.
         most_pixels: of the tag's box that take part, spread evenly; fewer are faster.
         before: black, contrast, blur in px and noise of the same tag in the frame before, for a

@@ -12,7 +12,7 @@ from freeswing.session.session_file import ROLES, TRAJECTORY_SUFFIXES, Session
 Mark = dict[str, tuple[int, int]]
 
 VIDEO_SUFFIXES = (".mkv", ".mp4", ".mov", ".avi")
-EVERY_THIRD = 3  # a third of the runs is kept apart, as `freeswing new` does
+VALIDATE_EVERY = 3  # every third recording is kept apart: a check on two runs at six recordings
 
 
 def mark(session: Session) -> Mark:
@@ -70,7 +70,7 @@ def take_in(session: Session, new: Iterable[Path]) -> list[str]:
 def next_role(roles: list[str]) -> str:
     """`validate` where fewer than a third of the runs would be, else `identify`."""
     identify, validate = ROLES
-    return validate if EVERY_THIRD * (roles.count(validate) + 1) <= len(roles) + 1 else identify
+    return validate if VALIDATE_EVERY * (roles.count(validate) + 1) <= len(roles) + 1 else identify
 
 
 def _table(session: Session, path: Path, role: str) -> str:

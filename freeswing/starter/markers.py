@@ -20,9 +20,9 @@ from freeswing.cdpr.measured.trajectory import Trajectory
 from freeswing.cdpr.robot import Array
 from freeswing.cdpr.rotation import nearest_rotation
 from freeswing.ident.signals.free_motions import free_motions
+from freeswing.session.new_recordings import VALIDATE_EVERY
 
 FEWEST = 3
-VALIDATE_EVERY = 3  # every third recording is kept apart: a check on two runs at six recordings
 _ROUNDS = 5
 
 

@@ -116,11 +116,6 @@ class BenchRun:
         mine = {signal.column for signal in self.signals if signal.is_coordinate}
         return tuple(name for name in POSE_COORDINATES if name in mine)
 
-    @property
-    def is_tare(self) -> bool:
-        """Whether nothing is on the platform."""
-        return not self.payloads and not self.loads
-
 
 @dataclass(frozen=True, slots=True)
 class Bench:

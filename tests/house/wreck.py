@@ -114,8 +114,7 @@ HELD = (
     Held("freeswing/session/drive_session.py", ("LARGEST_LATENCY_S", "SHORTEST_RUN"), SESSION),
     Held("freeswing/session/exchanged_lengths.py", ("NEXT_BEST",), SESSION),
     Held("freeswing/session/load_bench.py", ("PARALLEL_RAD", "STRAIGHT_RAD"), SESSION),
-    Held("freeswing/session/new_recordings.py", ("EVERY_THIRD",), SESSION),
-    Held("freeswing/starter/markers.py", ("VALIDATE_EVERY",), SESSION),
+    Held("freeswing/session/new_recordings.py", ("VALIDATE_EVERY",), SESSION),
     Held("freeswing/session/repeated_runs.py", ("STRETCH", "SHARED"), MARKERS),
     Held("freeswing/results/comparison.py", ("NOTABLE_Z",), MARKERS),
     Held(

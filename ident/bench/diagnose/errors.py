@@ -29,14 +29,12 @@ class Errors:
         metres: rms of each over its positions; NaN: it measures none, or cannot be followed.
         radians: over its angles.
         floor_m: what neighbouring samples differ by at random, all runs together.
-        floor_rad: likewise.
     """
 
     runs: tuple[str, ...]
     metres: Array
     radians: Array
     floor_m: float
-    floor_rad: float
 
     def document(self) -> dict[str, Any]:
         """An entry of `ladder`."""
@@ -62,13 +60,13 @@ class Errors:
 
 def errors_of(bench: Bench, ground: Ground, one: Fit) -> Errors:
     """Of held-out runs over their second halves; without any, of each run left out in turn."""
-    floors = _floors(one)
+    floor = _floor(one)
     checked = [run for run in bench.runs if run.role == "validate"]
     if not checked:
         metres, radians = one.left_out()
-        return Errors(tuple(swing.name for swing in one.swings), metres, radians, *floors)
+        return Errors(tuple(swing.name for swing in one.swings), metres, radians, floor)
     seen = np.array([_predicted(bench, ground, one, run) for run in checked])
-    return Errors(tuple(run.name for run in checked), seen[:, 0], seen[:, 1], *floors)
+    return Errors(tuple(run.name for run in checked), seen[:, 0], seen[:, 1], floor)
 
 
 def _predicted(bench: Bench, ground: Ground, one: Fit, run: BenchRun) -> tuple[float, float]:
@@ -99,17 +97,16 @@ def _bodies(one: Fit) -> dict[str, Array]:
     }
 
 
-def _floors(one: Fit) -> tuple[float, float]:
-    """White noise of positions and of angles, by how neighbouring residuals differ."""
-    found: tuple[list[float], list[float]] = ([], [])
+def _floor(one: Fit) -> float:
+    """White noise of positions in metres, by how neighbouring residuals differ."""
+    found: list[float] = []
     for swing, white in zip(one.swings, one.solution.residuals, strict=True):
         for column, part in zip(swing.columns, column_residuals(swing, white), strict=False):
-            if column.coordinate is not None:
+            if column.coordinate is not None and column.coordinate < 3:
                 off = part * (column.factor * column.std)[column.known]
                 noise = np.std(np.diff(off, 2)) / SECOND_DIFFERENCES
-                found[column.coordinate // 3].append(float(noise) ** 2)
-    metres, radians = (float(np.sqrt(np.mean(one))) if one else np.nan for one in found)
-    return metres, radians
+                found.append(float(noise) ** 2)
+    return float(np.sqrt(np.mean(found))) if found else np.nan
 
 
 def _rms(values: Array) -> float | None:
