@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from freeswing.cdpr.markers.jumps import JUMP_DEVIATIONS, Jump
 from freeswing.cdpr.markers.rigidity import Rigidity
-from freeswing.cdpr.markers.spacing import JUMP_DEVIATIONS, Jump
 
 # Below this it is the common drift of half-hidden markers, which the covariances hold.
 STANDS_OUT_M = 5e-4

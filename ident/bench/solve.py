@@ -1,4 +1,4 @@
-"""The rounds of a bench fit: rough, noise, colour, scatter, and whether the mass is believed."""
+"""The rounds of a bench fit: rough, noise, colour, scatter, then the wires and the mass."""
 
 from __future__ import annotations
 
@@ -11,35 +11,17 @@ from freeswing.cdpr.model.statics import Equilibrium, modes
 from freeswing.cdpr.robot import Array
 from freeswing.ident.bench.assemble import UNSTATED_LENGTH_STD_M, Assembled
 from freeswing.ident.bench.considered import Held, considered, gauge, holding, sees_sway, unseen
+from freeswing.ident.bench.mass_verdict import CONTRADICTED, MassVerdict, doubt, weighed_mass
 from freeswing.ident.bench.noise import WIDE_SCATTER, rescaled, scatter_block, scatter_std
 from freeswing.ident.bench.objects import moments, specific
 from freeswing.ident.bench.runs import Bench
 from freeswing.ident.bench.swing import COMMON, IZZ, BenchSwing
 from freeswing.ident.likelihood.fit_blocks import How, Solution, fit
-from freeswing.ident.likelihood.unknowns import Gaussian, Unknowns
+from freeswing.ident.likelihood.unknowns import Unknowns
 
 ROUGH = How(steps=30, tolerance=3.0)
 FINE = How(steps=30, tolerance=0.1)
 LEAST_FOR_SCATTER = 5  # runs: fewer cannot tell scatter from what is looked for
-CONTRADICTED = 3.0  # standard deviations between payload runs and the declared mass
-CHECKING = 0.05  # of the mass: payload runs that tell it as well check it, and what they say counts
-
-
-@dataclass(frozen=True, slots=True)
-class MassVerdict:
-    """The platform's mass by payload runs beside the declared one.
-
-    Attributes:
-        declared_kg: of the robot file.
-        fitted_kg: by the runs alone.
-        fitted_std_kg: its deviation.
-        contradicted: whether they exclude each other: the fitted one then serves.
-    """
-
-    declared_kg: float
-    fitted_kg: float
-    fitted_std_kg: float
-    contradicted: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,9 +100,8 @@ def solved(model: Model, bench: Bench, start: Assembled) -> Solved:
     if wires is not None and not wires.contradicted:
         found = fit(swings, _pinned(found.unknowns, COMMON), FINE)
     freed = found
-    found, mass = _mass(bench, model, swings, found, start)
-    doubt = _doubt(freed, mass)
-    right = _who_is_right(found, wires) + doubt
+    found, mass = weighed_mass(bench, model, swings, found, start, FINE)
+    right = _who_is_right(found, wires) + doubt(freed, mass)
     found = considered(swings, found, held)
     found = replace(found, covariance=found.covariance + right)
     return Solved(found, swings, start.unknowns, tau, mass, wires, held, fastest_hz)
@@ -175,69 +156,3 @@ def _fastest(model: Model, found: Solution, swing: BenchSwing) -> float:
         return float(modes(model, rest, inertia).frequencies_hz.max())
     except (ValueError, np.linalg.LinAlgError):
         return 1.0
-
-
-def _mass(
-    bench: Bench,
-    model: Model,
-    swings: tuple[BenchSwing, ...],
-    found: Solution,
-    start: Assembled,
-) -> tuple[Solution, MassVerdict | None]:
-    """The declared mass is taken where payload runs do not contradict it."""
-    declared = model.robot.platform.mass_kg
-    if declared is None or not any(run.payloads for run in start.runs):
-        return found, None
-    block = found.unknowns.block("platform")
-    prior = block.prior
-    if prior is None:
-        return found, None
-    spread = float(found.std("platform")[0])
-    fitted, std = _without_prior(float(block.value[0]), spread, prior, bench.mass_std_kg)
-    off = abs(fitted - declared) / np.hypot(std, bench.mass_std_kg or 0.0)
-    verdict = MassVerdict(declared, fitted, std, bool(off > CONTRADICTED))
-    if verdict.contradicted:
-        loose = np.array(prior.std)
-        loose[0] = max(declared, 10.0 * std)
-        freed = found.unknowns.known("platform", Gaussian(prior.mean, loose, prior.source))
-        return (fit(swings, freed, FINE), verdict) if bench.mass_std_kg else (found, verdict)
-    if bench.mass_std_kg:
-        return found, verdict
-    value: Array = np.array(block.value)
-    value[4:] *= declared / value[0]  # what was seen is inertia over mass: it stays
-    value[0] = declared
-    estimated = np.array(block.mask)
-    estimated[0] = False
-    trusted = replace(block, value=value, estimated=estimated)
-    held = Unknowns(
-        tuple(trusted if one.name == "platform" else one for one in found.unknowns.blocks)
-    )
-    return fit(swings, held, FINE), verdict
-
-
-def _doubt(freed: Solution, mass: MassVerdict | None) -> Array:
-    """What deviations count where a declared mass serves: how far payload runs are from it.
-
-    Args:
-        freed: the fit with the mass free.
-        mass: what was made of it.
-    """
-    nothing = np.zeros_like(freed.covariance)
-    if mass is None or mass.contradicted or mass.fitted_std_kg > CHECKING * mass.declared_kg:
-        return nothing
-    place = int(freed.unknowns.columns("platform")[0])
-    shift = mass.declared_kg - mass.fitted_kg
-    change = freed.covariance[:, place] / freed.covariance[place, place] * shift
-    change[place] = 0.0
-    return np.asarray(np.outer(change, change))
-
-
-def _without_prior(
-    value: float, std: float, prior: Gaussian, stated: float | None
-) -> tuple[float, float]:
-    """Mass and deviation as the runs alone would have them."""
-    own = 1.0 / std**2 - 1.0 / float(prior.std[0]) ** 2
-    if not stated or own <= 0.0:
-        return value, std
-    mean = (value / std**2 - float(prior.mean[0]) / float(prior.std[0]) ** 2) / own
-    return mean, float(np.sqrt(1.0 / own))

@@ -16,9 +16,10 @@ from freeswing.ident.bench.diagnose.removal import Removed, removals
 from freeswing.ident.bench.diagnose.search import Ground, Round, searched
 from freeswing.ident.bench.diagnose.weigh import Fit
 from freeswing.ident.bench.identify_bench import BenchResult, identify_bench
+from freeswing.ident.bench.mass_verdict import CONTRADICTED, MassVerdict
 from freeswing.ident.bench.modal import ModalSwing
 from freeswing.ident.bench.runs import Bench
-from freeswing.ident.bench.solve import CONTRADICTED, FINE, MassVerdict, Solved
+from freeswing.ident.bench.solve import FINE, Solved
 from freeswing.ident.bench.swing import COMMON
 from freeswing.ident.likelihood.fit_blocks import fit
 

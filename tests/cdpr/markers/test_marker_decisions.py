@@ -9,8 +9,11 @@ import numpy as np
 import pytest
 
 from freeswing.cdpr.files.problems import DataError
-from freeswing.cdpr.markers import layout, rigidity, session_markers, spacing
+from freeswing.cdpr.markers import exchanged_labels, layout, rigidity, session_markers
+from freeswing.cdpr.markers.distances import distances, pairs_of
+from freeswing.cdpr.markers.jumps import mended
 from freeswing.cdpr.markers.slow_residuals import slow_share
+from freeswing.cdpr.markers.units import unit_between
 from freeswing.cdpr.measured.marker_recording import MarkerRecording
 from freeswing.cdpr.measured.target import Marker, Target
 
@@ -21,7 +24,7 @@ SQUARE = np.array([[0.1, 0.0, 0.0], [-0.1, 0.0, 0.0], [0.0, 0.2, 0.0], [0.0, -0.
 def test_a_marker_jumps_by_a_millimetre(off_m, jumps):
     points = np.tile(SQUARE, (50, 1, 1))
     points[20, 0, 0] += off_m  # straight away from the second marker
-    assert len(spacing.mended(points).jumps) == jumps
+    assert len(mended(points).jumps) == jumps
 
 
 @pytest.mark.parametrize(("deviations", "jumps"), [(7.8, 0), (8.2, 1)])
@@ -30,13 +33,13 @@ def test_or_by_eight_deviations_of_its_distances(deviations, jumps):
     points = np.tile(np.array([[0.1, 0, 0], [-0.1, 0, 0], [0.5, 0, 0]]), (101, 1, 1))
     points[:, 0, 0] += 1e-3 / 1.4826 * np.resize([1.0, -1.0, 1.5, -1.5, 0.0], 101)
     points[40, 0, 0] = 0.1 + deviations * 1e-3
-    assert len(spacing.mended(points).jumps) == jumps
+    assert len(mended(points).jumps) == jumps
 
 
 @pytest.mark.parametrize(("factor", "found"), [(1029.0, True), (1031.0, False), (969.0, False)])
 def test_a_unit_is_another_within_three_per_cent(factor, found):
-    apart = factor * spacing.distances(SQUARE, spacing.pairs_of(4))
-    assert (spacing.unit_between(SQUARE, apart) is not None) == found
+    apart = factor * distances(SQUARE, pairs_of(4))
+    assert (unit_between(SQUARE, apart) is not None) == found
 
 
 @pytest.mark.parametrize(
@@ -44,18 +47,20 @@ def test_a_unit_is_another_within_three_per_cent(factor, found):
 )
 def test_a_platform_measures_two_centimetres_to_ten_metres(size_m, wrong):
     """Of sizes a thousand times apart, the layout's is wrong where no platform has it."""
-    places = SQUARE * size_m / spacing.distances(SQUARE, spacing.pairs_of(4)).max()
-    apart = 1000.0 * spacing.distances(places, spacing.pairs_of(4))
-    assert spacing.unit_between(places, apart)[1] == wrong
+    places = SQUARE * size_m / distances(SQUARE, pairs_of(4)).max()
+    apart = 1000.0 * distances(places, pairs_of(4))
+    assert unit_between(places, apart)[1] == wrong
 
 
 @pytest.mark.parametrize(("off_m", "looked"), [(4.9e-3, False), (5.1e-3, True)])
 def test_labels_that_fit_to_five_millimetres_are_right(monkeypatch, off_m, looked):
     calls = []
-    monkeypatch.setattr(spacing, "_orders", lambda n: calls.append(n) or [tuple(range(n))] * 2)
+    monkeypatch.setattr(
+        exchanged_labels, "_orders", lambda n: calls.append(n) or [tuple(range(n))] * 2
+    )
     points = np.tile(SQUARE, (5, 1, 1))
     points[:, 0, 0] += off_m
-    assert spacing.renamed(SQUARE, points) is None
+    assert exchanged_labels.renamed(SQUARE, points) is None
     assert bool(calls) == looked
 
 
@@ -64,9 +69,9 @@ def test_another_order_fits_ten_times_better(monkeypatch, times, renamed):
     orders = [(0, 1, 2, 3), (1, 0, 2, 3), (2, 1, 0, 3)]
     points = np.tile(SQUARE[[1, 0, 2, 3]] * [2.0, 1.0, 1.0], (5, 1, 1))
     fits = iter([1.0, 1.0 / times, 1.0, 1.0])
-    monkeypatch.setattr(spacing, "_orders", lambda _: orders)
-    monkeypatch.setattr(spacing, "_rigid_error", lambda *_: next(fits))
-    assert (spacing.renamed(SQUARE, points) is not None) == renamed
+    monkeypatch.setattr(exchanged_labels, "_orders", lambda _: orders)
+    monkeypatch.setattr(exchanged_labels, "_rigid_error", lambda *_: next(fits))
+    assert (exchanged_labels.renamed(SQUARE, points) is not None) == renamed
 
 
 @pytest.mark.parametrize(
@@ -205,4 +210,4 @@ def test_labels_of_four_markers_show_an_exchange(n, found):
     """Three alike in two distances may as well be another platform."""
     places = np.array([[0.0, 0.0, 0.0], [0.3, 0.0, 0.0], [0.0, 0.5, 0.0], [0.2, 0.1, 0.4]])[:n]
     points = np.tile(places[[1, 0, *range(2, n)]], (20, 1, 1))
-    assert spacing.renamed(places, points) == found
+    assert exchanged_labels.renamed(places, points) == found

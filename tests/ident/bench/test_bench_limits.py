@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from freeswing.cdpr.files.documents import DataError
-from freeswing.ident.bench import noise, solve
+from freeswing.ident.bench import mass_verdict, noise, solve
 from freeswing.ident.bench.channels import Channel
 from freeswing.ident.bench.identify_bench import _check_moves
 from freeswing.ident.bench.modal import SQUARE
@@ -35,11 +35,11 @@ def body(mass_std: float, prior_std: float = 0.1) -> SimpleNamespace:
 @pytest.mark.parametrize(("declared_kg", "contradicted"), [(5.28, False), (5.32, True)])
 def test_a_declared_mass_that_payload_runs_exclude(monkeypatch, declared_kg, contradicted):
     """Runs that know the mass to 0.1 kg."""
-    monkeypatch.setattr(solve, "fit", lambda swings, unknowns, how: body(0.1))
+    monkeypatch.setattr(mass_verdict, "fit", lambda swings, unknowns, how: body(0.1))
     model = SimpleNamespace(robot=SimpleNamespace(platform=SimpleNamespace(mass_kg=declared_kg)))
     start = SimpleNamespace(runs=[SimpleNamespace(payloads=("one",))])
     bench = SimpleNamespace(mass_std_kg=None)
-    _, verdict = solve._mass(bench, model, (), body(0.1), start)
+    _, verdict = mass_verdict.weighed_mass(bench, model, (), body(0.1), start, solve.FINE)
     assert verdict is not None
     assert verdict.contradicted == contradicted, verdict
 
@@ -56,7 +56,9 @@ def test_scatter_is_looked_for_between_enough_runs(monkeypatch, runs, looked) ->
     monkeypatch.setattr(solve, "_rough", lambda swings, unknowns: unknowns)
     monkeypatch.setattr(solve, "_fastest", lambda *_: 1.0)
     monkeypatch.setattr(solve, "rescaled", lambda swings, *_, **__: swings)
-    monkeypatch.setattr(solve, "_mass", lambda bench, model, swings, found, *_: (found, None))
+    monkeypatch.setattr(
+        solve, "weighed_mass", lambda bench, model, swings, found, *_: (found, None)
+    )
     monkeypatch.setattr(solve, "considered", lambda swings, found, held: found)
     monkeypatch.setattr(solve, "replace", lambda found, **_: found)
     monkeypatch.setattr(solve, "scatter_std", lambda found: asked.append(1) or 0.0)
@@ -72,8 +74,8 @@ def test_payload_runs_that_check_a_declared_mass(share, counts) -> None:
     covariance = 1e-4 * np.eye(10)
     covariance[6, 0] = covariance[0, 6] = 2e-4
     freed = SimpleNamespace(covariance=covariance, unknowns=free.unknowns)
-    verdict = solve.MassVerdict(5.0, 4.9, 5.0 * share, contradicted=False)
-    counted = solve._doubt(freed, verdict)
+    verdict = mass_verdict.MassVerdict(5.0, 4.9, 5.0 * share, contradicted=False)
+    counted = mass_verdict.doubt(freed, verdict)
     assert counted[6, 6] == pytest.approx(0.04 if counts else 0.0)
     assert counted[0, 0] == 0.0
 

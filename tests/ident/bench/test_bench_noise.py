@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from freeswing.ident.bench.averaged import averaged
+from freeswing.ident.bench.mass_verdict import without_prior
 from freeswing.ident.bench.noise import scatter_std
 from freeswing.ident.bench.runs import BenchRun, Signal
-from freeswing.ident.bench.solve import _without_prior
 from freeswing.ident.bench.told.classic import BESIDE, ClassicRun, leaning_sentence
 from freeswing.ident.likelihood.unknowns import Gaussian, Unknown, Unknowns
 
@@ -55,7 +55,7 @@ def test_a_mass_prior_is_taken_out_again() -> None:
     alone, alone_std = 1.1, 0.01
     std = (1.0 / 0.01**2 + 1.0 / 0.02**2) ** -0.5
     value = std**2 * (alone / 0.01**2 + 1.0 / 0.02**2)
-    mean, spread = _without_prior(value, std, prior, 0.02)
+    mean, spread = without_prior(value, std, prior, 0.02)
     assert mean == pytest.approx(alone)
     assert spread == pytest.approx(alone_std)
 

@@ -1,0 +1,102 @@
+"""The platform's mass as payload runs have it beside the declared one, and which of them serves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from freeswing.cdpr.model.equations import Model
+from freeswing.cdpr.robot import Array
+from freeswing.ident.bench.assemble import Assembled
+from freeswing.ident.bench.runs import Bench
+from freeswing.ident.bench.swing import BenchSwing
+from freeswing.ident.likelihood.fit_blocks import How, Solution, fit
+from freeswing.ident.likelihood.unknowns import Gaussian, Unknowns
+
+CONTRADICTED = 3.0  # standard deviations between what runs say and what is stated
+CHECKING = 0.05  # of the mass: payload runs that tell it as well check it, and what they say counts
+
+
+@dataclass(frozen=True, slots=True)
+class MassVerdict:
+    """The platform's mass by payload runs beside the declared one.
+
+    Attributes:
+        declared_kg: of the robot file.
+        fitted_kg: by the runs alone.
+        fitted_std_kg: its deviation.
+        contradicted: whether they exclude each other: the fitted one then serves.
+    """
+
+    declared_kg: float
+    fitted_kg: float
+    fitted_std_kg: float
+    contradicted: bool
+
+
+def weighed_mass(
+    bench: Bench,
+    model: Model,
+    swings: tuple[BenchSwing, ...],
+    found: Solution,
+    start: Assembled,
+    how: How,
+) -> tuple[Solution, MassVerdict | None]:
+    """The declared mass is taken where payload runs do not contradict it."""
+    declared = model.robot.platform.mass_kg
+    if declared is None or not any(run.payloads for run in start.runs):
+        return found, None
+    block = found.unknowns.block("platform")
+    prior = block.prior
+    if prior is None:
+        return found, None
+    spread = float(found.std("platform")[0])
+    fitted, std = without_prior(float(block.value[0]), spread, prior, bench.mass_std_kg)
+    off = abs(fitted - declared) / np.hypot(std, bench.mass_std_kg or 0.0)
+    verdict = MassVerdict(declared, fitted, std, bool(off > CONTRADICTED))
+    if verdict.contradicted:
+        loose = np.array(prior.std)
+        loose[0] = max(declared, 10.0 * std)
+        freed = found.unknowns.known("platform", Gaussian(prior.mean, loose, prior.source))
+        return (fit(swings, freed, how), verdict) if bench.mass_std_kg else (found, verdict)
+    if bench.mass_std_kg:
+        return found, verdict
+    value: Array = np.array(block.value)
+    value[4:] *= declared / value[0]  # what was seen is inertia over mass: it stays
+    value[0] = declared
+    estimated = np.array(block.mask)
+    estimated[0] = False
+    trusted = replace(block, value=value, estimated=estimated)
+    held = Unknowns(
+        tuple(trusted if one.name == "platform" else one for one in found.unknowns.blocks)
+    )
+    return fit(swings, held, how), verdict
+
+
+def doubt(freed: Solution, mass: MassVerdict | None) -> Array:
+    """What deviations count where a declared mass serves: how far payload runs are from it.
+
+    Args:
+        freed: the fit with the mass free.
+        mass: what was made of it.
+    """
+    nothing = np.zeros_like(freed.covariance)
+    if mass is None or mass.contradicted or mass.fitted_std_kg > CHECKING * mass.declared_kg:
+        return nothing
+    place = int(freed.unknowns.columns("platform")[0])
+    shift = mass.declared_kg - mass.fitted_kg
+    change = freed.covariance[:, place] / freed.covariance[place, place] * shift
+    change[place] = 0.0
+    return np.asarray(np.outer(change, change))
+
+
+def without_prior(
+    value: float, std: float, prior: Gaussian, stated: float | None
+) -> tuple[float, float]:
+    """Mass and deviation as the runs alone would have them."""
+    own = 1.0 / std**2 - 1.0 / float(prior.std[0]) ** 2
+    if not stated or own <= 0.0:
+        return value, std
+    mean = (value / std**2 - float(prior.mean[0]) / float(prior.std[0]) ** 2) / own
+    return mean, float(np.sqrt(1.0 / own))
