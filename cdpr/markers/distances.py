@@ -31,7 +31,11 @@ def typical_distances(points: Array, pairs: Pairs) -> Array:
 
 
 def medians(values: Array) -> Array:
-    """Medians over time of columns that may hold NaN, NaN where a column holds nothing."""
+    """Medians over time of columns that may hold NaN, NaN where a column holds nothing.
+
+    Source:
+        Huber, Ronchetti 2009, Robust Statistics, sec. 1.4: the median, which few cannot move.
+    """
     seen = np.isfinite(values)
     result = np.full(values.shape[1], np.nan)
     for k in np.flatnonzero(seen.any(axis=0)):

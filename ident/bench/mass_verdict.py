@@ -80,6 +80,10 @@ def doubt(freed: Solution, mass: MassVerdict | None) -> Array:
     Args:
         freed: the fit with the mass free.
         mass: what was made of it.
+
+    Source:
+        JCGM 100:2008, Guide to the Expression of Uncertainty in Measurement, sec. F.2.4.5: a
+        correction that is not applied counts in full.
     """
     nothing = np.zeros_like(freed.covariance)
     if mass is None or mass.contradicted or mass.fitted_std_kg > CHECKING * mass.declared_kg:
@@ -94,7 +98,7 @@ def doubt(freed: Solution, mass: MassVerdict | None) -> Array:
 def without_prior(
     value: float, std: float, prior: Gaussian, stated: float | None
 ) -> tuple[float, float]:
-    """Mass and deviation as the runs alone would have them."""
+    """Mass and deviation as the runs alone would have them: normal densities divide."""
     own = 1.0 / std**2 - 1.0 / float(prior.std[0]) ** 2
     if not stated or own <= 0.0:
         return value, std

@@ -1,4 +1,6 @@
 """When a bench says a number, doubts it or refuses a column: both sides of each limit."""
+# Stubs stand for what is not looked at.
+# pyright: reportArgumentType=false
 
 from __future__ import annotations
 
