@@ -204,6 +204,37 @@ class Budget(Entry):
 
 
 @entry
+class YawAmplitudes(Entry):
+    """Amplitude of yaw in parts of a run of a bench, rad: measured, and by each law of loss.
+
+    Attributes:
+        run: its name.
+        times_s: middles of the parts, from the first sample.
+        measured_rad: as measured.
+        std_rad: their deviations.
+        linear_rad: a share of what is there is lost.
+        quadratic_rad: a share that grows with what is there.
+        dry_rad: the same from every period.
+    """
+
+    run: str
+    times_s: Numbers = ()
+    measured_rad: Numbers = ()
+    std_rad: Numbers = ()
+    linear_rad: Numbers = ()
+    quadratic_rad: Numbers = ()
+    dry_rad: Numbers = ()
+
+
+@entry
+class YawDecay(Entry):
+    """How yaw dies away on a bench: probability of each law, and every run."""
+
+    laws: Mapping[str, float] = empty(default_factory=dict)
+    runs: tuple[YawAmplitudes, ...] = ()
+
+
+@entry
 class MarkerRun(Entry):
     """How rigid the markers were in one run: standard deviations about a rigid body.
 
@@ -255,6 +286,7 @@ class Identification(Document):
         budgets: of a bench, where each body's deviation of Izz comes from.
         classic: the classic formula of benches, by run.
         scatter_between_runs_kg_m2: of Izz on a bench beyond noise; 0: none was seen.
+        yaw_decay: amplitude of yaw against time, of a bench.
         swings: where each run took place.
         entries_m: the cables' entry points.
         markers: what the recorded markers were worth.
@@ -274,6 +306,7 @@ class Identification(Document):
     budgets: tuple[Budget, ...] | None = absent(default=None)
     classic: tuple[ClassicRow, ...] | None = absent(default=None)
     scatter_between_runs_kg_m2: float | None = absent(default=None)
+    yaw_decay: YawDecay | None = absent(default=None)
     swings: tuple[SwingPlace, ...] = ()
     entries_m: tuple[Numbers, ...] = ()
     markers: Markers | None = None

@@ -23,6 +23,7 @@ from freeswing.ident.bench.told.classic import (
     leaning_sentence,
     wires_sentence,
 )
+from freeswing.ident.bench.told.envelope import Envelope, envelopes, law_chances
 from freeswing.ident.bench.told.held_out import HeldOut, held_out
 from freeswing.ident.bench.told.report_objects import (
     channels_document,
@@ -44,6 +45,7 @@ class BenchResult:
         classic: the classic formula beside it, by run.
         validation: held-out runs.
         notes: what a reader must know.
+        decay: amplitude of yaw against time, by run.
     """
 
     solved: Solved
@@ -51,6 +53,7 @@ class BenchResult:
     classic: tuple[ClassicRun, ...]
     validation: tuple[HeldOut, ...]
     notes: tuple[str, ...]
+    decay: tuple[Envelope, ...] = ()
 
     def document(self) -> dict[str, Any]:
         """results/identification.json."""
@@ -71,6 +74,10 @@ class BenchResult:
             "budgets": self._budgets(),
             "classic": [one.document() for one in self.classic],
             "scatter_between_runs_kg_m2": self.solved.scatter_std,
+            "yaw_decay": {
+                "laws": law_chances(self.decay),
+                "runs": [one.document() for one in self.decay],
+            },
         }
 
     def _budgets(self) -> list[dict[str, Any]]:
@@ -117,7 +124,7 @@ def identify_bench(bench: Bench, robot: Robot) -> BenchResult:
     sway = any({"x", "y"} & set(run.coordinates) for run in fitted)
     leaning = leaning_sentence(classic, sway)
     notes = [*([leaning] if leaning else []), *_notes(found, bench, robot)]
-    return BenchResult(found, bench, classic, validation, tuple(notes))
+    return BenchResult(found, bench, classic, validation, tuple(notes), envelopes(found))
 
 
 def _check(bench: Bench, robot: Robot) -> None:

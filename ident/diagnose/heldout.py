@@ -15,6 +15,7 @@ from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.model.free_motion import free_basis
 from freeswing.cdpr.model.regressor import SwingMotion
 from freeswing.cdpr.robot import POSE_COORDINATES, Array
+from freeswing.ident.diagnose.answer.averages import median, rms
 from freeswing.ident.judge.prediction import Prediction, Stage, predict_in_turn
 from freeswing.ident.signals.prepare import PreparedRun
 
@@ -57,14 +58,14 @@ class HeldOut:
             for run in self.runs
             if run.prediction is not None and run.prediction.rmse_rad is not None
         ]
-        sigmas = [run.sigma_perp for run in self.runs if np.isfinite(run.sigma_perp)]
+        sigmas = [run.sigma_perp for run in self.runs]
         return {
-            "sigma_perp": _rms(sigmas),
-            "prediction_rmse_m": _rms(errors),
-            "noise_floor_m": _rms([run.noise_floor_m for run in self.runs]),
-            "prediction_rmse_rad": _rms(turns),
-            "sigma_perp_median": _median(sigmas),
-            "prediction_median_m": _median(errors),
+            "sigma_perp": rms(sigmas),
+            "prediction_rmse_m": rms(errors),
+            "noise_floor_m": rms([run.noise_floor_m for run in self.runs]),
+            "prediction_rmse_rad": rms(turns),
+            "sigma_perp_median": median(sigmas),
+            "prediction_median_m": median(errors),
             **self._offsets(),
             "runs": [
                 {
@@ -86,15 +87,7 @@ class HeldOut:
         if not known:
             return {}
         shifts, turns = zip(*known, strict=True)
-        return {"frame_shift_m": _rms(list(shifts)), "frame_turn_rad": _rms(list(turns))}
-
-
-def _rms(numbers: list[float]) -> float | None:
-    return float(np.sqrt(np.mean(np.square(numbers)))) if numbers else None
-
-
-def _median(numbers: list[float]) -> float | None:
-    return float(np.median(numbers)) if numbers else None
+        return {"frame_shift_m": rms(list(shifts)), "frame_turn_rad": rms(list(turns))}
 
 
 def held_out(
@@ -158,7 +151,7 @@ def _offset(model: Model, prediction: Prediction | None) -> tuple[float, float] 
         unit: [prediction.values[k] for k in places if model.names[k].endswith(unit)]
         for unit in ("_m", "_rad")
     }
-    return _rms(by_unit["_m"]) or 0.0, _rms(by_unit["_rad"]) or 0.0
+    return rms(by_unit["_m"]) or 0.0, rms(by_unit["_rad"]) or 0.0
 
 
 def internal_error(model: Model, motion: SwingMotion, inertia: Array, values: Array) -> float:

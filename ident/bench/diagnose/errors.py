@@ -16,6 +16,7 @@ from freeswing.ident.bench.diagnose.weigh import Fit
 from freeswing.ident.bench.noise import column_residuals
 from freeswing.ident.bench.runs import Bench, BenchRun
 from freeswing.ident.bench.told.held_out import confronted
+from freeswing.ident.diagnose.answer.averages import known_number, median, rms
 
 SECOND_DIFFERENCES = np.sqrt(6.0)  # times white noise
 
@@ -40,18 +41,18 @@ class Errors:
         """An entry of `ladder`."""
         return {
             "sigma_perp": None,
-            "prediction_rmse_m": _rms(self.metres),
-            "prediction_rmse_rad": _rms(self.radians),
-            "noise_floor_m": _number(self.floor_m),
+            "prediction_rmse_m": rms(self.metres),
+            "prediction_rmse_rad": rms(self.radians),
+            "noise_floor_m": known_number(self.floor_m),
             "sigma_perp_median": None,
-            "prediction_median_m": _median(self.metres),
+            "prediction_median_m": median(self.metres),
             "runs": [
                 {
                     "run": name,
                     "sigma_perp": None,
-                    "prediction_rmse_m": _number(metres),
-                    "prediction_rmse_rad": _number(radians),
-                    "noise_floor_m": _number(self.floor_m),
+                    "prediction_rmse_m": known_number(metres),
+                    "prediction_rmse_rad": known_number(radians),
+                    "noise_floor_m": known_number(self.floor_m),
                 }
                 for name, metres, radians in zip(self.runs, self.metres, self.radians, strict=True)
             ],
@@ -107,17 +108,3 @@ def _floor(one: Fit) -> float:
                 noise = np.std(np.diff(off, 2)) / SECOND_DIFFERENCES
                 found.append(float(noise) ** 2)
     return float(np.sqrt(np.mean(found))) if found else np.nan
-
-
-def _rms(values: Array) -> float | None:
-    known = values[np.isfinite(values)]
-    return float(np.sqrt(np.mean(known**2))) if len(known) else None
-
-
-def _median(values: Array) -> float | None:
-    known = values[np.isfinite(values)]
-    return float(np.median(known)) if len(known) else None
-
-
-def _number(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None

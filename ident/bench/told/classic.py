@@ -17,7 +17,7 @@ from freeswing.cdpr.simulation.parallel_wires import bending
 from freeswing.ident.bench.modal import SQUARE
 from freeswing.ident.bench.objects import moments
 from freeswing.ident.bench.solve import Solved
-from freeswing.ident.bench.swing import COMMON, IZZ, BenchSwing, Column
+from freeswing.ident.bench.swing import COMMON, IZZ, BenchSwing
 
 LEAST_PERIODS = 2.0  # in a record: a sine and a slow drift look alike on fewer
 BESIDE = "centre of mass beside the middle: yaw moves it along"
@@ -95,11 +95,11 @@ def period_of(swing: BenchSwing) -> float | None:
         column = next((one for one in swing.columns if one.channel is not None), None)
     if column is None:
         return None
-    return _period(swing.times_s, column)
+    return sine_period(swing.times_s[column.known], column.values[column.known])
 
 
-def _period(times_s: Array, column: Column) -> float | None:
-    times, values = times_s[column.known], column.values[column.known]
+def sine_period(times: Array, values: Array) -> float | None:
+    """Period of the sine that leaves least of some samples, (n,) each, s; None: too short."""
     span = times[-1] - times[0]
     rates = np.arange(LEAST_PERIODS / span, min(5.0, 0.25 / np.median(np.diff(times))), 0.1 / span)
     if not len(rates):

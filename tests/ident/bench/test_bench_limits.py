@@ -18,7 +18,7 @@ from freeswing.ident.bench.modal import SQUARE
 from freeswing.ident.bench.noise import _colours, rescaled, scatter_std
 from freeswing.ident.bench.runs import Bench, BenchRun, Signal
 from freeswing.ident.bench.swing import COMMON, Column
-from freeswing.ident.bench.told.classic import BESIDE, ClassicRun, _period, leaning_sentence
+from freeswing.ident.bench.told.classic import BESIDE, ClassicRun, leaning_sentence, sine_period
 from freeswing.ident.bench.told.report_objects import _in_true_scale, told_object
 from freeswing.ident.likelihood.unknowns import Gaussian, Unknown, Unknowns
 
@@ -159,7 +159,7 @@ def test_izz_that_leans_on_an_unseen_centre_of_mass(percent, warned) -> None:
 def test_a_period_needs_two_of_them(periods, found) -> None:
     times = np.arange(501) / 50.0
     values = 0.1 * np.cos(2.0 * np.pi * periods * times / 10.0)
-    period = _period(times, Column("chi", values, np.ones(501), 5))
+    period = sine_period(times, values)
     assert period is not None
     assert (abs(period * periods / 10.0 - 1.0) < 0.02) == found, period
 
