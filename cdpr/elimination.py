@@ -6,15 +6,16 @@ about shapes, and makes what holds it several times as long to compile.
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
+
+from freeswing.cdpr.compiled.kernels import kernel
 
 Array = NDArray[np.float64]
 _Singular = np.linalg.LinAlgError
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def eliminate(matrix: Array, right: Array) -> Array:
     """The solution of matrix (n, n) @ x = right (n, m), in the place of `right`.
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.calib.camera.lens_kernels import lens_point
 from freeswing.calib.rig.reprojection_kernels import turn_and_jacobian
+from freeswing.cdpr.compiled.kernels import kernel
 from freeswing.cdpr.elimination import eliminate
 
 Array = NDArray[np.float64]
@@ -19,7 +19,7 @@ _SMALL_STEP = 1e-9
 _LEAST_GAIN = 1e-10
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def _linearise(
     is_fisheye: bool,
     full: Array,
@@ -63,7 +63,7 @@ def _linearise(
     return squares / max(2 * count, 1) if math.isfinite(squares) else math.inf
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def polish_poses(
     is_fisheye: bool, full: Array, points: Array, pixels: Array, poses: Array, most_steps: int
 ) -> Array:

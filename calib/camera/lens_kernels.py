@@ -9,9 +9,10 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
+
+from freeswing.cdpr.compiled.kernels import kernel
 
 Array = NDArray[np.float64]
 
@@ -23,7 +24,7 @@ SOLVED = 1e-9
 _NEIGHBOUR = 0.01  # step to a neighbouring pixel of any lens here: rays farther apart start anew
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def perspective(
     full: Array, point: Array, slopes: bool, pixel: Array, d_point: Array, d_full: Array
 ) -> None:
@@ -64,7 +65,7 @@ def perspective(
         d_full[1, 9 + k] = -gain * fy * y * power
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def fisheye(
     full: Array, point: Array, slopes: bool, pixel: Array, d_point: Array, d_full: Array
 ) -> None:
@@ -106,7 +107,7 @@ def fisheye(
         d_full[0, column], d_full[1, column] = fx * power * x, fy * power * y
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def lens_point(
     is_fisheye: bool,
     full: Array,
@@ -123,7 +124,7 @@ def lens_point(
         perspective(full, point, slopes, pixel, d_point, d_full)
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def lens_pixels(is_fisheye: bool, full: Array, points: Array) -> Array:
     """Pixels (n, 2) of camera-frame points (n, 3).
 
@@ -138,7 +139,7 @@ def lens_pixels(is_fisheye: bool, full: Array, points: Array) -> Array:
     return pixels
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def lens_jacobians(is_fisheye: bool, full: Array, points: Array) -> tuple[Array, Array, Array]:
     """Pixels (n, 2), and their derivatives by point (n, 2, 3) and full parameters (n, 2, 12)."""
     count = len(points)
@@ -159,7 +160,7 @@ class _Bent(NamedTuple):
     vy: float
 
 
-@numba.njit(cache=True, nogil=True, forceinline=True)
+@kernel(forceinline=True)
 def _bent(full: Array, x: float, y: float) -> _Bent:
     """As `perspective` at depth 1 with its slopes by x and y, focal lengths of one."""
     p1, p2 = full[6], full[7]
@@ -179,7 +180,7 @@ def _bent(full: Array, x: float, y: float) -> _Bent:
     )
 
 
-@numba.njit(cache=True, nogil=True, forceinline=True)
+@kernel(forceinline=True)
 def _step(bent: _Bent, ex: float, ey: float) -> tuple[float, float]:
     """Newton's step of a ray whose image is (ex, ey) away."""
     determinant = bent.ux * bent.vy - bent.uy * bent.uy
@@ -189,7 +190,7 @@ def _step(bent: _Bent, ex: float, ey: float) -> tuple[float, float]:
     return sx / determinant, sy / determinant
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def _unbent(
     full: Array, xd: float, yd: float, x: float, y: float, limit: float
 ) -> tuple[bool, float, float]:
@@ -208,7 +209,7 @@ def _unbent(
     return solved and math.hypot(x, y) < limit, x, y
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def perspective_rays(distorted: Array, full: Array, limit: float) -> Array:
     """Undistorted x/z, y/z (n, 2) of distorted ones (n, 2); NaN where no ray of the lens is.
 

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
+
+from freeswing.cdpr.compiled.kernels import kernel
 
 Image = NDArray[np.uint8]
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def largest_tile_change(before: Image, image: Image, tile: int) -> int:
     """Largest sum over a tile of the absolute change of every second pixel of every second row."""
     across = image.shape[1] // tile
@@ -30,7 +31,7 @@ def largest_tile_change(before: Image, image: Image, tile: int) -> int:
     return largest
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def bends(before: Image, image: Image, moved_grey: int) -> tuple[np.int64, np.int64, np.int64]:
     """Pixels that changed by more than `moved_grey`; their bends to the next row and the second.
 

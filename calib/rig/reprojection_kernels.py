@@ -17,11 +17,11 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
 from freeswing.calib.camera.lens_kernels import lens_point
 from freeswing.calib.rig.kernel_inputs import Array, Estimate, Ints, Shape, ViewArrays
+from freeswing.cdpr.compiled.kernels import kernel
 
 POSE, CLOCK, WARP = 6, 2, 3
 
@@ -75,7 +75,7 @@ class Spare(NamedTuple):
     point: _Point
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def turn_and_jacobian(w: Array, turn: Array, left: Array) -> tuple[Array, Array]:
     """exp(skew(w)) and its left Jacobian, (3, 3) each, in the arrays given.
 
@@ -105,7 +105,7 @@ def turn_and_jacobian(w: Array, turn: Array, left: Array) -> tuple[Array, Array]
     return turn, left
 
 
-@numba.njit(cache=True, nogil=True, forceinline=True)
+@kernel(forceinline=True)
 def view_of(views: ViewArrays, estimate: Estimate, v: int) -> View:
     """View v with its own camera and board."""
     c, piece = views.camera[v], views.piece[v]
@@ -127,7 +127,7 @@ def view_of(views: ViewArrays, estimate: Estimate, v: int) -> View:
     )
 
 
-@numba.njit(cache=True, nogil=True, forceinline=True)
+@kernel(forceinline=True)
 def _carry(view: View, row_px: float, at: _Carried) -> float:
     """Carries the board to the time of an image row; gives that time in its scale."""
     T_board, motion = view.T_board, view.motion
@@ -156,7 +156,7 @@ def _carry(view: View, row_px: float, at: _Carried) -> float:
     return s
 
 
-@numba.njit(cache=True, nogil=True, forceinline=True)
+@kernel(forceinline=True)
 def _see(view: View, at: _Carried, p: int, slopes: bool, seen: _Point) -> None:
     """Corner p of the board as the camera sees it."""
     point, R, t, R_camera = view.shape.points[p], at.R, at.t, view.R_camera
@@ -175,7 +175,7 @@ def _see(view: View, at: _Carried, p: int, slopes: bool, seen: _Point) -> None:
     )
 
 
-@numba.njit(cache=True, nogil=True, forceinline=True)
+@kernel(forceinline=True)
 def _fill_row(
     view: View, at: _Carried, s: float, p: int, seen: _Point, axis: int, row: Array
 ) -> None:
@@ -223,7 +223,7 @@ def _fill_row(
         power *= s
 
 
-@numba.njit(cache=True, nogil=True, forceinline=True)
+@kernel(forceinline=True)
 def view_rows(
     view: View, with_rows: bool, rows: Array, residuals: Array, spare: Spare
 ) -> tuple[Array, Array]:
@@ -257,7 +257,7 @@ def view_rows(
     return rows, residuals
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def new_spare() -> Spare:
     """Scratch for views of boards that all rest or all move; those at rest leave the turn alone."""
     carried = _Carried(
@@ -276,7 +276,7 @@ def new_spare() -> Spare:
     return Spare(carried, point)
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def local_rows(views: ViewArrays, estimate: Estimate, v: int) -> Array:
     """Minus the derivatives of view v by its local unknowns, (2 n_points, n_local).
 
@@ -290,7 +290,7 @@ def local_rows(views: ViewArrays, estimate: Estimate, v: int) -> Array:
     return view_rows(view, True, np.zeros((n, columns)), np.zeros(n), new_spare())[0]
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def all_residuals(views: ViewArrays, estimate: Estimate) -> Array:
     """Residuals of all views in px, NaN where unseen, (n, n_points, 2)."""
     result = np.full(views.pixels.shape, np.nan)

@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
 from freeswing.calib.rig.kernel_inputs import Array, Estimate, Ints, ViewArrays
@@ -20,6 +19,7 @@ from freeswing.calib.rig.reprojection_kernels import (
     view_of,
     view_rows,
 )
+from freeswing.cdpr.compiled.kernels import kernel
 
 
 class Normal(NamedTuple):
@@ -42,7 +42,7 @@ class Normal(NamedTuple):
     cost: float
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def _whiten(factor: Array, block: Array, spare: Array) -> None:
     """Block <- factor @ block, for a lower triangle."""
     size = len(factor)
@@ -57,7 +57,7 @@ def _whiten(factor: Array, block: Array, spare: Array) -> None:
             block[i, c] = spare[c]
 
 
-@numba.njit(cache=True, nogil=True, forceinline=True)
+@kernel(forceinline=True)
 def _weighted(
     views: ViewArrays, v: int, rows: Array, spare: Array, sigma: float, knee: float, cost: float
 ) -> tuple[int, float]:
@@ -98,7 +98,7 @@ def _weighted(
     return used, cost
 
 
-@numba.njit(cache=True, nogil=True, forceinline=True)
+@kernel(forceinline=True)
 def _targets(first: int, own: int, warp_at: int) -> Ints:
     """Where a view's columns before the board's stand among the shared unknowns."""
     target = np.empty(own + WARP, dtype=np.int64)
@@ -109,7 +109,7 @@ def _targets(first: int, own: int, warp_at: int) -> Ints:
     return target
 
 
-@numba.njit(cache=True, nogil=True, forceinline=True)
+@kernel(forceinline=True)
 def _add_gram(gram: Array, target: Ints, piece: int, into: Normal) -> None:
     """Adds one view's rows' products to the blocks they belong to."""
     n_shared, last = len(target), len(gram) - 1
@@ -127,7 +127,7 @@ def _add_gram(gram: Array, target: Ints, piece: int, into: Normal) -> None:
             into.boards[piece, i, j] += gram[n_shared + i, n_shared + j]
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def view_equations(
     views: ViewArrays, estimate: Estimate, sigma: Array, knee: float, warp_at: int, unknowns: int
 ) -> Normal:

@@ -17,12 +17,12 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.calib.tags.gaussian_tables import gaussian_edge
 from freeswing.calib.tags.tag_map import blur_at_centre
+from freeswing.cdpr.compiled.kernels import kernel
 
 Array = NDArray[np.float64]
 
@@ -126,7 +126,7 @@ class _Nine(NamedTuple):
     c2: float
 
 
-@numba.njit(cache=True, nogil=True, forceinline=True)
+@kernel(forceinline=True)
 def _nine(cells: Array, m: int, k: int) -> _Nine:
     """Around cell (m, k); the rim goes on for ever."""
     last = cells.shape[0] - 1
@@ -145,7 +145,7 @@ def _nine(cells: Array, m: int, k: int) -> _Nine:
     )
 
 
-@numba.njit(cache=True, nogil=True, forceinline=True)
+@kernel(forceinline=True)
 def _slopes(h: Array, ray_step: Array, c: float, r: float, w: float) -> _Slopes:
     cx, cy = (h[0, 0] - c * h[2, 0]) * w, (h[0, 1] - c * h[2, 1]) * w
     dx, dy = (h[1, 0] - r * h[2, 0]) * w, (h[1, 1] - r * h[2, 1]) * w
@@ -157,7 +157,7 @@ def _slopes(h: Array, ray_step: Array, c: float, r: float, w: float) -> _Slopes:
     )
 
 
-@numba.njit(cache=True, nogil=True, forceinline=True)
+@kernel(forceinline=True)
 def _side(at: float, cell: int, blur: float, step: Array, bell: Array) -> _Side:
     """The edges before and after cell number `cell`, seen from `at`."""
     z0, z1 = (at - (cell - 1)) / blur, (at - cell) / blur
@@ -166,7 +166,7 @@ def _side(at: float, cell: int, blur: float, step: Array, bell: Array) -> _Side:
     return _Side(z0, z1, s0, s1, g0, g1)
 
 
-@numba.njit(cache=True, nogil=True, forceinline=True)
+@kernel(forceinline=True)
 def _twist(near: _Nine, c: _Side, r: _Side, rho: float) -> float:
     """What the four cell corners add where the blur's axes correlate by `rho`, over `rho`."""
     twist = 0.0
@@ -185,7 +185,7 @@ def _twist(near: _Nine, c: _Side, r: _Side, rho: float) -> float:
     return twist
 
 
-@numba.njit(cache=True, nogil=True, forceinline=True)
+@kernel(forceinline=True)
 def _blurred(near: _Nine, c: _Side, r: _Side, blur_c: float, blur_r: float, rho: float) -> _Blurred:
     """The cells around a place, blurred by a Gaussian with `rho` between its axes."""
     wc0, wc1, wc2 = 1.0 - c.s0, c.s0 - c.s1, c.s1
@@ -210,7 +210,7 @@ def _blurred(near: _Nine, c: _Side, r: _Side, blur_c: float, blur_r: float, rho:
     return _Blurred(value, by_c, by_r, by_blur)
 
 
-@numba.njit(cache=True, nogil=True, forceinline=True)
+@kernel(forceinline=True)
 def _add_levels(normal: Array, right: Array, value: float, residual: float, weight: float) -> None:
     """Adds a pixel that tells of black and contrast alone."""
     normal[8, 8] += weight
@@ -220,7 +220,7 @@ def _add_levels(normal: Array, right: Array, value: float, residual: float, weig
     right[9] += weight * residual * value
 
 
-@numba.njit(cache=True, nogil=True, forceinline=True)
+@kernel(forceinline=True)
 def _add_row(normal: Array, right: Array, design: Array, residual: float, weight: float) -> None:
     """Adds a pixel that tells of all unknowns."""
     for i in range(UNKNOWNS):
@@ -230,7 +230,7 @@ def _add_row(normal: Array, right: Array, design: Array, residual: float, weight
             normal[i, j] += wi * design[j]
 
 
-@numba.njit(cache=True, nogil=True, forceinline=True)
+@kernel(forceinline=True)
 def _fill_design(
     design: Array, seen: _Blurred, x: float, y: float, contrast: float, blur: float
 ) -> None:
@@ -244,7 +244,7 @@ def _fill_design(
     design[10] = contrast * seen.by_blur / blur
 
 
-@numba.njit(cache=True, nogil=True, forceinline=True)
+@kernel(forceinline=True)
 def _is_flat(c: float, r: float, k: int, m: int, n: int, flat_c: float, flat_r: float) -> bool:
     """Whether a place lies so deep in cell (m, k) that nothing of its edges is left."""
     from_c, from_r = c - (k - 1), r - (m - 1)
@@ -253,14 +253,14 @@ def _is_flat(c: float, r: float, k: int, m: int, n: int, flat_c: float, flat_r: 
     return inside_c and inside_r and k > 0 and m > 0 and k <= n and m <= n
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def new_arrays() -> Arrays:
     """Memory of one fit."""
     normal, right = np.zeros((UNKNOWNS, UNKNOWNS)), np.zeros(UNKNOWNS)
     return Arrays(normal, right, np.zeros(256, dtype=np.int64), np.zeros(UNKNOWNS))
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def accumulate(
     tag: TagImage, h: Array, state: Array, stride: int, scale: float, arrays: Arrays
 ) -> Pass:

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -28,6 +27,7 @@ from freeswing.calib.tags.edge_pixels import (
     RAY_Y,
     ROW,
 )
+from freeswing.cdpr.compiled.kernels import kernel
 
 Array = NDArray[np.float64]
 
@@ -42,13 +42,13 @@ class Work(NamedTuple):
     sums: Array
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def new_work() -> Work:
     """Memory of one fit."""
     return Work(np.zeros(_ROWS * CHUNK), np.zeros((_COLUMNS, _COLUMNS)))
 
 
-@numba.njit(cache=True, nogil=True, forceinline=True)
+@kernel(forceinline=True)
 def _edge(z: float) -> tuple[float, float]:
     """The Gaussian's integral (to 8e-8) and density at z, without a branch.
 
@@ -70,9 +70,7 @@ def _edge(z: float) -> tuple[float, float]:
     return (tail if z < 0.0 else 1.0 - tail), bell * 0.3989422804014327
 
 
-@numba.njit(
-    cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz", "arcp", "nnan"}
-)
+@kernel(error_model="numpy", fastmath={"contract", "nsz", "arcp", "nnan"})
 def _fill(
     t: Array, pixels: Array, h: Array, ray_step: Array, state: Array, half: float, limit: float
 ) -> None:
@@ -117,7 +115,7 @@ def _fill(
         t[11 * CHUNK + i] = root * residual
 
 
-@numba.njit(cache=True, nogil=True, fastmath={"reassoc", "contract", "nsz"})
+@kernel(fastmath={"reassoc", "contract", "nsz"})
 def _add(sums: Array, design: Array) -> None:
     """Adds the products of all rows of the design."""
     for i in range(_COLUMNS):
@@ -128,7 +126,7 @@ def _add(sums: Array, design: Array) -> None:
             sums[i, j] += total
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def pass_over(
     tag: TagImage, pixels: Array, h: Array, state: Array, scale: float, work: Work
 ) -> Pass:

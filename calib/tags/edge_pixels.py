@@ -15,11 +15,11 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.calib.tags.corner_kernels import TagImage
+from freeswing.cdpr.compiled.kernels import kernel
 
 Array = NDArray[np.float64]
 
@@ -37,7 +37,7 @@ FIELDS = 10
 GREY, RAY_X, RAY_Y, COLUMN, ROW, CELL_A, CELL_B, CELL_D, CELL_E, COUNTS = range(FIELDS)
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def lattice_pixels(tag: TagImage, h: Array) -> Array:
     """Pixels (u, v) of the corners of all cells, by row and column, (n + 1, n + 1, 2).
 
@@ -91,7 +91,7 @@ class Walk(NamedTuple):
     box: NDArray[np.int64]
 
 
-@numba.njit(cache=True, nogil=True, forceinline=True)
+@kernel(forceinline=True)
 def _take(walk: Walk, count: int, u: int, v: int) -> int:
     """The count after a pixel, which is listed when it is new and inside the box."""
     taken, places, box = walk
@@ -104,7 +104,7 @@ def _take(walk: Walk, count: int, u: int, v: int) -> int:
     return count + 1
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def _along(walk: Walk, count: int, p: Array, q: Array, reach_px: float, step: int) -> int:
     """The count after the pixels within `reach_px` of the edge p-q; every `step`-th row of them."""
     du, dv = q[0] - p[0], q[1] - p[1]
@@ -126,7 +126,7 @@ def _along(walk: Walk, count: int, p: Array, q: Array, reach_px: float, step: in
     return count
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def _inside(walk: Walk, count: int, corners: Array) -> int:
     """The count after a few pixels in each cell and in the rim."""
     n = corners.shape[0] - 1
@@ -146,7 +146,7 @@ def _inside(walk: Walk, count: int, corners: Array) -> int:
     return count
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def _walked(tag: TagImage, corners: Array, reach_px: float, most: float) -> NDArray[np.int32]:
     """Pixels (u, v) along the edges and a few in each cell, (n, 2)."""
     cells, box = tag.cells, tag.box
@@ -177,7 +177,7 @@ def _walked(tag: TagImage, corners: Array, reach_px: float, most: float) -> NDAr
     return walk.places[:count]
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def edge_pixels(tag: TagImage, h: Array, blur: float, most: float) -> Array:
     """The pixels that tell of a tag at the map `h`, in chunks, (chunks, FIELDS, CHUNK).
 

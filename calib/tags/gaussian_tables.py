@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
+
+from freeswing.cdpr.compiled.kernels import kernel
 
 Array = NDArray[np.float64]
 
@@ -23,7 +24,7 @@ def _gaussian_tables() -> tuple[Array, Array]:
 _STEP, _BELL = _gaussian_tables()
 
 
-@numba.njit(cache=True, nogil=True, inline="always")
+@kernel(inline="always")
 def gaussian_edge(z: float, step: Array, bell: Array) -> tuple[float, float]:
     """Gaussian integral and density at z, from tables."""
     if z >= _REACH:

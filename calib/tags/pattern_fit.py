@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,6 +12,7 @@ from freeswing.calib.tags.corner_kernels import UNKNOWNS, Pass, TagImage, accumu
 from freeswing.calib.tags.edge_pass import new_work, pass_over
 from freeswing.calib.tags.edge_pixels import LEAST_CELL, edge_pixels
 from freeswing.calib.tags.tag_map import blur_at_centre, compose
+from freeswing.cdpr.compiled.kernels import kernel
 
 Array = NDArray[np.float64]
 
@@ -80,7 +80,7 @@ class PatternFit(NamedTuple):
     last: float
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def _noise_from(histogram: NDArray[np.int64], count: float) -> float:
     """Noise level from the median of |residual|, grey levels."""
     seen = 0
@@ -93,7 +93,7 @@ def _noise_from(histogram: NDArray[np.int64], count: float) -> float:
     return 64.0
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def _outlying(seen: Pass, scale: float) -> float:
     """Share of the pixels whose residual is beyond four noise levels."""
     count = 0
@@ -102,7 +102,7 @@ def _outlying(seen: Pass, scale: float) -> float:
     return count / seen.pixels
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def _levels(seen: Pass, state: Array) -> Array:
     """The state with black and contrast by linear least squares at the first guess of the place."""
     normal, right, found = seen.normal, seen.right, state.copy()
@@ -115,7 +115,7 @@ def _levels(seen: Pass, state: Array) -> Array:
     return found
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def _solvable(seen: Pass, held: bool) -> tuple[Array, Array]:
     """The pass's whole normal matrix and right side, the blur `held` or not."""
     normal, right = seen.normal.copy(), seen.right.copy()
@@ -133,7 +133,7 @@ def _solvable(seen: Pass, held: bool) -> tuple[Array, Array]:
     return normal, right
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def _moved(state: Array, change: Array) -> tuple[Array, float]:
     """The state after a step; and how its blur changed, by half of itself at the most."""
     blur = state[2]
@@ -143,7 +143,7 @@ def _moved(state: Array, change: Array) -> tuple[Array, float]:
     return moved, blur_change
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def _strides(box: NDArray[np.int64], most_pixels: float) -> tuple[int, int]:
     """Of the pixels that take part, at the end and in the first passes."""
     area = max((box[2] - box[0]) * (box[3] - box[1]), 1.0)
@@ -151,7 +151,7 @@ def _strides(box: NDArray[np.int64], most_pixels: float) -> tuple[int, int]:
     return fine, max(fine, int(area / 1600.0))
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def _length(change: Array) -> float:
     """Largest change of the small homography."""
     largest = 0.0
@@ -184,7 +184,7 @@ class _Step(NamedTuple):
     explained: float
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def _step(seen: Pass, h: Array, state: Array, half: float, noise: float, free: bool) -> _Step:
     """Gauss-Newton's step of a pass, the blur `free` or held."""
     at_least = state[2] <= LEAST_BLUR and seen.right[BLUR] < 0.0
@@ -209,7 +209,7 @@ def _step(seen: Pass, h: Array, state: Array, half: float, noise: float, free: b
     )
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def _given(step: _Step, least: float, pixels: float, last: float) -> PatternFit:
     """The fit of a last step; `least` is the smallest variance of a pixel."""
     covariance = np.empty((8, 8))
@@ -218,12 +218,12 @@ def _given(step: _Step, least: float, pixels: float, last: float) -> PatternFit:
     return PatternFit(step.h, covariance, step.state, noise, step.explained, pixels, last)
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def _failed(h: Array, state: Array, noise: float, pixels: float, last: float) -> PatternFit:
     return PatternFit(h, np.zeros((8, 8)), state, noise, 0.0, pixels, last)
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def _is_wide(tag: TagImage, h: Array, blur: float) -> bool:
     """Whether a pixel near one edge of the print is too far from the next to see it."""
     half = (tag.cells.shape[0] - 2) / 2.0
@@ -231,7 +231,7 @@ def _is_wide(tag: TagImage, h: Array, blur: float) -> bool:
     return LEAST_CELL * max(across, down) < 1.0
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def _fit_edges(tag: TagImage, h: Array, state: Array, search: Search, scale: float) -> PatternFit:
     """Gauss-Newton on the pixels along the edges, from a map within some tenths of a pixel.
 
@@ -268,7 +268,7 @@ def _fit_edges(tag: TagImage, h: Array, state: Array, search: Search, scale: flo
     return _failed(h, state, noise, count, last)
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def fit_pattern(tag: TagImage, pattern_from_ray: Array, search: Search) -> PatternFit:
     """Gauss-Newton from coarse to fine, from a first guess of the pattern's map (3, 3)."""
     h = pattern_from_ray.copy()

@@ -19,7 +19,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
 
-import numba
 import numpy as np
 
 from freeswing.calib.board.board_motion import boards_at
@@ -32,6 +31,7 @@ from freeswing.calib.camera.lens_models import FISHEYE, Array, full_parameters
 from freeswing.calib.rig.reprojection import Scene
 from freeswing.calib.rig.views import Views
 from freeswing.calib.tags.corners import rimmed_cells
+from freeswing.cdpr.compiled.kernels import kernel
 from freeswing.cdpr.elimination import eliminate
 from freeswing.cdpr.rotation import log_rotation
 
@@ -139,7 +139,7 @@ def fit_bias(
     )
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def _exposed(
     is_fisheye: bool,
     full: Array,
@@ -162,7 +162,7 @@ def _exposed(
         lens_point(is_fisheye, full, place, True, pixel, d_point, d_full)
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def _fields(x: float, y: float, across: float, down: float, row: Array) -> None:
     """How eight small homographies move the point (x, y) along (across, down), (8,)."""
     row[0], row[1], row[2] = across, across * x, across * y
@@ -171,7 +171,7 @@ def _fields(x: float, y: float, across: float, down: float, row: Array) -> None:
     row[6], row[7] = lean * x, lean * y
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def _biases(
     is_fisheye: bool,
     full: Array,
@@ -230,7 +230,7 @@ def _biases(
     return result
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def _from_unit_square(image: Array) -> Array:
     """Homography that takes (0, 0) (1, 0) (1, 1) (0, 1) to four image points (4, 2)."""
     sx = image[0, 0] - image[1, 0] + image[2, 0] - image[3, 0]

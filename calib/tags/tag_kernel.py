@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.calib.tags.corner_kernels import TagImage
 from freeswing.calib.tags.pattern_fit import Search, fit_pattern
 from freeswing.calib.tags.tag_map import corners_of_map, map_of_square
+from freeswing.cdpr.compiled.kernels import kernel
 
 Array = NDArray[np.float64]
 
@@ -28,7 +28,7 @@ _CROWDED_PX = 0.05
 _TOO_CROWDED = 1.2
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def _box(corners_px: Array, n: int, height: int, width: int) -> NDArray[np.int64]:
     """Left, top, right, bottom (exclusive) of a tag with its rim; empty where there is none."""
     box = np.zeros(4, dtype=np.int64)
@@ -47,7 +47,7 @@ def _box(corners_px: Array, n: int, height: int, width: int) -> NDArray[np.int64
     return box
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def _ray_step(rays: Array, corners_px: Array) -> Array:
     """How a pixel to the right and one down change the ray in the tag's middle, (2, 2) columns."""
     u = min(max(int(corners_px[:, 0].mean()), 1), rays.shape[1] - 2)
@@ -59,7 +59,7 @@ def _ray_step(rays: Array, corners_px: Array) -> Array:
     return step
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def fit_guess(
     image: NDArray[np.uint8],
     rays: Array,

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
+
+from freeswing.cdpr.compiled.kernels import kernel
 
 Array = NDArray[np.float64]
 
 
-@numba.njit(cache=True, nogil=True, inline="always")
+@kernel(inline="always")
 def blur_at_centre(h: Array, ray_step: Array, half: float, blur: float) -> tuple[float, float]:
     """How many cells across and down `blur` pixels are in the middle of the tag, and a margin."""
     back = np.linalg.inv(h)
@@ -28,7 +29,7 @@ def blur_at_centre(h: Array, ray_step: Array, half: float, blur: float) -> tuple
     return across[0], across[1]
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def map_of_square(rays: Array, side: float) -> Array:
     """Homography from undistorted (x, y, 1) to cells, corners TL TR BR BL at 0 ... side, (3, 3).
 
@@ -60,7 +61,7 @@ def map_of_square(rays: Array, side: float) -> Array:
     return found
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def compose(pattern_from_ray: Array, e: NDArray[np.floating], half: float) -> Array:
     """The pattern's map after the small homography `e`, which acts on (q - half) / half.
 
@@ -79,7 +80,7 @@ def compose(pattern_from_ray: Array, e: NDArray[np.floating], half: float) -> Ar
     return moved
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def corners_of_map(
     pattern_from_ray: Array, covariance: Array, n: int
 ) -> tuple[Array, Array, float]:

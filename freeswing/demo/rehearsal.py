@@ -17,6 +17,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from freeswing.calib.camera.cameras_file import write_cameras
+from freeswing.cdpr.compiled.kernels import is_kept
 from freeswing.cdpr.files.documents import DataError, dump_toml
 from freeswing.cdpr.files.robot_file import write_robot
 from freeswing.cdpr.measured.target import write_target
@@ -29,13 +30,6 @@ SWING = "swing-01"
 LASTS_S = 0.8  # 24 frames: more than a motion's polynomial needs, filmed and tracked in a second
 
 
-def is_compiled() -> bool:
-    """Whether an earlier run left what tracking needs on the disk, or none can."""
-    kept = solve_block.stats.cache_path
-    pattern = f"pose_kernels.{solve_block.py_func.__name__}-*.nbi"
-    return kept is None or any(Path(kept).glob(pattern))
-
-
 @contextmanager
 def rehearsed() -> Iterator[None]:
     """Compiles beside what the block does, where nothing is compiled yet.
@@ -43,7 +37,7 @@ def rehearsed() -> Iterator[None]:
     What the process comes to is of no account: what it did not compile is compiled when it is
     called.
     """
-    if is_compiled():
+    if is_kept(solve_block):
         yield
         return
     with TemporaryDirectory() as folder:

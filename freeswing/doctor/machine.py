@@ -130,17 +130,18 @@ def _memory() -> Finding:
 
 
 def _kernels() -> Finding:
-    """Compiled kernels are kept beside the modules, or in NUMBA_CACHE_DIR."""
-    told = os.environ.get("NUMBA_CACHE_DIR")
-    package = Path(__file__).parents[1]
-    folder = Path(told) if told else package
-    places = {folder, *(one.resolve() for one in package.iterdir() if one.is_dir() and not told)}
-    kept = len({file for place in places for file in place.rglob("*.nbc")})
+    """Which compiled kernels are kept, and whether new ones can be."""
+    from freeswing.cdpr.compiled.kernels import SUFFIX, user_folder
+
+    folder = user_folder()
+    kept = [file.stat().st_size for file in folder.glob(f"*{SUFFIX}")]
     try:
+        folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
             pass
     except OSError:
         text = f"{folder} cannot be written to: kernels are compiled again in every process"
         return Finding("warning", "kernels", text, "set NUMBA_CACHE_DIR to a folder of your own")
     first = "" if kept else "; the first track or demo compiles them, about a minute"
-    return Finding("note", "kernels", f"{kept} compiled ones kept in {folder}{first}")
+    text = f"{len(kept)} compiled ones kept in {folder}, {1e-6 * sum(kept):.0f} MB{first}"
+    return Finding("note", "kernels", text)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from freeswing.cdpr.compiled.kernels import kernel
 from freeswing.servo.synthesis.state_space import Array
 from freeswing.servo.tensions.method_kernels import closed_form_point, paper_point
 from freeswing.servo.tensions.polygon_kernels import (
@@ -41,7 +41,7 @@ class Currents(NamedTuple):
     stops: int
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def distribute(
     A: Array, b: Array, offset: Array, lower: Array, upper: Array, wish: Array, method: int
 ) -> Currents:
@@ -80,7 +80,7 @@ def distribute(
     return Currents(_at(basis.N, x0, point), FEASIBLE, 1.0, -1)
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def distribute_rows(
     A: Array, b: Array, offset: Array, lower: Array, upper: Array, wish: Array, method: int
 ) -> tuple[Array, NDArray[np.int64], Array, NDArray[np.int64]]:
@@ -94,7 +94,7 @@ def distribute_rows(
     return x, status, scale, stops
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def _by(
     method: int, basis: Basis, x0: Array, lower: Array, upper: Array, wish: Array, slack: float
 ) -> Point:
@@ -116,7 +116,7 @@ def _by(
     return centre if centre.found else nearest_point(basis.N, below, above, slack)
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def _scaled(
     N: Array, x_rest: Array, x_b: Array, lower: Array, upper: Array, slack: float
 ) -> Currents:
@@ -154,7 +154,7 @@ def _scaled(
     return Currents(np.full(n, np.nan), IMPOSSIBLE, np.nan, stops)
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def _at(N: Array, x0: Array, point: Point) -> Array:
     x = np.empty(len(x0))
     for i in range(len(x0)):

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from freeswing.cdpr.compiled.kernels import kernel
 from freeswing.servo.synthesis.state_space import Array
 from freeswing.servo.tensions.polygon_kernels import Point
 
 Mask = NDArray[np.bool_]
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def paper_point(N: Array, below: Array, above: Array, slack: float, repeated: bool) -> Point:
     """The paper's (29)-(31): violated bounds put to equality until all the others are met.
 
@@ -43,7 +43,7 @@ def paper_point(N: Array, below: Array, above: Array, slack: float, repeated: bo
     return nothing
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def _try_all(
     N: Array, below: Array, above: Array, slack: float, candidate: Mask, grown: Mask
 ) -> tuple[bool, float, float]:
@@ -62,7 +62,7 @@ def _try_all(
     return False, 0.0, 0.0
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def closed_form_point(
     N: Array, below: Array, above: Array, slack: float, u: float, v: float
 ) -> Point:
@@ -91,17 +91,17 @@ def closed_form_point(
     return Point(True, u, v, -1, -1, -1, np.zeros(3))
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def _bound(below: Array, above: Array, c: int) -> float:
     return above[c // 2] if c % 2 else below[c // 2]
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def _on_one(N: Array, below: Array, above: Array, a: int) -> tuple[bool, float, float]:
     return _on_one_from(N, below, above, a, 0.0, 0.0)
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def _on_one_from(
     N: Array, below: Array, above: Array, a: int, u: float, v: float
 ) -> tuple[bool, float, float]:
@@ -114,7 +114,7 @@ def _on_one_from(
     return True, u + g0 * step, v + g1 * step
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def _on_two(N: Array, below: Array, above: Array, a: int, b: int) -> tuple[bool, float, float]:
     """Where the lines of two bounds cross."""
     a0, a1, b0, b1 = N[a // 2, 0], N[a // 2, 1], N[b // 2, 0], N[b // 2, 1]
@@ -125,7 +125,7 @@ def _on_two(N: Array, below: Array, above: Array, a: int, b: int) -> tuple[bool,
     return True, (ha * b1 - hb * a1) / cross, (a0 * hb - b0 * ha) / cross
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def _mark_violated(
     N: Array, below: Array, above: Array, u: float, v: float, slack: float, marks: Mask
 ) -> bool:
@@ -142,7 +142,7 @@ def _mark_violated(
     return any_violated
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def _most_violated(N: Array, below: Array, above: Array, u: float, v: float, slack: float) -> int:
     worst, most = -1, slack
     for i in range(N.shape[0]):

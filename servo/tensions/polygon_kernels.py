@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
+from freeswing.cdpr.compiled.kernels import kernel
 from freeswing.servo.synthesis.state_space import Array
 
 # Shares of the widest range between two bounds. A bound missed by less than HIT is met: the sum
@@ -30,7 +30,7 @@ class Basis(NamedTuple):
     rank_ratio: float
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def basis_of(A: Array) -> Basis:
     """Householder QR of A'; `rank_ratio` is the smallest over the largest diagonal of R."""
     m, n = A.shape
@@ -76,7 +76,7 @@ def basis_of(A: Array) -> Basis:
     return Basis(Q[:, :m].copy(), R[:m, :m].copy(), N, ratio)
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def least_norm(basis: Basis, b: Array) -> Array:
     """The shortest x with A x = b (the paper's eq. (27)): Q1 R'^-1 b."""
     m = b.shape[0]
@@ -94,7 +94,7 @@ def least_norm(basis: Basis, b: Array) -> Array:
     return x
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def in_null_space(N: Array, wish: Array) -> Array:
     """N N' wish (the paper's eq. (28))."""
     a = 0.0
@@ -124,7 +124,7 @@ class Point(NamedTuple):
     y: Array
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def nearest_point(N: Array, below: Array, above: Array, slack: float) -> Point:
     """The point of `below <= N lambda <= above` that is nearest to the origin.
 
@@ -176,7 +176,7 @@ def nearest_point(N: Array, below: Array, above: Array, slack: float) -> Point:
     return Point(True, u, v, -1, -1, -1, none)
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def _half_plane(N: Array, below: Array, above: Array, c: int) -> tuple[float, float, float]:
     i = c // 2
     if c % 2:
@@ -184,7 +184,7 @@ def _half_plane(N: Array, below: Array, above: Array, c: int) -> tuple[float, fl
     return -N[i, 0], -N[i, 1], -below[i]
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def _contradiction(
     N: Array, below: Array, above: Array, first: int, second: int, third: int
 ) -> Array:
@@ -196,7 +196,7 @@ def _contradiction(
     return np.abs(y)
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def barycentre(N: Array, below: Array, above: Array, box: float) -> Point:
     """Centre of area of the polygon; of a segment or a point that has none, the mean corner.
 
@@ -222,7 +222,7 @@ def barycentre(N: Array, below: Array, above: Array, box: float) -> Point:
     return _centre(xs, ys, count, box)
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def _clip(
     xs: Array, ys: Array, count: int, g0: float, g1: float, h: float, new_xs: Array, new_ys: Array
 ) -> int:
@@ -243,7 +243,7 @@ def _clip(
     return made
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def _centre(xs: Array, ys: Array, count: int, box: float) -> Point:
     mean_x = mean_y = 0.0
     for k in range(count):

@@ -11,16 +11,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from freeswing.cdpr.compiled.kernels import is_kept
 from freeswing.cdpr.model.equations import build_model
 from freeswing.demo import mocap, rehearsal, truth
 from freeswing.demo.lessons import LESSONS
-from freeswing.demo.rehearsal import is_compiled, rehearse
+from freeswing.demo.rehearsal import rehearse
 from freeswing.ident.diagnose.heldout import Stage, held_out
 from freeswing.ident.identify import IdentifySettings, identify
 from freeswing.main import main
 from freeswing.session import stages
 from freeswing.session.load_swings import load_robot, load_swings, load_target
 from freeswing.session.session_file import read_session
+from freeswing.vision.fuse.pose_kernels import solve_block
 
 FEW_SWINGS = ("swing-01", "swing-02", "swing-03", "check-01")
 SHORT_S = 4.0
@@ -74,7 +76,7 @@ def test_which_swings_are_made_does_not_change_them() -> None:
 def test_the_rehearsal_goes_as_far_as_poses(tmp_path: Path) -> None:
     """What it compiles is what tracking calls: it tracks, with the demonstration's cameras."""
     assert rehearse(tmp_path)
-    assert is_compiled()
+    assert is_kept(solve_block)
     tracked = json.loads((tmp_path / "results" / "tracking.json").read_text(encoding="utf-8"))
     assert tracked["format"] == "freeswing-tracking/1", tracked["format"]
 
@@ -82,7 +84,7 @@ def test_the_rehearsal_goes_as_far_as_poses(tmp_path: Path) -> None:
 def test_a_rehearsal_ends_with_what_it_is_for(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(rehearsal, "is_compiled", lambda: False)
+    monkeypatch.setattr(rehearsal, "is_kept", lambda _: False)
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     with rehearsal.rehearsed():
         assert len(multiprocessing.active_children()) == 1

@@ -14,7 +14,9 @@ from importlib import import_module
 from pathlib import Path
 
 import pytest
+from numba.core import config
 
+from freeswing.cdpr.compiled.kernels import SUFFIX
 from freeswing.console import _write, has_colours
 from freeswing.doctor import machine
 from freeswing.main import COMMANDS, main
@@ -55,10 +57,11 @@ def test_memory_from_both_sides(
 def test_kernels_that_cannot_be_kept_are_said(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    (tmp_path / "one.nbc").write_bytes(b"")
+    monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path))
+    assert machine._kernels().text.startswith("0 compiled ones")
+    (tmp_path / "kernels" / f"one{SUFFIX}").write_bytes(b"")
     assert machine._kernels().text.startswith("1 compiled ones")
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "nowhere"))
+    monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path / "kernels" / f"one{SUFFIX}"))
     assert machine._kernels().level == "warning"
 
 

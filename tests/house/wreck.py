@@ -697,7 +697,7 @@ def is_compiled(file: str, name: str) -> bool:
         for path in (ROOT / floor).rglob("*.py"):
             text = path.read_text(encoding="utf-8")
             reads = path == ROOT / file or (f"{module} import" in text and name in text)
-            if reads and "njit" in text:
+            if reads and "@kernel" in text:
                 return True
     return False
 

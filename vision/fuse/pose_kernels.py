@@ -14,10 +14,10 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from freeswing.cdpr.compiled.kernels import kernel
 from freeswing.cdpr.elimination import eliminate
 from freeswing.vision.fuse.small_rotation import small_rotation
 
@@ -140,7 +140,7 @@ class _Spare(NamedTuple):
     j: Array
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def carried_on(
     times_s: Array, rotations: Array, positions: Array, time_s: float
 ) -> tuple[Array, Array]:
@@ -171,7 +171,7 @@ def carried_on(
     return turn @ rotations[n - 1], positions[n - 1] + ahead[:3]
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def _observe(seen: Seen, o: int, pose: MovingPose, into: Linear, at: int | np.int64) -> bool:
     """Row `at` of `into` from sighting o at a pose; False when a point is behind the camera."""
     residual, jacobian = into.residuals[at], into.jacobians[at]
@@ -228,7 +228,7 @@ def _observe(seen: Seen, o: int, pose: MovingPose, into: Linear, at: int | np.in
     return True
 
 
-@numba.njit(cache=True, nogil=True, forceinline=True)
+@kernel(forceinline=True)
 def _whiten(white: Array, found: Linear, m: int, free: int, r: Array, j: Array) -> None:
     """W residual into r and W jacobian into j over the first m rows; W is lower triangular."""
     residual, jacobian = found.residuals[0], found.jacobians[0]
@@ -241,7 +241,7 @@ def _whiten(white: Array, found: Linear, m: int, free: int, r: Array, j: Array) 
                 j[i, c] += white[i, k] * jacobian[k, c]
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def _unlinearised(count: int | np.int64) -> Linear:
     """Zeros, and points one metre away."""
     return Linear(
@@ -249,7 +249,7 @@ def _unlinearised(count: int | np.int64) -> Linear:
     )
 
 
-@numba.njit(cache=True, nogil=True, forceinline=True)
+@kernel(forceinline=True)
 def _equations(
     seen: Seen, whitening: Array, k: int, pose: MovingPose, bound: float, free: int, spare: _Spare
 ) -> tuple[Array, Array, Array]:
@@ -279,7 +279,7 @@ def _equations(
     return normal, right, scores
 
 
-@numba.njit(cache=True, nogil=True, forceinline=True)
+@kernel(forceinline=True)
 def _balanced(normal: Array) -> Array:
     """A normal matrix whose diagonal is made one."""
     balanced = normal.copy()
@@ -290,7 +290,7 @@ def _balanced(normal: Array) -> Array:
     return balanced
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def solve_instant(
     seen: Seen,
     whitening: Array,
@@ -336,7 +336,7 @@ def solve_instant(
     return SolvedPose(rotation, position, covariance, scores, condition)
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def solve_block(
     seen: Seen, whitening: Array, start: MovingPoses, free: int, limit: float
 ) -> Solved:
@@ -373,7 +373,7 @@ def solve_block(
     return found
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def linearise_block(seen: Seen, poses: MovingPoses) -> Linear:
     """Every sighting of a block about its pose; zeros where there is none."""
     found = _unlinearised(len(seen.counts))

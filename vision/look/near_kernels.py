@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import math
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.calib.camera.lens_kernels import lens_pixels
+from freeswing.cdpr.compiled.kernels import kernel
 from freeswing.vision.fuse.pose_kernels import MovingPose, Seen, solve_instant
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def _one_to_one(is_fisheye: bool, point: Array, limit: float) -> bool:
     """Whether the lens still means something at a point of the camera's frame."""
     radius = math.hypot(point[0], point[1])
@@ -24,7 +24,7 @@ def _one_to_one(is_fisheye: bool, point: Array, limit: float) -> bool:
     return point[2] > 0.0 and radius < limit * point[2]
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def expected_tags(
     corners_m: Array,
     rotation: Array,
@@ -81,7 +81,7 @@ def expected_tags(
     return seen, guesses
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def refined_pose(
     points: Array,
     rays: Array,

@@ -9,9 +9,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
+
+from freeswing.cdpr.compiled.kernels import kernel
 
 Array = NDArray[np.float64]
 
@@ -65,7 +66,7 @@ def _widened(corners_m: Array, factors: Array) -> Array:
     return centres + (corners_m - centres) * factors[:, None, None]
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def _hidden(
     read: Array, whole: Array, pairs: NDArray[np.int64], rotation: Array, position: Array
 ) -> NDArray[np.bool_]:
@@ -92,7 +93,7 @@ def _hidden(
     return found
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def _covers(plate: Array, point: Array) -> bool:
     """Whether a plate (4, 3) stands before a point (3,), as seen from the origin."""
     corner = plate[3]

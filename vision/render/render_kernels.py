@@ -11,9 +11,10 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
+
+from freeswing.cdpr.compiled.kernels import kernel
 
 Array = NDArray[np.float64]
 Samples = NDArray[np.float32]
@@ -101,7 +102,7 @@ class _Slopes(NamedTuple):
     wv: float
 
 
-@numba.njit(cache=True, nogil=True, forceinline=True)
+@kernel(forceinline=True)
 def _ray_of(rays: Array, column: int, row: int) -> _Ray:
     """The ray of a pixel, continued beyond the image's edge."""
     height, width = rays.shape[0], rays.shape[1]
@@ -119,7 +120,7 @@ def _ray_of(rays: Array, column: int, row: int) -> _Ray:
     return _Ray(x, y, xu, yu, xv, yv)
 
 
-@numba.njit(cache=True, nogil=True, forceinline=True)
+@kernel(forceinline=True)
 def _place_of(h: Array, ray: _Ray, depth: float) -> tuple[_Place, _Slopes]:
     """Where a ray of that depth meets the cells, by the map h (3, 3)."""
     x, y, xu, yu, xv, yv = ray
@@ -135,7 +136,7 @@ def _place_of(h: Array, ray: _Ray, depth: float) -> tuple[_Place, _Slopes]:
     return place, _Slopes(cu, cv, ru, rv, wu, wv)
 
 
-@numba.njit(cache=True, nogil=True, forceinline=True)
+@kernel(forceinline=True)
 def _cell_of(plane: Plane, place: _Place, subpixels: int) -> tuple[int, int]:
     """Row and column of a cell that all of the pixel looks like; (-1, -1): there is none."""
     light, cover = plane.light, plane.cover
@@ -153,7 +154,7 @@ def _cell_of(plane: Plane, place: _Place, subpixels: int) -> tuple[int, int]:
     return m0 + 1, k0 + 1
 
 
-@numba.njit(cache=True, nogil=True, forceinline=True)
+@kernel(forceinline=True)
 def _sample_pixel(plane: Plane, place: _Place, slopes: _Slopes, out: Samples, at: _At) -> None:
     """Adds light and coverage of one pixel's samples, each cell edge a ramp as wide as a foot."""
     light, cover = plane.light, plane.cover
@@ -185,7 +186,7 @@ def _sample_pixel(plane: Plane, place: _Place, slopes: _Slopes, out: Samples, at
             out[1, p + a, q + b] += upper + fr * (lower - upper)
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def sample_plane(plane: Plane, rays: Array, buffer: Buffer) -> Buffer:
     """The buffer with one plane added to its samples (in place).
 
@@ -222,7 +223,7 @@ def sample_plane(plane: Plane, rays: Array, buffer: Buffer) -> Buffer:
     return buffer
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def sample_sphere(
     grey: float, centres: Array, radius_m: float, rays: Array, buffer: Buffer
 ) -> Buffer:
@@ -262,7 +263,7 @@ def sample_sphere(
     return buffer
 
 
-@numba.njit(cache=True, nogil=True, fastmath={"reassoc", "contract"})
+@kernel(fastmath={"reassoc", "contract"})
 def composite(
     buffer: Buffer, weights: NDArray[np.float32], share: float, image: NDArray[np.float32]
 ) -> NDArray[np.float32]:
@@ -305,7 +306,7 @@ def composite(
     return image
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def expose(
     image: NDArray[np.float32], noise: NDArray[np.float32], start: int, sigma: float
 ) -> NDArray[np.uint8]:

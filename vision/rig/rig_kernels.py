@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from freeswing.cdpr.compiled.kernels import kernel
 from freeswing.cdpr.elimination import eliminate
 from freeswing.vision.fuse.pose_kernels import Linear
 
@@ -62,7 +62,7 @@ class _PoseEquations(NamedTuple):
     right: Array
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def _rows_of(
     seen: RigSightings, linear: Linear, offsets: Array, o: int, raw: Array, white: Array
 ) -> int:
@@ -99,7 +99,7 @@ def _rows_of(
     return m
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def _add_rows(
     white: Array, m: int, w: float, first: int, pose: _PoseEquations, rig: RigEquations
 ) -> None:
@@ -120,7 +120,7 @@ def _add_rows(
                 rig.normal[first + a, first + b] += wa * white[i, 6 + b]
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def _eliminate(pose: _PoseEquations, rig: RigEquations) -> None:
     """Takes an instant's pose out of the rig's equations by its Schur complement."""
     unknowns = len(rig.right)
@@ -139,7 +139,7 @@ def _eliminate(pose: _PoseEquations, rig: RigEquations) -> None:
         rig.right[a] -= total
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def add_rig_equations(
     before: RigEquations, seen: RigSightings, linear: Linear, offsets: Array
 ) -> RigEquations:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from freeswing.cdpr.compiled.kernels import kernel
 from freeswing.cdpr.compiled.native import call_at
 from freeswing.cdpr.driven.kernels.rigid_kernels import N_STATE, set_flows
 
@@ -37,7 +37,7 @@ class ElasticMachine(NamedTuple):
     slopes: Array
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def set_elastic_slope(machine, stage):
     """Rates of everything at a stage, into `machine.slopes`."""
     y, slope = machine.looks[stage], machine.slopes[stage]
@@ -62,7 +62,7 @@ def set_elastic_slope(machine, stage):
         slope[N_STATE + n + j] = outputs[6 + j]
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def elastic_step(machine, y, currents, references, period, tensions):
     """Advance y (13 + 2 n,) and currents (n,) in place; tensions (n,) are those at the start."""
     looks, slopes, n = machine.looks, machine.slopes, len(currents)
@@ -89,7 +89,7 @@ def elastic_step(machine, y, currents, references, period, tensions):
         currents[j] = references[j] + (currents[j] - references[j]) * left
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def elastic_samples(machine, period, count, reach, looks, currents, references, tensions):
     """Fill looks (n_t, 13 + 2 n), currents and tensions (n_t, n) from their first rows.
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from freeswing.cdpr.compiled.kernels import kernel
 from freeswing.cdpr.compiled.native import call_at
 
 Array = NDArray[np.float64]
@@ -55,7 +55,7 @@ class Pace(NamedTuple):
     reach: float
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def set_flows(machine, currents, references, period):
     """The currents that a step's stages take, from those at its start.
 
@@ -72,7 +72,7 @@ def set_flows(machine, currents, references, period):
         flows[3, j] = references[j] + gap * last
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def stage_shares(lag, period):
     """What is left of a unit gap of the current at the middle stages and at the last."""
     ratio = lag / period
@@ -83,7 +83,7 @@ def stage_shares(lag, period):
     return middle, 6.0 * impulse - 1.0 - 4.0 * middle
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def set_slope(machine, stage):
     """Rate of the state at a stage, into `machine.slopes`."""
     state, slope = machine.states[stage], machine.slopes[stage]
@@ -106,7 +106,7 @@ def set_slope(machine, stage):
         slope[7 + i] = outputs[i]
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def one_step(machine, state, currents, references, period, tensions):
     """Advance state (13,) and currents (n,) in place; the largest change of a motor's sign.
 
@@ -146,7 +146,7 @@ def one_step(machine, state, currents, references, period, tensions):
     return turned
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def one_sample(machine, pace, state, currents, references, tensions):
     """Advance by one period of held references; the number of steps that it took.
 
@@ -170,7 +170,7 @@ def one_sample(machine, pace, state, currents, references, tensions):
     return count
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def all_samples(machine, pace, states, currents, references, tensions, steps):
     """Fill states (n_t, 13), currents and tensions (n_t, n), steps (n_t - 1,) from first rows.
 

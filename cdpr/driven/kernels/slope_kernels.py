@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from freeswing.cdpr.compiled.kernels import kernel
 from freeswing.cdpr.compiled.native import call_at
 from freeswing.cdpr.driven.kernels.rigid_kernels import N_STATE, one_step, stage_shares
 
@@ -34,7 +34,7 @@ class Slope(NamedTuple):
     by: Array
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def set_derivatives(machine, slope):
     """Derivatives at the stages that `machine` holds, into `slope.by`."""
     n, inputs, outputs = machine.flows.shape[1], slope.inputs, slope.outputs
@@ -54,7 +54,7 @@ def set_derivatives(machine, slope):
                 slope.by[stage, direction, i] = outputs[i, stage]
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def set_rates(state, by, changes, shares, rates):
     """Rates (13, m) of changes (13, m) at a stage, sources included.
 
@@ -90,7 +90,7 @@ def set_rates(state, by, changes, shares, rates):
             row[k] += by[i, N_STATE + k - N_POSE]
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def carry(machine, slope, left, period, changes):
     """Changes (13, m) after the step whose stages `machine` holds, in place.
 
@@ -126,7 +126,7 @@ def carry(machine, slope, left, period, changes):
             changes[i, c] += period / 6.0 * total[i, c]
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def all_slopes(machine, slope, period, states, currents, references, steps, result):
     """Fill result (n_t, 13, m) from its first row; quaternions are normalised as the steps do."""
     now, left = result[0].copy(), np.ones(currents.shape[1])
