@@ -18,11 +18,10 @@ from freeswing.ident.bench.told.budget import budget
 from freeswing.ident.bench.told.classic import (
     ClassicRun,
     classic_runs,
-    group_sentence,
     held_sentences,
     leaning_sentence,
-    wires_sentence,
 )
+from freeswing.ident.bench.told.contradicted import group_sentence, wires_sentence
 from freeswing.ident.bench.told.envelope import Envelope, envelopes, law_chances
 from freeswing.ident.bench.told.held_out import HeldOut, held_out
 from freeswing.ident.bench.told.report_objects import (

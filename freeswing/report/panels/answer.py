@@ -115,6 +115,18 @@ def verdict(diagnosis: Diagnosis | None) -> list[str]:
     unexplained = diagnosis.unexplained
     if unexplained is not None and unexplained.present:
         sentences.append(f"Something remains unexplained: {unexplained.signature}")
-    if not sentences:
-        sentences.append("The model explains the held-out runs; no effect is missing.")
-    return sentences
+    untold = _untold(diagnosis)
+    if untold:
+        return [*sentences, untold]
+    return sentences or ["The model explains the held-out runs; no effect is missing."]
+
+
+def _untold(diagnosis: Diagnosis) -> str:
+    """Where no run was predicted: what these data can say of effects at all; else nothing."""
+    untold = [one for one in diagnosis.candidates if one.verdict == "not_identifiable"]
+    if diagnosis.before is not None or not untold:
+        return ""
+    seen = [plain(one.effect) for one in diagnosis.candidates if one not in untold]
+    if not seen:
+        return "These data cannot tell whether an effect is missing."
+    return f"Beside {', '.join(seen)}, these data cannot tell whether an effect is missing."

@@ -11,6 +11,7 @@ from freeswing.cdpr.files.problems import DataError
 from freeswing.cdpr.robot import Array, Robot
 from freeswing.ident.bench.considered import considered
 from freeswing.ident.bench.diagnose.causes import Cause, causes_of, dressed
+from freeswing.ident.bench.diagnose.channels_only import ByChannels, by_channels
 from freeswing.ident.bench.diagnose.errors import Errors, errors_of
 from freeswing.ident.bench.diagnose.removal import Removed, removals
 from freeswing.ident.bench.diagnose.search import Ground, Round, searched
@@ -29,11 +30,6 @@ LEAST_RUNS = 3  # of two, either is predicted by the other alone, drag, wires an
 FEW = (
     "{count} run(s) have role identify: to leave each out in turn takes {least} or more; record "
     "further ones"
-)
-CHANNELS_ONLY = (
-    "nothing but uncalibrated channels was recorded: how far the platform swung, and what an "
-    "effect would do to it, is not known, so that none can be told from another; add one run with "
-    "poses, or with yaw by a calibrated sensor"
 )
 
 
@@ -98,7 +94,7 @@ def diagnose_bench(
     robot: Robot,
     progress: Progress | None = None,
     only: Sequence[str] | None = None,
-) -> BenchDiagnosis | CannotTell:
+) -> BenchDiagnosis | ByChannels | CannotTell:
     """Find what a bench lacks.
 
     Args:
@@ -108,7 +104,7 @@ def diagnose_bench(
         only: effects to consider; None for all that a bench may show.
 
     Returns:
-        The diagnosis, or why there can be none.
+        The diagnosis, what channels alone tell, or why there can be none.
 
     Raises:
         DataError: when the data cannot give a result, naming run, number and remedy.
@@ -116,11 +112,12 @@ def diagnose_bench(
     told = progress or (lambda label, fraction: None)
     told("all runs in one fit", 0.0)
     identified = identify_bench(bench, robot)
-    if isinstance(identified.solved.swings[0], ModalSwing):
-        return CannotTell(identified, CHANNELS_ONLY)
     count = len(identified.solved.swings)
     if count < LEAST_RUNS:
         return CannotTell(identified, FEW.format(count=count, least=LEAST_RUNS))
+    if isinstance(identified.solved.swings[0], ModalSwing):
+        told("what channels tell", 0.5)
+        return by_channels(identified)
     try:
         return _diagnosed(identified, robot, told, only)
     except (ValueError, np.linalg.LinAlgError) as error:

@@ -5,39 +5,36 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-
 from freeswing.cdpr.effects import catalogue
-from freeswing.ident.bench.diagnose.causes import LENGTHS, SAME, Cause
+from freeswing.ident.bench.diagnose.causes import SAME, Cause
+from freeswing.ident.bench.diagnose.channels_only import ByChannels, channels_document
 from freeswing.ident.bench.diagnose.diagnose import BenchDiagnosis, CannotTell
+from freeswing.ident.bench.diagnose.entries import (
+    CLAMPS,
+    EXCHANGE,
+    FORMAT,
+    NOTHING_LEFT,
+    WIRES_GROUP,
+    found_entry,
+    granted_entry,
+    group_entry,
+    mass_candidate,
+    mass_found,
+    removed_entry,
+    told_entry,
+)
 from freeswing.ident.bench.diagnose.left import remaining
-from freeswing.ident.bench.diagnose.removal import Removed
 from freeswing.ident.bench.diagnose.search import Word
 from freeswing.ident.bench.solve import Solved
 from freeswing.ident.bench.swing import COMMON
-from freeswing.ident.bench.told.classic import group_sentence
+from freeswing.ident.bench.told.contradicted import group_sentence, wires_sentence
 from freeswing.ident.bench.told.report_objects import objects_document, platform_rows
 from freeswing.ident.diagnose.experiments import separating_experiment
 
-FORMAT = "freeswing-diagnosis/1"
-MASS = "platform_mass"
-MASS_GROUP = ("wire_radii", "payload_distance", "payload_mass", "frame_rate")
-WIRES_GROUP = ("yielding_clamp", "frame_rate")
 NOT_ON_BENCHES = "it is not looked for on benches: their wires would not show it, or not alone"
-WEIGH = (
-    "weigh the platform with all that hangs on it; if the declared mass is right, measure the "
-    "wires' radii and lengths again, then film a clock"
-)
-EXCHANGE = (
-    "exchange the wires and record again: what goes with a wire is its length, what stays with the "
-    "platform its end or the measured frame, what stays above the hook"
-)
 LEVEL = (
     "hold a plumb line beside the hooks, or a level on their frame; a constant force tilts a "
     "heavier load less, and a tilt does not"
-)
-CLAMPS = (
-    "measure the wires from bend to bend, film a clock, and push the hooks: a clamp that yields"
 )
 ADVICE = (
     (frozenset({"gravity_tilt", "constant_force"}), LEVEL),
@@ -46,17 +43,19 @@ ADVICE = (
 )
 
 
-def bench_document(found: BenchDiagnosis | CannotTell) -> dict[str, Any]:
+def bench_document(found: BenchDiagnosis | ByChannels | CannotTell) -> dict[str, Any]:
     """What `diagnose` writes of a bench."""
     if isinstance(found, CannotTell):
         return _cannot_tell(found)
+    if isinstance(found, ByChannels):
+        return channels_document(found)
     bench, first, last = found.identified.bench, found.declared, found.solved
     runs = tuple(run for run in bench.runs if run.role == "identify")
     before, after = found.ladder[0].errors.document(), found.ladder[-1].errors.document()
     mass = group_sentence(last)
     entries = [_accepted(found, cause) for cause in found.accepted]
-    entries += [_granted(one) for one in found.removed if one.accepted]
-    entries += [_mass_entry(last)] if mass else []
+    entries += [granted_entry(one) for one in found.removed if one.accepted]
+    entries += [mass_found(last)] if mass else []
     notes = [mass] if mass else []
     notes += [_basis(found)]
     return {
@@ -80,14 +79,16 @@ def bench_document(found: BenchDiagnosis | CannotTell) -> dict[str, Any]:
 
 
 def _cannot_tell(found: CannotTell) -> dict[str, Any]:
-    rows = [_entry(name, "not_identifiable", found.reason) for name in catalogue()]
+    """Every effect untold, and what `identify` says that runs contradict."""
+    solved = found.identified.solved
+    contradicted = [one for one in (group_sentence(solved), wires_sentence(solved)) if one]
     return {
         "format": FORMAT,
-        "candidates": rows,
+        "candidates": [told_entry(n, "not_identifiable", found.reason) for n in catalogue()],
         "accepted": [],
         "ladder": [],
-        "unexplained": {"present": False, "signature": "", "evidence": {}},
-        "notes": [f"cannot tell: {found.reason}"],
+        "unexplained": NOTHING_LEFT,
+        "notes": [f"cannot tell: {found.reason}", *contradicted],
     }
 
 
@@ -96,11 +97,6 @@ def _basis(found: BenchDiagnosis) -> str:
     if held_out:
         return "before and after are of runs with role validate, over their second halves"
     return "no run has role validate: before and after are of each run left out in turn"
-
-
-def _entry(effect: str, verdict: str, reason: str, **more: Any) -> dict[str, Any]:
-    empty = {"delta_bic": None, "held_out_gain": None, "probability": None, "confounded_with": []}
-    return {"effect": effect, "verdict": verdict, **empty, "reason": reason, **more}
 
 
 def _candidates(found: BenchDiagnosis, mass: bool) -> list[dict[str, Any]]:
@@ -116,17 +112,14 @@ def _candidates(found: BenchDiagnosis, mass: bool) -> list[dict[str, Any]]:
     for one in found.removed:
         before = told.get(one.effect)
         if before is None or before["verdict"] == "rejected":
-            told[one.effect] = _removed(one)
+            told[one.effect] = removed_entry(one)
     rows = list(told.values())
-    rows += [_entry(n, "not_identifiable", NOT_ON_BENCHES) for n in catalogue() if n not in told]
+    rows += [
+        told_entry(n, "not_identifiable", NOT_ON_BENCHES) for n in catalogue() if n not in told
+    ]
     if mass:
-        reason = "runs with a known mass contradict the declared one"
-        rows.append(_entry(MASS, "confounded", reason, **_group(MASS_GROUP, WEIGH)))
+        rows.append(mass_candidate(found.solved))
     return rows
-
-
-def _group(others: Sequence[str], experiment: str) -> dict[str, Any]:
-    return {"confounded_with": list(others), "experiment": experiment}
 
 
 def _others(cause: Cause, others: Sequence[Cause]) -> tuple[str, ...]:
@@ -151,7 +144,7 @@ def _word(word: Word) -> dict[str, Any]:
     others = _others(word.cause, word.others) if word.verdict != "rejected" else ()
     verdict = "confounded" if others else word.verdict
     verdict = "accepted" if word.verdict == "confounded" and not others else verdict
-    entry = _entry(
+    entry = told_entry(
         word.cause.effect,
         verdict,
         word.reason,
@@ -163,24 +156,10 @@ def _word(word: Word) -> dict[str, Any]:
         entry["part"] = word.cause.part
     if others:
         common = word.cause.block == COMMON
-        entry |= _group(others, CLAMPS if common else experiment_of((word.cause.effect, *others)))
+        entry |= group_entry(
+            others, CLAMPS if common else experiment_of((word.cause.effect, *others))
+        )
     return entry
-
-
-def _removed(one: Removed) -> dict[str, Any]:
-    wires = one.effect == LENGTHS and one.accepted
-    verdict = "accepted" if one.accepted else "rejected"
-    entry = _entry(
-        one.effect,
-        "confounded" if wires else verdict,
-        one.reason,
-        delta_bic=one.delta_bic,
-        held_out_gain=one.gain,
-        probability=one.chance,
-    )
-    if one.part and wires:
-        entry["part"] = one.part
-    return entry | (_group(SAME[LENGTHS], EXCHANGE) if wires else {})
 
 
 def _accepted(found: BenchDiagnosis, cause: Cause) -> dict[str, Any]:
@@ -192,7 +171,7 @@ def _accepted(found: BenchDiagnosis, cause: Cause) -> dict[str, Any]:
         for word in one.words
         if word.cause == cause and word.verdict != "rejected"
     )
-    return _found(
+    return found_entry(
         cause.effect,
         cause.part,
         [one.name for one in cause.parameters],
@@ -200,33 +179,6 @@ def _accepted(found: BenchDiagnosis, cause: Cause) -> dict[str, Any]:
         stds.tolist(),
         _others(cause, word.others),
     )
-
-
-def _granted(one: Removed) -> dict[str, Any]:
-    others = SAME[LENGTHS] if one.effect == LENGTHS else ()
-    return _found(one.effect, one.part, one.names, one.values, one.stds, others)
-
-
-def _mass_entry(solved: Solved) -> dict[str, Any]:
-    solution = solved.solution
-    value, std = solution.value("platform")[:1], solution.std("platform")[:1]
-    return _found(MASS, "", ["mass_kg"], value.tolist(), std.tolist(), MASS_GROUP)
-
-
-def _found(
-    effect: str,
-    part: str,
-    names: Sequence[str],
-    values: Sequence[float],
-    stds: Sequence[float],
-    others: Sequence[str],
-) -> dict[str, Any]:
-    rows = [
-        {"name": name, "value": float(value), "std": float(std) if np.isfinite(std) else None}
-        for name, value, std in zip(names, values, stds, strict=True)
-    ]
-    entry = {"effect": effect, "parameters": rows, "confounded_with": list(others)}
-    return entry | ({"part": part} if part else {})
 
 
 def _parameters(solved: Solved) -> list[dict[str, Any]]:

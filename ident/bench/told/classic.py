@@ -17,7 +17,7 @@ from freeswing.cdpr.simulation.parallel_wires import bending
 from freeswing.ident.bench.modal import SQUARE
 from freeswing.ident.bench.objects import moments
 from freeswing.ident.bench.solve import Solved
-from freeswing.ident.bench.swing import COMMON, IZZ, BenchSwing
+from freeswing.ident.bench.swing import IZZ, BenchSwing
 
 LEAST_PERIODS = 2.0  # in a record: a sine and a slow drift look alike on fewer
 BESIDE = "centre of mass beside the middle: yaw moves it along"
@@ -142,25 +142,6 @@ def _reasons(
     )
 
 
-def group_sentence(solved: Solved) -> str:
-    """What runs with a known mass cannot tell apart, where they contradict the robot file."""
-    mass = solved.mass
-    if mass is None or not mass.contradicted:
-        return ""
-    ratio = mass.fitted_kg / mass.declared_kg
-    share, half = 100.0 * (ratio - 1.0), 50.0 * (ratio - 1.0)
-    return (
-        f"the payload runs contradict mass_kg = {mass.declared_kg:.4g} kg: they give "
-        f"{mass.fitted_kg:.4g} +- {mass.fitted_std_kg:.2g} kg ({share:+.1f} %), which is used. "
-        "They cannot tell apart what is off: the platform's mass; R_top R_bottom / L of the wires "
-        f"({share:+.1f} %); the payloads' distances from the middle ({-half:+.1f} %) or "
-        f"masses ({-share:+.1f} %); the frame rate ({half:+.1f} %). Weigh the "
-        "platform with all that hangs on it: if the declared mass was wrong, all is settled; if it "
-        "was right, measure R and L again, then film a clock. The platform's inertia in kg m2 is "
-        "the same for the first two, and goes with the payloads' masses and squared distances"
-    )
-
-
 def leaning_sentence(classic: Sequence[ClassicRun], sway_seen: bool) -> str:
     """A warning where Izz leans on a centre of mass that no calibrated column has shown.
 
@@ -176,27 +157,6 @@ def leaning_sentence(classic: Sequence[ClassicRun], sway_seen: bool) -> str:
         "beside the middle, which only shows in sway, and no run measures x or y itself: how an "
         "uncalibrated signal or yaw alone answers to sway may look the same. Give com_m, measure x "
         "and y in one run, or hang the platform so that its wires share the weight alike"
-    )
-
-
-def wires_sentence(solved: Solved) -> str:
-    """By what sway contradicts the stated wire lengths, and what that does to Izz."""
-    wires = solved.wires
-    if wires is None or not wires.contradicted:
-        return ""
-    found = solved.solution
-    answer = found.covariance_of("platform", COMMON)[IZZ, -1]
-    change = answer / found.covariance_of(COMMON)[0, 0] * wires.shift_m
-    share = 100.0 * change / float(found.value("platform")[IZZ])
-    longer = "longer" if wires.shift_m > 0.0 else "shorter"
-    rate = -50.0 * wires.shift_m / wires.stated_m
-    return (
-        f"the sway contradicts cable_lengths_m: its period is that of wires "
-        f"{1e3 * abs(wires.shift_m):.1f} +- {1e3 * wires.std_m:.1f} mm {longer} than the "
-        f"stated {wires.stated_m:.4g} m (+- {1e3 * wires.allowed_m:.2g} mm on the average), and "
-        f"sway's are used: Izz changes by {share:+.2f} % with them, all of which its deviation "
-        f"counts. Ends, knots and hooks that do not bend shorten wires; a frame rate off by "
-        f"{rate:+.2f} % would look the same. Measure the wires from bend to bend, and film a clock"
     )
 
 

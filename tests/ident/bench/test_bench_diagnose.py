@@ -134,19 +134,26 @@ def test_what_remains_stands_out_of_white_noise(power: float, present: bool) -> 
     assert ("chi is off by" in told["signature"]) == present
 
 
-@pytest.mark.parametrize(("kind", "runs", "told"), [
-    (ModalSwing, 9, "nothing but uncalibrated channels"), (BenchSwing, 2, "2 run(s)"),
-])  # fmt: skip
-def test_runs_that_tell_no_effect_from_another(monkeypatch, kind, runs, told) -> None:
+@pytest.mark.parametrize("kind", [ModalSwing, BenchSwing])
+def test_two_runs_tell_no_effect_from_another(monkeypatch, kind) -> None:
     """Every effect is `not_identifiable`, with the reason and what to add."""
-    swings = tuple(object.__new__(kind) for _ in range(runs))
-    identified = SimpleNamespace(solved=SimpleNamespace(swings=swings))
+    swings = tuple(object.__new__(kind) for _ in range(2))
+    identified = SimpleNamespace(solved=SimpleNamespace(swings=swings, mass=None, wires=None))
     monkeypatch.setattr(diagnose, "identify_bench", lambda *_: identified)
     nothing: Any = None
     document = bench_document(diagnose.diagnose_bench(nothing, nothing))
     assert {row["verdict"] for row in document["candidates"]} == {"not_identifiable"}
     assert len(document["candidates"]) == len(catalogue())
-    assert told in document["notes"][0], document["notes"]
+    assert "2 run(s)" in document["notes"][0], document["notes"]
+
+
+def test_channels_alone_go_their_own_way(monkeypatch) -> None:
+    swings = tuple(object.__new__(ModalSwing) for _ in range(3))
+    identified = SimpleNamespace(solved=SimpleNamespace(swings=swings))
+    monkeypatch.setattr(diagnose, "identify_bench", lambda *_: identified)
+    monkeypatch.setattr(diagnose, "by_channels", lambda one: ("by channels", one))
+    nothing: Any = None
+    assert diagnose.diagnose_bench(nothing, nothing) == ("by channels", identified)
 
 
 def test_three_runs_are_diagnosed_and_what_fails_is_said(monkeypatch) -> None:

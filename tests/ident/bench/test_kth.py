@@ -51,3 +51,20 @@ def test_positions_as_unknown_loads(tmp_path: Path) -> None:
             row = rows["Izz_P_kg_m2"]
             within += abs(row["value"] - expected) < 2.0 * row["std"]
     assert within >= 4, bodies
+
+
+def test_what_is_off_is_told_with_what_it_cannot_be(tmp_path: Path) -> None:
+    """Wires by sway; some per cent that are neither wires nor clock; no more than that."""
+    shutil.copytree(REAL / "kth-trifilar", tmp_path / "kth")
+    assert main(["diagnose", str(tmp_path / "kth"), "--results", str(tmp_path / "out")]) == 0
+    told = json.loads((tmp_path / "out" / "diagnosis.json").read_text(encoding="utf-8"))
+    (wires,) = told["accepted"]
+    assert (wires["effect"], wires["part"]) == ("cable_length_bias", "all wires"), wires
+    assert -0.0115 < wires["parameters"][0]["value"] < -0.0075, wires
+    assert "frame_rate" in wires["confounded_with"], wires
+    rows = {row["effect"]: row for row in told["candidates"]}
+    assert {"wire_radii", "payload_distance", "centre_of_mass"} <= set(
+        rows["platform_mass"]["confounded_with"]
+    )
+    assert not {"frame_rate", "wire_length"} & set(rows["platform_mass"]["confounded_with"])
+    assert rows["gravity_tilt"]["verdict"] == "not_identifiable", rows["gravity_tilt"]
