@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-SURVEY_STD_M = 0.0003
+from freeswing.calib.tags.base_tags import SURVEY_STD_M
 
 
 @dataclass(frozen=True, slots=True)

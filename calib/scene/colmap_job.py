@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from freeswing.calib.exchange.colmap import HALF_PIXEL
+from freeswing.calib.scene.stills import LEAST_IMAGES
 from freeswing.cdpr.system.arrays import save_arrays
 from freeswing.cdpr.system.lifeline import tie_to
 
@@ -29,7 +30,6 @@ _PAIRS_AT_ONCE = 40
 _IMAGES_AT_ONCE = 8
 _SEED = 0
 _MODELS = 3
-_LEAST_IMAGES = 3
 
 
 def main(folder: Path) -> None:
@@ -127,7 +127,7 @@ def _mapping() -> Any:
     options = pycolmap.IncrementalPipelineOptions()
     options.random_seed = options.mapper.random_seed = options.triangulation.random_seed = _SEED
     options.max_num_models = _MODELS
-    options.min_model_size = _LEAST_IMAGES
+    options.min_model_size = LEAST_IMAGES
     options.extract_colors = False
     return options
 

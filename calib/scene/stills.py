@@ -19,7 +19,7 @@ from freeswing.cdpr.files.documents import InputError
 
 MOST_WALK = 80  # images of a walk: pairs grow with the square, 80 take minutes
 _FRAMES_AT_REST = 9  # averaged: noise falls to a third
-_LEAST_WALK = 3  # fewer tie no camera to another
+LEAST_IMAGES = 3  # of a walk, and of a map: two give a point no third sighting to test it
 _AT_REST_GREY = 12.0  # mean of a whole image: noise makes 5
 
 
@@ -77,9 +77,9 @@ def walk_stills(path: Path) -> tuple[Still, ...]:
     for _, label, image in _shares(recording):
         name = Path(label).stem if recording.images else label.rpartition(" ")[2].zfill(6)
         found.append(Still(name, image, walk=True))
-    if len(found) < _LEAST_WALK:
+    if len(found) < LEAST_IMAGES:
         raise InputError(
-            f"{path}: {len(found)} images, need {_LEAST_WALK}: walk with the camera to where it "
+            f"{path}: {len(found)} images, need {LEAST_IMAGES}: walk with the camera to where it "
             "sees what each camera of the rig sees, and take 20 to 60 stills on the way"
         )
     return tuple(found)

@@ -18,8 +18,8 @@ Array = NDArray[np.float64]
 
 BLACK, CONTRAST, BLUR = 8, 9, 10
 LEAST_BLUR = 0.289  # of the pixel's own square, in px
-MOST_BLUR = 6.0
-LEAST_ERROR = 0.02  # of the contrast: in a clean image every edge pixel would be an outlier
+MOST_BLUR = 6.0  # px; wider ones take tags of 80 px and more, and are no picture to measure in
+LEAST_ERROR = 0.02  # of the contrast, what print lacks: else a clean image is all outliers
 MOST_FREE_PASSES = 25  # sharp small tags settle slowly, others in four to six
 FIRST_BLACK, FIRST_CONTRAST = 40.0, 160.0  # where nothing is predicted
 LEAST_CONTRAST = 10.0
@@ -36,7 +36,8 @@ EDGE_LOST = 0.5  # after a longer one other pixels are near the edges
 OUTLYING = 0.02
 """Where more of the pixels than this lie beyond four noise levels (6e-5 do by chance), part of the
 tag is covered: weights then have to settle too, at the residuals' own noise level."""
-COVERED_SETTLED, COVERED_SCALE = 0.02, 1.3
+COVERED_SETTLED = 0.02  # blur widths: what weights then still move is a tenth of a deviation
+COVERED_SCALE = 1.3  # from one noise level to the next
 
 
 class Search(NamedTuple):
@@ -100,6 +101,17 @@ def _outlying(seen: Pass, scale: float) -> float:
     for k in range(min(int(16.0 * scale) + 1, 255), 256):
         count += seen.histogram[k]
     return count / seen.pixels
+
+
+@kernel
+def _settled_at(seen: Pass, scale: float, next_scale: float, at_last: bool) -> float:
+    """Step along the edges, in blur widths, from which a fit is done; 0: in no case."""
+    if _outlying(seen, next_scale) <= OUTLYING:
+        return EDGE_SETTLED
+    if scale >= COVERED_SCALE * next_scale:
+        return 0.0
+    # Pixels that go in and out of the law keep some prints of a sharp film from settling.
+    return EDGE_SETTLED if at_last else COVERED_SETTLED
 
 
 @kernel
@@ -251,12 +263,7 @@ def _fit_edges(tag: TagImage, h: Array, state: Array, search: Search, scale: flo
         blur = state[2]
         across, down = blur_at_centre(h, tag.ray_step, half, blur)
         step = _step(seen, h, state, half, search.noise, True)
-        settled = EDGE_SETTLED
-        if _outlying(seen, step.scale) > OUTLYING:
-            steady = scale < COVERED_SCALE * step.scale
-            # Pixels that go in and out of the law keep some prints of a sharp film from settling.
-            settled = EDGE_SETTLED if turn == MOST_EDGE_PASSES - 1 else COVERED_SETTLED
-            settled = settled if steady else 0.0
+        settled = _settled_at(seen, scale, step.scale, turn == MOST_EDGE_PASSES - 1)
         h, state, scale, noise = step.h, step.state, step.scale, math.sqrt(step.variance)
         blurs = step.size * half / min(across, down)
         last = max(step.size, 0.5 * step.blur_step)

@@ -18,14 +18,14 @@ RAYS, COVARIANCE = slice(0, 8), slice(8, 72)
 BLACK, CONTRAST, BLUR, NOISE, EXPLAINED, PIXELS = range(72, 78)
 NUMBERS = 78
 
-_LEAST_EXPLAINED = 0.75
-_LEAST_CONTRAST = 8.0
+_LEAST_EXPLAINED = 0.75  # of the grey values: what is no tag, or half of one, explains less
+_LEAST_CONTRAST = 8.0  # grey levels: a fainter print cannot be told from shadows
 _LEAST_BOX_PX = 8
 # Cells narrower than 2.8 blur widths see their neighbours' neighbours, which the kernel leaves
 # out: rendered tags at grazing angles then show a bias of about 0.05 px a blur width.
 _CROWDED_CELLS = 2.8
 _CROWDED_PX = 0.05
-_TOO_CROWDED = 1.2
+_TOO_CROWDED = 1.2  # blur widths narrower than that: neighbours blend, the bias grows faster
 
 
 @kernel

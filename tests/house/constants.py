@@ -2,7 +2,7 @@
 
 `named_numbers` finds them all: names in capitals at the top of a module whose value is a number or
 arithmetic of numbers. Those of `tests/house/wreck.py` are held from both sides; the others stand in
-`undeciding.toml`, in groups that share one reason. What decides and is not yet held is owed there.
+`undeciding.toml`, in groups that share one reason.
 """
 
 from __future__ import annotations
@@ -61,14 +61,11 @@ def named_numbers() -> list[Place]:
     ]
 
 
-def listed() -> tuple[dict[str, Undeciding], tuple[Place, ...]]:
-    """What decides nothing, by its group's word, and what is owed."""
+def listed() -> dict[str, Undeciding]:
+    """What decides nothing, by its group's word."""
     with LISTS.open("rb") as file:
         groups = tomllib.load(file)
-    owed = groups.pop("owed")
-    return {
-        word: Undeciding(group.pop("reason"), _places(group)) for word, group in groups.items()
-    }, _places({name: value for name, value in owed.items() if name != "reason"})
+    return {word: Undeciding(group.pop("reason"), _places(group)) for word, group in groups.items()}
 
 
 def _places(files: dict[str, list[str]]) -> tuple[Place, ...]:

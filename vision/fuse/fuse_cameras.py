@@ -17,7 +17,13 @@ from numpy.typing import NDArray
 from freeswing.vision.fuse.blocks import blocks
 from freeswing.vision.fuse.linearised_block import block_poses, lags, seen_by
 from freeswing.vision.fuse.noise import Noise, NoiseSums, alike, whitened
-from freeswing.vision.fuse.pose_kernels import Linear, Solved, linearise_block, solve_block
+from freeswing.vision.fuse.pose_kernels import (
+    ROBUST_LIMIT,
+    Linear,
+    Solved,
+    linearise_block,
+    solve_block,
+)
 from freeswing.vision.fuse.poses import Poses, motion_of_poses, unknown_poses
 from freeswing.vision.fuse.run_views import Block, CameraViews
 from freeswing.vision.look.watched_target import Watch
@@ -26,7 +32,6 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 LEAST_FLOOR_PX = 0.002  # no lens is known better
-_ROBUST_LIMIT = 9.0
 _REJECT = 16.0  # mean square: four deviations in all numbers of a sighting
 _MOTION_PASSES = 4
 
@@ -96,7 +101,7 @@ def fuse(
             begun = block_poses(start_rotation, start_position, can, poses.motions[span])
             seen = seen_by(block, views, lags(block, instants_s[span]))
             white = whitened(block, noise, views)
-            found = solve_block(seen, white, begun, free_of(watch), _ROBUST_LIMIT)
+            found = solve_block(seen, white, begun, free_of(watch), ROBUST_LIMIT)
             linear = linearise_block(seen, found.poses(begun.motions))
             good = account.add(block, views, found, linear)
             if parts is not None:

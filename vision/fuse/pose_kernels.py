@@ -27,6 +27,7 @@ Mask = NDArray[np.bool_]
 
 # As np.int64 where they are arguments: a literal would be compiled for once more.
 MOST_PASSES = 12
+ROBUST_LIMIT = 9.0  # mean square of a sighting: beyond three deviations it weighs less
 
 
 class Seen(NamedTuple):

@@ -20,7 +20,7 @@ from freeswing.vision.look.single_pose import Pose
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-LEAST_MARKERS = 4
+LEAST_MARKERS = 4  # three have up to four poses
 MOST_SPOTS = 8  # what has to be tried grows with their cube
 _NEAR_M = 0.004  # a spot may be this far from its marker, by a pose from three others
 _EXACT_M = 0.0015  # and this far by the pose from all

@@ -20,8 +20,8 @@ _MOST_SIDE_PX = 80  # larger than any marker at arm's length: a lamp or a window
 _LEAST_CONTRAST = 30.0  # grey levels: above noise and texture of dim footage
 _LEAST_FILL = 0.55  # of its box: a disc fills 0.79, a sickle of glare half
 _LEAST_ASPECT = 0.5  # short over long side: a disc seen from 60 degrees
-_EDGE_LEVEL = 0.35
-_CENTRE_FLOOR_PX = 0.01
+_EDGE_LEVEL = 0.35  # of the peak: weights start a third up the edge
+_CENTRE_FLOOR_PX = 0.01  # no ball is rounder or more evenly lit
 
 
 @dataclass(frozen=True, slots=True)

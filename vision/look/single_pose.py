@@ -9,14 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.cdpr.rotation import exp_rotation
-from freeswing.vision.fuse.pose_kernels import carried_on
+from freeswing.vision.fuse.pose_kernels import ROBUST_LIMIT, carried_on
 from freeswing.vision.look.near_kernels import refined_pose
 
 Array = NDArray[np.float64]
 Pose = tuple[Array, Array]
 """R_camera_platform (3, 3) and the platform's origin in the camera frame (3,)."""
 
-_ROBUST_LIMIT = 25.0
 _PASSES = 10
 
 
@@ -62,7 +61,7 @@ def refine_pose(start: Pose, points: Array, rays: Array, covariances: Array) -> 
         np.ascontiguousarray(covariances),
         start[0],
         start[1],
-        _ROBUST_LIMIT,
+        ROBUST_LIMIT,
         _PASSES,
     )
     return (rotation, position) if known else None

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.calib.camera.camera import Camera
+from freeswing.calib.tags.base_tags import SURVEY_STD_M
 from freeswing.cdpr.rotation import exp_rotation
 from freeswing.vision.fuse.blocks import blocks
 from freeswing.vision.fuse.fuse_cameras import Fit, fuse
@@ -31,7 +32,6 @@ from freeswing.vision.rig.rig_kernels import (
     RigSightings,
     add_rig_equations,
 )
-from freeswing.vision.settings import SURVEY_STD_M
 
 Array = NDArray[np.float64]
 

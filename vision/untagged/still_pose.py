@@ -9,12 +9,16 @@ from numpy.typing import NDArray
 
 from freeswing.calib.camera.camera import Camera
 from freeswing.cdpr.rotation import transform
-from freeswing.vision.fuse.pose_kernels import MOST_PASSES, MovingPose, Seen, solve_instant
+from freeswing.vision.fuse.pose_kernels import (
+    MOST_PASSES,
+    ROBUST_LIMIT,
+    MovingPose,
+    Seen,
+    solve_instant,
+)
 from freeswing.vision.look.single_pose import whitening
 
 Array = NDArray[np.float64]
-
-_ROBUST_LIMIT = 9.0
 
 
 def still_pose(
@@ -59,6 +63,6 @@ def still_pose(
     )
     begun = MovingPose(start[:3, :3].copy(), start[:3, 3].copy(), np.zeros(12))
     solved = solve_instant(
-        seen, whitening(covariance), 0, begun, 6, _ROBUST_LIMIT, np.int64(MOST_PASSES)
+        seen, whitening(covariance), 0, begun, 6, ROBUST_LIMIT, np.int64(MOST_PASSES)
     )
     return transform(solved.rotation, solved.position), solved.covariance

@@ -9,9 +9,14 @@ import numpy as np
 import pytest
 
 from freeswing.cdpr.measured.pose_errors import TERMS, PoseErrors
+from freeswing.cdpr.rotation import transform
+from freeswing.vision.fuse import tag_layout
 from freeswing.vision.fuse.calibration_share import RunShare, common_errors
 from freeswing.vision.fuse.fuse_cameras import _Account
 from freeswing.vision.fuse.noise import Noise
+from freeswing.vision.fuse.pose_kernels import Linear
+from freeswing.vision.untagged.still_pose import still_pose
+from tests.vision.scenes import camera
 
 FOCAL = 100.0
 
@@ -59,3 +64,38 @@ def test_causes_that_are_a_trace_of_the_variance_are_dropped(share, modes) -> No
     (found,) = common_errors([RunShare(np.ones(6), errors, np.ones(TERMS))])
     assert found is not None
     assert len(found.modes) == modes
+
+
+def pulled_m(off_sigmas: float) -> float:
+    """How far one of 200 points, off by so many deviations of a pixel, pulls the pose with it."""
+    view, home = camera(), transform(np.eye(3), np.zeros(3))
+    points = np.random.default_rng(4).uniform(-0.3, 0.3, (200, 3))
+    pixels = view.project(view.to_camera(points))
+    pixels[0, 0] += off_sigmas
+    found, _ = still_pose([view], np.zeros(200, np.int64), points, pixels, np.ones(200), home)
+    return float(np.linalg.norm(found[:3, 3]))
+
+
+def test_a_sighting_beyond_three_deviations_weighs_less() -> None:
+    """In root mean square of its two numbers, with the square of what is beyond."""
+    for rms, weight in ((2.85, 1.0), (3.15, (3.0 / 3.15) ** 4)):
+        share = pulled_m(np.sqrt(2.0) * rms) / pulled_m(1.0) / (np.sqrt(2.0) * rms)
+        assert share == pytest.approx(weight, rel=0.05), f"{rms}: {share:.3f}"
+
+
+@pytest.mark.parametrize(("off", "counts"), [(19.5, True), (20.5, False)])
+def test_a_tag_twenty_deviations_off_says_nothing_of_the_layout(monkeypatch, off, counts) -> None:
+    """One of two tags seen by two cameras."""
+    n = 4
+    jacobians = np.random.default_rng(2).standard_normal((n, 8, 6))
+    residuals = np.zeros((n, 8))
+    residuals[0] = off
+    linear = Linear(residuals, jacobians, np.zeros((n, 8)), np.ones((n, 4, 3)))
+    monkeypatch.setattr(tag_layout, "linearised", lambda *_: linear)
+    monkeypatch.setattr(tag_layout, "whitened", lambda *_: np.tile(np.eye(8), (n, 1, 1)))
+    block = stub(starts=np.array([0, n]), first=0, things=np.array([0, 1, 0, 1]))
+    poses = stub(known=np.ones(1, bool), rotations=np.eye(3)[None])
+    watch = stub(tags=range(2), tag_corners_m=np.random.default_rng(3).random((2, 4, 3)))
+    normal, right = np.zeros((12, 12)), np.zeros(12)
+    tag_layout._add_block(block, poses, [], watch, Noise.unknown(1), normal, right)
+    assert bool(np.abs(right).max() > 1e-9) == counts

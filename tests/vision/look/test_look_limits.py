@@ -1,13 +1,17 @@
 """What is looked at and what is passed over: both sides of each limit."""
+# Stubs stand for what is not looked at.
+# pyright: reportArgumentType=false
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
+from freeswing.calib.tags.tag_patterns import tag_cells
 from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.measured.target import Marker, Tag, Target
 from freeswing.cdpr.rotation import exp_rotation
+from freeswing.vision.look.detect import TagFinder
 from freeswing.vision.look.follow import COVERED, NOTHING, OVEREXPOSED, Follower
 from freeswing.vision.look.label import _acquire, _match, _nearest, _Tracker
 from freeswing.vision.look.marker_pose import pose_from_one_view
@@ -74,6 +78,38 @@ def test_spots_with_a_margin_to_the_border(left, found) -> None:
 def test_spots_near_where_they_are_expected(away_px, found) -> None:
     near = np.array([[304.0 + away_px, 204.0]])
     assert blobs_of(np.ones((9, 9)), near=near) == found
+
+
+def ball(glare: float = 0.0) -> np.ndarray:
+    """A disc of radius 10, and light beside it of so much of the disc's."""
+    image = dark()
+    v, u = np.indices(image.shape)
+    image[198:203, 311:313] = round(40 + 180 * glare)
+    image[np.hypot(u - 300, v - 200) < 10.5] = 220
+    return image
+
+
+@pytest.mark.parametrize(("glare", "moved"), [(0.33, False), (0.37, True)])
+def test_what_is_faint_beside_a_ball_has_no_say(glare, moved) -> None:
+    clean, beside = find_blobs(ball(), VIEW), find_blobs(ball(glare), VIEW)
+    assert len(clean) == len(beside) == 1
+    assert bool(np.abs(clean[0].centre_px - beside[0].centre_px).max() > 1e-6) == moved
+
+
+def test_no_ball_is_found_better_than_to_a_hundredth_of_a_pixel() -> None:
+    (blob,) = find_blobs(ball(), VIEW)
+    std = VIEW.focal_px.mean() * np.sqrt(np.diag(blob.covariance))
+    np.testing.assert_allclose(std, 0.01, rtol=0.15)
+
+
+@pytest.mark.parametrize(("cell_px", "found"), [(7, 0), (8, 1)])
+def test_tags_by_their_share_of_the_picture(cell_px, found) -> None:
+    """Around them it is two hundredths: 220 and 252 of 12000 px."""
+    tag = np.pad(tag_cells("tag36h11", 3), 2, constant_values=1)
+    tag = np.kron(tag, np.ones((cell_px, cell_px)))
+    picture = np.full((len(tag) + 20, 12_000), 200, np.uint8)
+    picture[10 : 10 + len(tag), 3000 : 3000 + len(tag)] = 40 + 160 * tag
+    assert len(TagFinder.of([("tag36h11", 3)]).quads(picture)) == found
 
 
 def watch_of(places: np.ndarray) -> Watch:

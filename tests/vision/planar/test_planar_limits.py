@@ -71,6 +71,13 @@ def test_a_wrong_size_leaves_the_turning_point_in_its_direction(cosine, said) ->
     assert size_said(0.2, 2.0, cosine) == said
 
 
+@pytest.mark.parametrize(
+    ("times", "said"), [(1.55, False), (1.65, True), (0.64, False), (0.61, True)]
+)
+def test_a_size_that_no_printer_is_off_by(times, said) -> None:
+    assert size_said(0.2, times, 1.0) == said
+
+
 FAST = np.resize([1.0, -1.0], 1000)
 SLOWER = np.resize([1.0, 1.0, -1.0, -1.0], 1000)
 SLOWEST = np.resize(np.repeat([1.0, -1.0], 4), 1000)

@@ -18,7 +18,8 @@ from freeswing.cdpr.rotation import transform
 from freeswing.vision.untagged import rest_model as room
 from freeswing.vision.untagged.features import matched
 from freeswing.vision.untagged.look import PointMatcher, agreed_pose
-from freeswing.vision.untagged.refine import PointSums
+from freeswing.vision.untagged.refine import PointSums, at_home
+from freeswing.vision.untagged.still_pose import still_pose
 from tests.vision.untagged import boxes
 
 STATED = np.array([[0.0, 0.0, 0.0], [0.2, 0.0, 0.0], [0.0, 0.3, 0.0], [0.1, 0.1, 0.2]])
@@ -158,3 +159,23 @@ def test_a_click_is_good_to_half_a_pixel(tmp_path) -> None:
     path.write_text("camera,point,u_px,v_px\ncam0,A,1,2\n")
     found = room._clicks(Untagged(tmp_path, path, (Marker("A", np.zeros(3)),)), ["cam0"])
     assert found["cam0", "A"][2] == pytest.approx(0.5, rel=0.15)
+
+
+def test_a_feature_at_rest_is_good_to_a_third_of_a_pixel() -> None:
+    """Beside what features of one pixel say of the frame."""
+    cameras, rest = boxes.cameras(), transform(np.eye(3), boxes.HOME_M)
+    points = np.random.default_rng(1).uniform(-0.1, 0.1, (50, 3))
+    pixels = [camera.project(camera.to_camera(points + boxes.HOME_M)) for camera in cameras]
+    every = np.arange(50)
+    seen = {
+        camera.name: (every, SimpleNamespace(pixels=one))
+        for camera, one in zip(cameras, pixels, strict=True)
+    }
+    model = SimpleNamespace(seen=seen, T_base_rest=rest)
+    _, covariance = at_home(points, model, cameras)
+    count = len(cameras)
+    camera_of, every = np.repeat(np.arange(count), 50), np.tile(points, (count, 1))
+    _, alone = still_pose(
+        cameras, camera_of, every, np.concatenate(pixels), np.ones(50 * count), rest
+    )
+    assert np.sqrt(np.trace(covariance) / np.trace(alone)) == pytest.approx(0.3, rel=0.15)
