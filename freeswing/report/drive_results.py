@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-from freeswing.cdpr.files.documents import load_json
-from freeswing.results.driven.estimates import AGAIN, LARGEST_BYTES, DriveResult, read_drive
+from freeswing.cdpr.files.documents import InputError
+from freeswing.results.driven.estimates import AGAIN, DriveResult, read_drive
+from freeswing.results.driven.motion import DriveMotion
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,11 +16,11 @@ class DriveResults:
 
     Attributes:
         estimates: `drive.json`.
-        motion: `drive_motion.json`, empty where it is not there.
+        motion: `drive_motion.json`, or None where it is not there.
     """
 
     estimates: DriveResult
-    motion: Mapping[str, Any]
+    motion: DriveMotion | None
 
 
 def read_drive_results(results: Path) -> DriveResults | None:
@@ -34,7 +33,9 @@ def read_drive_results(results: Path) -> DriveResults | None:
     if not path.is_file():
         return None
     estimates = read_drive(path, DriveResult)
-    motion: dict[str, Any] = {}
-    if beside.is_file():
-        motion = load_json(beside, "freeswing-drive-motion/1", LARGEST_BYTES, AGAIN)
+    if not beside.is_file():
+        return DriveResults(estimates, None)
+    motion = read_drive(beside, DriveMotion)
+    if run := motion.uneven():
+        raise InputError(f"{beside}: run {run}: rows and columns are not as many; {AGAIN}")
     return DriveResults(estimates, motion)

@@ -97,7 +97,8 @@ def identify(
     document = drive_document(file.name, session, found, effects, held)
     result = file.results / "drive.json"
     write_json(result, document.to_json())
-    write_json(file.results / "drive_motion.json", drive_motion_document(file.name, session, found))
+    motion = drive_motion_document(file.name, session, found)
+    write_json(file.results / "drive_motion.json", motion.to_json())
     _say(document, console)
     console.say(str(result))
     console.show_file(result)

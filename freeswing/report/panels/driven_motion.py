@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -24,8 +24,7 @@ from freeswing.report.figures import (
 )
 from freeswing.report.material import Material
 from freeswing.report.words import plain
-
-Table = Mapping[str, Any]
+from freeswing.results.driven.motion import DriveMotion, DrivenRunMotion
 
 MOST_RUNS = 3  # whose curves are shown, held-out ones first
 
@@ -38,37 +37,37 @@ class DrivenMotion:
 
     def values(self, material: Material) -> dict[str, Any] | None:
         """Pictures a run; None where no driven robot's motion was written."""
-        if material.drive is None or not material.drive.motion:
+        if material.drive is None or material.drive.motion is None:
             return None
         found = material.drive.motion
-        runs = sorted(found["runs"], key=_rank)[:MOST_RUNS]
+        runs = sorted(found.runs, key=_rank)[:MOST_RUNS]
         return {
-            "runs": [(str(one["run"]), _angles(one, found), _tensions(one, found)) for one in runs],
+            "runs": [(one.run, _angles(one, found), _tensions(one, found)) for one in runs],
             "shown": len(runs),
-            "total": len(found["runs"]),
+            "total": len(found.runs),
             "spectrum": _spectrum(found),
             "left": _left(material),
             "evidence": _evidence(material),
         }
 
 
-def _rank(one: Table) -> tuple[bool, int]:
+def _rank(one: DrivenRunMotion) -> tuple[bool, int]:
     """Held-out runs first, the longest first."""
-    return (one["role"] != "validate", -round(1e3 * one["times_s"][-1]))
+    return (one.role != "validate", -round(1e3 * (one.times_s[-1] or 0.0)))
 
 
-def _angles(one: Table, found: Table) -> Markup:
+def _angles(one: DrivenRunMotion, found: DriveMotion) -> Markup:
     """Fig. 7: of every motor the angle measured, predicted, and what is left of it."""
-    times = np.array(one["times_s"], dtype=float)
-    angles = np.array(one["angles_rad"], dtype=float)
-    gaps = np.array(one["residuals_rad"], dtype=float)
+    times = np.array(one.times_s, dtype=float)
+    angles = np.array(one.angles_rad, dtype=float)
+    gaps = np.array(one.residuals_rad, dtype=float)
     draws = [
-        _motor(str(name), times, angles[:, k], gaps[:, k], found["angle_noise_rad"])
-        for k, name in enumerate(found["cables"])
+        _motor(name, times, angles[:, k], gaps[:, k], found.angle_noise_rad)
+        for k, name in enumerate(found.cables)
     ]
     legend = [("measured", MEASURED, "-"), ("predicted", AFTER, "--"), ("residual", BEFORE, "-")]
     caption = (
-        f"Run {one['run']}: motor angles in rad, and below predicted less measured in mrad "
+        f"Run {one.run}: motor angles in rad, and below predicted less measured in mrad "
         "(the paper's Fig. 7)."
     )
     return figures([*draws, key(legend)], 2.2, caption)
@@ -91,13 +90,13 @@ def _motor(
     return draw
 
 
-def _tensions(one: Table, found: Table) -> Markup:
+def _tensions(one: DrivenRunMotion, found: DriveMotion) -> Markup:
     """Tensions with their limits, and how long each cable would have pushed."""
-    times = np.array(one["times_s"], dtype=float)
-    tensions = np.array(one["tensions_N"], dtype=float)
-    shares = np.array(one["slack_share"], dtype=float)
-    limits = np.unique(np.array(found["tension_limits_N"], dtype=float))
-    names = [str(name) for name in found["cables"]]
+    times = np.array(one.times_s, dtype=float)
+    tensions = np.array(one.tensions_N, dtype=float)
+    shares = np.array(one.slack_share, dtype=float)
+    limits = np.unique(np.array(found.tension_limits_N, dtype=float))
+    names = found.cables
 
     def draw(sheet: Figure) -> None:
         axes = sheet.subplots()
@@ -119,7 +118,7 @@ def _tensions(one: Table, found: Table) -> Markup:
         axes.set_ylabel("slack (% of samples)")
 
     caption = (
-        f"Run {one['run']}: tensions by the estimate, limits dotted, and the share of samples at "
+        f"Run {one.run}: tensions by the estimate, limits dotted, and the share of samples at "
         "which each cable would have had to push."
     )
     return figures([draw, bars], 2.6, caption, 4.4)
@@ -130,18 +129,18 @@ def _line(k: int) -> dict[str, Any]:
     return {"color": SERIES[k % len(SERIES)], "ls": DASHES[k // len(SERIES) % len(DASHES)]}
 
 
-def _spectrum(found: Table) -> Markup:
+def _spectrum(found: DriveMotion) -> Markup:
     """Power of the residuals against that of counts alone."""
 
     def draw(sheet: Figure) -> None:
         axes = roomy(sheet)
         top = 1.0
-        for k, one in enumerate(found["runs"]):
-            rates = np.array(one["spectrum_hz"], dtype=float)
+        for k, one in enumerate(found.runs):
+            rates = np.array(one.spectrum_hz, dtype=float)
             top = max(top, float(rates.max(initial=1.0)))
-            power = np.array(one["spectrum_rad2_hz"], dtype=float)
-            axes.plot(rates, power, lw=0.9, label=str(one["run"]), **_line(k))
-        white = found["angle_noise_rad"] ** 2 / top
+            power = np.array(one.spectrum_rad2_hz, dtype=float)
+            axes.plot(rates, power, lw=0.9, label=one.run, **_line(k))
+        white = found.angle_noise_rad**2 / top
         axes.axhline(white, color=INK, lw=0.8, ls=":", label="counts alone")
         axes.set_xscale("log")
         axes.set_yscale("log")

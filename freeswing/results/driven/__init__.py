@@ -1,1 +1,1 @@
-"""Results of driven robots: what `drive.json` holds, and what makes it and their diagnosis."""
+"""Results of driven robots: drive.json, its curves, and what makes them and their diagnosis."""

@@ -18,6 +18,7 @@ from freeswing.ident.drive.kinematics import Kinematics
 from freeswing.ident.drive.ramps import Ramp
 from freeswing.ident.drive.run_problem import DriveRun
 from freeswing.results.driven.estimates import DriveResult
+from freeswing.results.driven.motion import DriveMotion
 
 Array = NDArray[np.float64]
 
@@ -90,16 +91,18 @@ def drive_document(
 
 def drive_motion_document(
     name: str, session: DriveSession, found: DriveIdentification
-) -> dict[str, Any]:
+) -> DriveMotion:
     """What the page shows of every run: angles, residuals and their spectrum, tensions."""
-    return {
-        "format": "freeswing-drive-motion/1",
-        "session": name,
-        "cables": [cable.name for cable in session.model.robot.cables],
-        "tension_limits_N": session.model.drive.tension_limits_N,
-        "angle_noise_rad": session.noise.angle_std_rad,
-        "runs": [_shown(fit) for fit in found.fits],
-    }
+    return DriveMotion.from_json(
+        {
+            "format": DriveMotion.format(),
+            "session": name,
+            "cables": [cable.name for cable in session.model.robot.cables],
+            "tension_limits_N": session.model.drive.tension_limits_N,
+            "angle_noise_rad": session.noise.angle_std_rad,
+            "runs": [_shown(fit) for fit in found.fits],
+        }
+    )
 
 
 def _shown(fit: RunFit) -> dict[str, Any]:

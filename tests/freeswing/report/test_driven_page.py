@@ -11,6 +11,7 @@ import pytest
 from freeswing.report.material import read_material
 from freeswing.report.page import driven_panels, render_page
 from freeswing.report.words import unit_of
+from freeswing.results.driven.motion import DriveMotion
 
 
 def parameter(name, value, std, **more):
@@ -127,6 +128,29 @@ def test_everything_that_was_found_is_on_the_page(results):
     ):
         assert text in page, text
     assert page.index("Run val_b: motor angles") < page.index("Run ident: motor angles")
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "says"),
+    [
+        ("angles_rad", [[0.1, 0.2]], "run val_b: rows and columns are not as many"),
+        ("slack_share", [0.0], "run val_b: rows and columns are not as many"),
+        ("times_s", [], "run val_b: rows and columns are not as many"),
+        ("tensions_N", "none", "tensions_N"),
+    ],
+)
+def test_curves_that_do_not_fit_are_named(results, key, value, says):
+    table = motion()
+    table["runs"][0][key] = value
+    (results / "drive_motion.json").write_text(json.dumps(table))
+    said = read_material("made", results).absent["drive"]
+    assert "drive_motion.json: " in said
+    assert says in said
+    assert said.endswith("delete it and run freeswing drive again")
+
+
+def test_curves_are_written_as_they_are_read():
+    assert DriveMotion.from_json(motion()).to_json() == {"session": "", **motion()}
 
 
 def test_without_curves_and_a_diagnosis_the_numbers_stand_alone(results):
