@@ -13,7 +13,7 @@ from freeswing.ident.diagnose.leave_one_out import Score
 from freeswing.ident.diagnose.lengths.wrong_places import WrongPlace
 from freeswing.ident.diagnose.model_probabilities import LeftOut, Rival, model_probabilities
 from freeswing.ident.diagnose.refit import Refit, plausible
-from freeswing.ident.diagnose.screen import value_priors
+from freeswing.ident.diagnose.screen import known_rows
 from freeswing.ident.diagnose.spectrum import independent_numbers
 from freeswing.ident.diagnose.variants import effect_of, inside, variants
 from freeswing.ident.likelihood.joint_problem import INERTIA_UNIT
@@ -242,23 +242,21 @@ def included(fewer: Refit, more: Refit, key: str, noise_scales: Array) -> float:
 def _rival(one: Refit, key: str) -> Rival:
     """A fit as a model among others; `key` is what it has beside the current one, or "".
 
-    What each run has for itself was eliminated with the run's state: it counts by its number.
+    What each run has for itself was eliminated with the run's state: it counts by what the run's
+    own data leave of it. Errors that all poses share are unknowns of every model.
     """
     fit = one.fit
     columns = np.flatnonzero(fit.free)
     linear = one.evidence.subset(columns)
-    known = value_priors(fit.model, fit.values)[:, np.append(columns, -1)]
+    known = known_rows(fit.model, fit.values, fit.samples)[:, one.evidence.columns(columns)]
     size = len(INERTIA_UNIT)
     body = np.zeros((size, known.shape[1]))
     body[:, :size] = np.diag(1.0 / (INERTIA_RANGE * INERTIA_UNIT))
     prior = np.vstack([body, known[np.abs(known[:, :-1]).sum(axis=1) > 0.0]])
     tries = 0.0
     if key:
-        parameters = effect_named(effect_of(key)).parameters(fit.model.robot)
-        own = sum(p.per_run for p in parameters)
-        tries = 0.5 * own * float(np.log(one.evidence.counts).sum())
-        tries += float(np.log(len(variants(fit.model.robot, effect_of(key)))))
-    return Rival(linear.triangles, prior, int(bool(key)), tries)
+        tries = float(np.log(len(variants(fit.model.robot, effect_of(key)))))
+    return Rival(linear.triangles, prior, int(bool(key)), tries, linear.own)
 
 
 def delta_bic(current: Refit, one: Score, key: str, colour: float) -> float:

@@ -5,21 +5,29 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from freeswing.cdpr.effects import Recorded, catalogue, effect_named
 from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.model.equations import build_model
-from freeswing.cdpr.robot import INERTIA_NAMES, POSE_COORDINATES, Array, Robot
+from freeswing.cdpr.robot import POSE_COORDINATES, Array, Robot
 from freeswing.ident.diagnose.answer.cut import cut, settled_places, with_settled
 from freeswing.ident.diagnose.answer.decay import swing_decay
-from freeswing.ident.diagnose.answer.deviations import honest_covariance
-from freeswing.ident.diagnose.answer.entries import accepted_entries, candidate_entry, claims
+from freeswing.ident.diagnose.answer.deviations import chance_of_nothing, honest_covariance
+from freeswing.ident.diagnose.answer.entries import (
+    accepted_entries,
+    candidate_entry,
+    claims,
+    moved_percent,
+    parameter_entries,
+    share_closed,
+)
 from freeswing.ident.diagnose.answer.last_words import last_words, rivals_of
 from freeswing.ident.diagnose.answer.next_swing import NextSwing, next_swing
 from freeswing.ident.diagnose.decision import (
+    ACCEPTED,
     LEAST_SHARE_EXPLAINED,
     Candidate,
     excess_of,
@@ -35,8 +43,7 @@ from freeswing.ident.diagnose.variants import effect_of
 from freeswing.ident.fidim.fidim_stage import fidim_estimates
 from freeswing.ident.identify import session_notes
 from freeswing.ident.judge.prediction import Stage
-from freeswing.ident.likelihood.blocks import INERTIA
-from freeswing.ident.likelihood.calibration_modes import with_calibration
+from freeswing.ident.likelihood.calibration_modes import amplitudes_of, with_calibration
 from freeswing.ident.likelihood.fit_swings import LikelihoodFit, fit
 from freeswing.ident.likelihood.inertia_starts import likelihood_starts
 from freeswing.ident.likelihood.raw_samples import UNIT_NOISE_M, UNIT_NOISE_RAD
@@ -106,10 +113,10 @@ class Diagnosis:
             "candidates": [candidate_entry(one, self.apart) for one in self.candidates],
             "accepted": accepted_entries(self.final, self.spreads[1], self.groups),
             "after": after,
-            "share_closed": _share_closed(before, after),
-            "parameters_before": _parameters(self.first, self.spreads[0]),
-            "parameters_after": _parameters(self.final, self.spreads[1]),
-            "parameters_moved_percent": _moved(self.first, self.final),
+            "share_closed": share_closed(before, after),
+            "parameters_before": parameter_entries(self.first, self.spreads[0]),
+            "parameters_after": parameter_entries(self.final, self.spreads[1]),
+            "parameters_moved_percent": moved_percent(self.first, self.final),
             "ladder": [
                 {"effects": list(rung.effects), **rung.held_out.document()} for rung in self.ladder
             ],
@@ -179,31 +186,65 @@ def diagnose(
     last = search.run(base)
     notes = [*session_notes(model, prepared, {}), *dropped]
     notes += search.kinematics.notes() if search.kinematics else []
-    last, accepted, rest = _believed(search, last, fitted, full, notes)
-    last, held = _kept_from_dynamics(last, rest, noise_scales, notes)
-    begun = search.rounds[0].before if accepted else last
     _tell(progress, "before and after", 0.85)
-    with search.pool_of() as pool:
-        ladder = _ladder(search, accepted, last, checked, free, pool)
-        # Held-out runs are on their way in other processes.
-        final = _with_own_noise(last.fit, fitted)
-        first = _with_own_noise(begun.fit, fitted) if accepted else final
-        rungs = ladder()
-    spread = honest_covariance(final, last)
-    groups = rivals_of(accepted)
+    found = _told(search, last, fitted, checked, free, notes)
+    accepted = found.accepted
     _tell(progress, "diagnosis", 1.0)
     return Diagnosis(
-        rungs,
-        last_words(search.rounds, last.effects if accepted else (), barred, names),
-        groups,
-        first,
-        final,
-        (honest_covariance(first, begun), with_settled(spread, last) if held else spread),
+        found.ladder,
+        last_words(search.rounds, found.last.effects if accepted else (), barred, names),
+        rivals_of(accepted),
+        found.first,
+        found.final,
+        found.spreads,
         search.kinematics,
-        rest,
+        found.rest,
         tuple(notes),
         _next_swings(accepted, noise_scales),
     )
+
+
+class _Told(NamedTuple):
+    """What is left of a search once its answer was doubted."""
+
+    last: Refit
+    accepted: list[Round]
+    rest: Unexplained
+    ladder: tuple[Rung, ...]
+    first: LikelihoodFit
+    final: LikelihoodFit
+    spreads: tuple[Array, Array]
+
+
+def _told(
+    search: Search,
+    last: Refit,
+    fitted: list[PreparedRun],
+    checked: list[PreparedRun],
+    free: tuple[str, ...] | None,
+    notes: list[str],
+) -> _Told:
+    """The rounds that count, with the fits that are told of them; `notes` say what does not."""
+    full, scales = free is None, search.noise_scales
+    last, accepted, rest = _believed(search, last, fitted, full, notes)
+    with search.pool_of() as pool:
+        while True:
+            last, held = _kept_from_dynamics(last, rest, scales, notes)
+            ladder = _ladder(search, accepted, last, checked, free, pool)
+            # Held-out runs are on their way in other processes.
+            final = _with_own_noise(last.fit)
+            spread = honest_covariance(final, last)
+            doubt = _doubt(accepted, final, spread)
+            if not doubt:
+                break
+            notes.append(doubt)
+            last = accepted.pop().before
+            rest = unexplained(last.fit, fitted, full, scales)
+        begun = search.rounds[0].before if accepted else last
+        first = _with_own_noise(begun.fit) if accepted else final
+        rungs = ladder()
+    spreads = honest_covariance(first, begun), with_settled(spread, last) if held else spread
+    return _Told(last, accepted, rest, rungs, first, final, spreads)
 
 
 def _kept_from_dynamics(
@@ -212,8 +253,23 @@ def _kept_from_dynamics(
     """The last fit, its geometry held at what lengths say where forces are still missing."""
     if not len(settled_places(last.fit.model)) or not _follows_badly(last, rest):
         return last, False
-    notes.append(KEPT_FROM_DYNAMICS)
+    if KEPT_FROM_DYNAMICS not in notes:
+        notes.append(KEPT_FROM_DYNAMICS)
     return cut(last, noise_scales), True
+
+
+def _doubt(accepted: list[Round], final: LikelihoodFit, spread: Array) -> str:
+    """Why the effect accepted last is not to be believed as it would be told, or nothing."""
+    if not accepted or accepted[-1].by_lengths:
+        return ""
+    name = effect_of(accepted[-1].decision.key)
+    chance = chance_of_nothing(final, spread, name)
+    if chance < 1.0 - ACCEPTED:
+        return ""
+    return (
+        f"{name} would be told with values that are nothing within their deviations (chance "
+        f"{chance:.2f}): not accepted"
+    )
 
 
 def _next_swings(accepted: list[Round], noise_scales: Array) -> dict[str, NextSwing]:
@@ -296,13 +352,13 @@ def _barred(runs: list[PreparedRun], robot: Robot) -> dict[str, str]:
     return {name: words for name, words in why.items() if words}
 
 
-def _with_own_noise(found: LikelihoodFit, runs: list[PreparedRun]) -> LikelihoodFit:
+def _with_own_noise(found: LikelihoodFit) -> LikelihoodFit:
     """The same fit for honest standard deviations.
 
     Its scales follow its residuals, and errors of the cameras' calibration are unknowns too.
     """
     own = fit(found.model, found.samples, found.state, found.free, grow=False)
-    return with_calibration(own, [run.run.pose_errors for run in runs]).fit
+    return with_calibration(own).fit
 
 
 def _share_explained(search: Search, last: Refit) -> float:
@@ -319,38 +375,15 @@ def _ladder(
     free: tuple[str, ...] | None,
     pool: Executor | None,
 ) -> Callable[[], tuple[Rung, ...]]:
-    """Each model of the search on the validation runs, as recorded: begun, and waited for later.
+    """Each model of the search on the validation runs: begun, and waited for later.
 
-    The search fits without the errors of the cameras' calibration: its inertias belong to samples
-    that still contain them.
+    Its inertia belongs to samples without the errors that its fit has found in all runs.
     """
     stages: list[Refit] = [search.rounds[0].before, *(one.after for one in accepted[:-1])]
     stages += [last] if accepted else []
-    models = [Stage(one.model, one.inertia, one.values) for one in (stage.fit for stage in stages)]
+    fits = [stage.fit for stage in stages]
+    models = [Stage(one.model, one.inertia, one.values, amplitudes_of(one.samples)) for one in fits]
     seen = held_out(models, runs, free, pool)
     return lambda: tuple(
         Rung(claims(one.effects), held) for one, held in zip(stages, seen(), strict=True)
     )
-
-
-def _parameters(found: LikelihoodFit, covariance: Array) -> list[dict[str, Any]]:
-    stds = np.sqrt(np.diag(covariance))[found.unknowns.place(INERTIA)]
-    return [
-        {"name": name, "value": float(value), "std": float(std)}
-        for name, value, std in zip(INERTIA_NAMES, found.inertia, stds, strict=True)
-    ]
-
-
-def _moved(first: LikelihoodFit, final: LikelihoodFit) -> dict[str, float]:
-    size = np.maximum(np.abs(first.inertia), 1e-12)
-    change = 100.0 * (final.inertia - first.inertia) / size
-    return dict(zip(INERTIA_NAMES, change.tolist(), strict=True))
-
-
-def _share_closed(before: dict[str, Any], after: dict[str, Any]) -> float | None:
-    """Share of the distance between the prediction error and the noise floor that was closed."""
-    error, floor = before["prediction_rmse_m"], before["noise_floor_m"]
-    left = after["prediction_rmse_m"]
-    if error is None or left is None or error <= floor:
-        return None
-    return float((error - left) / (error - floor))

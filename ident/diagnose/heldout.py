@@ -4,20 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
 from freeswing.cdpr.effects import effect_named
 from freeswing.cdpr.model.batch import evaluate
-from freeswing.cdpr.model.equations import Model
+from freeswing.cdpr.model.equations import Model, build_model
 from freeswing.cdpr.model.free_motion import free_basis
 from freeswing.cdpr.model.regressor import SwingMotion
 from freeswing.cdpr.robot import POSE_COORDINATES, Array
 from freeswing.ident.diagnose.answer.averages import median, rms
 from freeswing.ident.judge.prediction import Prediction, Stage, predict_in_turn
-from freeswing.ident.signals.prepare import PreparedRun
+from freeswing.ident.likelihood.calibration_modes import freed
+from freeswing.ident.signals.derivatives import SignalSettings
+from freeswing.ident.signals.prepare import PreparedRun, prepare_runs
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,11 +121,28 @@ def _one(
     stages: Sequence[Stage], run: PreparedRun, free: tuple[str, ...] | None
 ) -> tuple[HeldOutRun, ...]:
     """One run under each of the models."""
-    predictions = predict_in_turn(stages, run, free)
+    seen = [_as_seen(stage, run) for stage in stages]
+    predictions = predict_in_turn(stages, seen, free)
     return tuple(
-        _confronted(stage, prediction, run, free)
-        for stage, prediction in zip(stages, predictions, strict=True)
+        _confronted(stage, prediction, one, free)
+        for stage, prediction, one in zip(stages, predictions, seen, strict=True)
     )
+
+
+def _as_seen(stage: Stage, run: PreparedRun) -> PreparedRun:
+    """The run without the errors that all runs share, as far as a model's fit has found them.
+
+    As recorded where its full poses were not measured.
+    """
+    if stage.freed is None:
+        return run
+    swing, robot = freed(run.run, stage.freed), stage.model.robot
+    if swing is run.run:
+        return run
+    names = None if run.free_signals is None else run.free_signals.coordinates
+    told = replace(robot, free_coordinates=robot.free_coordinates if names is None else names)
+    again = prepare_runs([swing], build_model(told), SignalSettings())
+    return next(iter(again.runs), run)
 
 
 def _confronted(

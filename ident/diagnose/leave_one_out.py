@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from freeswing.cdpr.robot import Array
+from freeswing.ident.diagnose.own_values import OwnValues
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,20 +25,30 @@ class Evidence:
             no unknown can explain.
         counts: how many numbers each run measured, less its own unknowns, (r,).
         prior_rows: weak priors, (q, p + 1).
+        common: how many of the unknowns, the last ones, are amplitudes of errors that the poses of
+            all runs share: they stand beside every set of the others.
+        own: what the runs know of effect values that each has for itself; None where none has.
     """
 
     runs: tuple[str, ...]
     triangles: Array
     counts: Array
     prior_rows: Array
+    common: int = 0
+    own: OwnValues | None = None
+
+    def columns(self, chosen: np.ndarray) -> np.ndarray:
+        """Those of chosen unknowns, of what stands beside every set, and of the residual."""
+        size = self.triangles.shape[-1]
+        return np.concatenate([chosen, np.arange(size - 1 - self.common, size)])
 
     def subset(self, columns: np.ndarray) -> Evidence:
         """The evidence with only some of the unknowns, the others held."""
-        kept = np.append(columns, self.triangles.shape[-1] - 1)
+        kept = self.columns(columns)
         reduced = np.asarray(np.linalg.qr(self.triangles[:, :, kept], mode="r"))
         prior = self.prior_rows[:, kept]
         prior = prior[np.abs(prior[:, :-1]).sum(axis=1) > 0]
-        return Evidence(self.runs, reduced, self.counts, prior)
+        return Evidence(self.runs, reduced, self.counts, prior, self.common, self.own)
 
 
 @dataclass(frozen=True, slots=True)

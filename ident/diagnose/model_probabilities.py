@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from freeswing.cdpr.robot import Array
+from freeswing.ident.diagnose.own_values import OwnValues
 
 DRAWS = 200
 SEED = 20201
@@ -34,12 +35,14 @@ class Rival:
             unknown is without one.
         effects: how many it has: each is improbable beforehand.
         tries: logarithm of how many ways of it were tried beside this one.
+        own: what the runs know of effect values that each has for itself; None where none has.
     """
 
     triangles: Array
     prior: Array
     effects: int
     tries: float = 0.0
+    own: OwnValues | None = None
 
 
 def log_predictive(squares: Array, counts: Array, independent: Array) -> Array:
@@ -127,7 +130,8 @@ def log_evidence(rival: Rival, counts: Array, independent: Array, weights: Array
     found = np.sum(weights * log_predictive(squares, counts, independent), axis=1)
     away = np.einsum("da,ab,db->d", change, prior, change)
     wider = np.linalg.slogdet(curves[:, :-1, :-1])[1] - np.linalg.slogdet(prior[:-1, :-1])[1]
-    return found - 0.5 * away - 0.5 * wider
+    beside = 0.0 if rival.own is None else rival.own.log_evidence(weights)
+    return found - 0.5 * away - 0.5 * wider + beside
 
 
 def model_probabilities(rivals: Sequence[Rival], counts: Array, independent: Array) -> Array:

@@ -17,6 +17,7 @@ from freeswing.ident.diagnose.screen import screen
 from freeswing.ident.diagnose.spectrum import residual_powers
 from freeswing.ident.diagnose.variants import effect_of, inside
 from freeswing.ident.likelihood.blocks import each_run, effect_blocks, free_of
+from freeswing.ident.likelihood.calibration_modes import CONVERGED, freed_samples
 from freeswing.ident.likelihood.fit_swings import LikelihoodFit, correlation_factor, fit
 from freeswing.ident.likelihood.joint_problem import State, with_motions
 from freeswing.ident.likelihood.unknowns import Unknowns
@@ -151,7 +152,25 @@ def polished(found: LikelihoodFit, noise_scales: Array) -> Refit:
     state = replace(found.state, scales=noise_scales * np.sqrt(colour))
     samples = tempered(found, noise_scales)
     exact = fit(found.model, samples, state, found.free, estimate_scales=False, grow=False)
-    return rescored(exact, noise_scales, colour)
+    return freed(rescored(exact, noise_scales, colour), noise_scales, colour)
+
+
+def freed(one: Refit, noise_scales: Array, colour: float) -> Refit:
+    """A fit again, the errors that the poses of all runs share taken out as far as it asks.
+
+    Args:
+        one: the fit, scored: these errors are among the unknowns of its evidence.
+        noise_scales: of metres and radians, (2,).
+        colour: of the residual.
+    """
+    found, common = one.fit, one.evidence.common
+    step = one.score.change[len(one.score.change) - common :]
+    if np.abs(step).max(initial=0.0) < CONVERGED:
+        return one
+    state = replace(found.state, scales=noise_scales * np.sqrt(colour))
+    samples = freed_samples(found, step)
+    exact = fit(found.model, samples, state, found.free, estimate_scales=False, grow=False)
+    return rescored(exact, noise_scales, colour_of(exact, noise_scales))
 
 
 def without(found: LikelihoodFit, name: str, noise_scales: Array) -> Refit:

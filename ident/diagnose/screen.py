@@ -7,15 +7,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from freeswing.cdpr.effects import effect_named
 from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.model.known_values import prior_whitener, with_effects
 from freeswing.cdpr.robot import Array
+from freeswing.cdpr.simulation.free_swing import Motion
 from freeswing.cdpr.simulation.sensitivity import linearise
 from freeswing.ident.diagnose.leave_one_out import Evidence
+from freeswing.ident.diagnose.own_values import OwnValues
 from freeswing.ident.diagnose.variants import effect_of, inside
 from freeswing.ident.likelihood.blocks import columns_of, shared_size
+from freeswing.ident.likelihood.calibration_modes import amplitudes_of, motion_shifts
 from freeswing.ident.likelihood.fit_swings import LikelihoodFit
-from freeswing.ident.likelihood.run_residuals import Samples, reduce_run
+from freeswing.ident.likelihood.run_residuals import Reduced, Samples, reduce_run
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +29,7 @@ class Screen:
     Attributes:
         model: with the accepted effects first and the candidates after them.
         values: at which it was linearised: fitted ones, and candidates that do nothing.
-        evidence: over [9 inertia values; effect values].
+        evidence: over [9 inertia values; effect values; amplitudes of errors that runs share].
         base: columns of inertia and of what is estimated of the accepted effects.
         columns: of each candidate's amplitudes, but those that each run has for itself: these
             are eliminated with its state.
@@ -68,23 +72,29 @@ def screen(
         for k in range(where.start, where.stop):
             parameter = model.parameters[k]
             values[k] = (shapes or {}).get(name, {}).get(parameter.name, parameter.start)
-    triangles, counts = [], []
+    common = len(amplitudes_of(fit.samples))
+    triangles, counts, own = [], [], []
     for motion, samples in zip(fit.motions, fit.samples, strict=True):
         mine = values.copy()
         mine[: len(fit.values)] = motion.values
+        moved = replace(motion, model=model, values=mine)
         reduced = reduce_run(
-            linearise(replace(motion, model=model, values=mine), len(values) - len(fit.values)),
+            linearise(moved, len(values) - len(fit.values)),
             samples,
             noise_scales,
+            motion_shifts(motion, samples, common) if common else None,
             prior_weight=float(np.sqrt(colour)),
         )
         triangles.append(reduced.rows)
+        own.append(_own_values(reduced, moved, colour))
         counts.append(_count(samples, model))
     evidence = Evidence(
         tuple(s.name for s in fit.samples),
         np.array(triangles),
         np.array(counts, dtype=np.float64),
-        np.sqrt(colour) * value_priors(model, values),
+        np.sqrt(colour) * known_rows(model, values, fit.samples),
+        common,
+        _together(own),
     )
     columns = {key: _amplitudes(model, key) for key in keys}
     return Screen(model, values, evidence, np.flatnonzero(fit.free), columns)
@@ -101,6 +111,67 @@ def _amplitudes(model: Model, key: str) -> np.ndarray:
     parameters = model.parameters[model.place_of(effect_of(key))]
     offsets = [k for k, p in enumerate(parameters) if chosen[k] and p.amplitude and not p.per_run]
     return columns_of(model, effect_of(key))[offsets]
+
+
+def _own_values(reduced: Reduced, motion: Motion, colour: float) -> OwnValues | None:
+    """What a run knows of effect values that it has for itself, but for nuisances; None: none.
+
+    Its triangle over its own unknowns holds what is known of them beforehand, raised by the
+    residual's colour as everything that is weighed against its samples.
+    """
+    model = motion.model
+    nuisances = {
+        k
+        for name in model.effects
+        if effect_named(name).nuisance
+        for k in range(len(model.names))[model.place_of(name)]
+    }
+    first = len(reduced.own) - len(reduced.own_columns)
+    mine = [i for i, k in enumerate(model.own_values) if k not in nuisances]
+    if not mine:
+        return None
+    places = model.own_values[mine]
+    rows = reduced.own[first:, first : first + len(reduced.own_columns)]
+    # Nuisances come first in a model: what is left of them was eliminated by the rows above.
+    kept, right = rows[np.ix_(mine, mine)], reduced.own[first:, -1][mine]
+    size = np.array([model.parameters[k].prior_std for k in places])
+    known = kept.T @ kept * np.outer(size, size) / colour
+    values = motion.values[places] - np.linalg.solve(kept, right)
+    return OwnValues(known - np.eye(len(mine)), known @ (values / size))
+
+
+def _together(runs: Sequence[OwnValues | None]) -> OwnValues | None:
+    known = [one for one in runs if one is not None]
+    if not known:
+        return None
+    return OwnValues(*(np.array(part) for part in zip(*known, strict=True)))
+
+
+def known_rows(model: Model, values: Array, samples: Sequence[Samples]) -> Array:
+    """What is known of all shared unknowns beforehand, as rows of unit deviation.
+
+    Args:
+        model: with its effects.
+        values: of these, (k,).
+        samples: of the runs: what errors they share, and what is taken out of these.
+
+    Returns:
+        Over [9 inertia values; effect values; amplitudes; residual], (k + r, 9 + k + r + 1).
+
+    Source:
+        Bishop 2006, Pattern Recognition and Machine Learning, sec. 3.3: a Gaussian prior as
+        rows.
+    """
+    of_values, amplitudes = value_priors(model, values), amplitudes_of(samples)
+    count = len(amplitudes)
+    beside = np.zeros((len(of_values), count))
+    of_errors = np.zeros((count, of_values.shape[1] - 1))
+    return np.vstack(
+        [
+            np.hstack([of_values[:, :-1], beside, of_values[:, -1:]]),
+            np.hstack([of_errors, np.eye(count), amplitudes[:, None]]),
+        ]
+    )
 
 
 def value_priors(model: Model, values: Array) -> Array:

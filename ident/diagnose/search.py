@@ -34,6 +34,7 @@ from freeswing.ident.diagnose.refit import (
     Refit,
     colour_of,
     displaced,
+    freed,
     polished,
     refit,
     rescored,
@@ -95,7 +96,8 @@ class Search:
     def run(self, base: LikelihoodFit) -> Refit:
         """Add effects to a base fit until none passes; the last fit."""
         self._tell("base dynamics", 0.0)
-        current = rescored(base, self.noise_scales, colour_of(base, self.noise_scales))
+        colour = colour_of(base, self.noise_scales)
+        current = freed(rescored(base, self.noise_scales, colour), self.noise_scales, colour)
         current = self._geometry(current)
         with self.pool_of() as self.pool:
             for index in range(MOST_ROUNDS):

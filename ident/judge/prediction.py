@@ -14,7 +14,7 @@ from freeswing.ident.likelihood.blocks import first_unknowns, none_free, state_o
 from freeswing.ident.likelihood.fit_swings import LikelihoodFit, fit
 from freeswing.ident.likelihood.joint_problem import State
 from freeswing.ident.likelihood.run_residuals import Samples, predicted, residuals
-from freeswing.ident.likelihood.session_estimates import started
+from freeswing.ident.likelihood.session_estimates import sampled, started
 from freeswing.ident.signals.band import independent_numbers
 from freeswing.ident.signals.prepare import PreparedRun
 
@@ -95,24 +95,32 @@ class Stage:
         model: the robot with its effects.
         inertia: the nine parameters, (9,).
         values: effect values, (k,); None for those that leave the declared model as it is.
+        freed: amplitudes of the errors that all runs share, taken out of their poses, (r,); None:
+            the poses are as recorded.
     """
 
     model: Model
     inertia: Array
     values: Array | None
+    freed: Array | None = None
 
 
 def predict_in_turn(
-    stages: Sequence[Stage], run: PreparedRun, free: tuple[str, ...] | None
+    stages: Sequence[Stage], runs: Sequence[PreparedRun], free: tuple[str, ...] | None
 ) -> tuple[Prediction | None, ...]:
     """Predictions of a run by models that grew out of each other, as `predict` makes them.
 
     Each begins where the one before it ended, which is nearer than any guess; None where one
     cannot be simulated.
+
+    Args:
+        stages: the models.
+        runs: the run as each of them sees it.
+        free: the coordinates to use of it, or None for full poses.
     """
     found: list[Prediction | None] = []
     before = None
-    for stage in stages:
+    for stage, run in zip(stages, runs, strict=True):
         try:
             before = _fitted_to(stage, run, free, before)
         except (ValueError, np.linalg.LinAlgError):
@@ -130,7 +138,7 @@ def _fitted_to(
     """A run's own unknowns under a model, from where they were under another or from a guess."""
     model = stage.model
     if before is not None:
-        samples = before.samples[0]
+        samples = _thinned(sampled(run, free))
         unknowns = first_unknowns(model, stage.inertia, [samples.payload], stage.values)
         state = _carried(state_of(unknowns, model, before.state.starts, np.ones(2)), model, before)
         found = _near(model, samples, state, _AS_GOOD * _error(before))

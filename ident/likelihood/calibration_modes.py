@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from freeswing.cdpr.measured.pose_errors import TERMS, PoseErrors
+from freeswing.cdpr.measured.pose_errors import PoseErrors
 from freeswing.cdpr.robot import Array
 from freeswing.cdpr.rotation import angle_rate_matrix, matrix_from_angles
 from freeswing.cdpr.simulation.free_swing import Motion
@@ -65,40 +65,25 @@ class Calibrated:
         )
 
 
-def with_calibration(
-    found: LikelihoodFit, errors: Sequence[PoseErrors | None], consistent: bool = False
-) -> Calibrated:
+def with_calibration(found: LikelihoodFit, consistent: bool = False) -> Calibrated:
     """Goes on from a fit with the amplitudes of the calibration's errors as further unknowns.
 
     Args:
-        found: converged, without them.
-        errors: of each of its runs, None where a run's poses have none.
+        found: converged; its samples state the errors and may be free of some already.
         consistent: hold the inertia to what a body can have.
 
     Raises:
         ValueError: when the runs' errors have different numbers of modes, or a refit breaks down.
     """
-    counts = {len(one.modes) for one in errors if one is not None}
-    if len(counts) > 1:
-        raise ValueError(
-            f"calibration errors with {sorted(counts)} modes: all runs must come from one tracking"
-        )
-    if not counts or found.rank < int(found.free.sum()):
+    amplitudes = amplitudes_of(found.samples)
+    if not len(amplitudes) or found.rank < int(found.free.sum()):
         return Calibrated(found, np.zeros(0), np.zeros(0))
-    amplitudes = np.zeros(counts.pop())
-    none = PoseErrors(np.zeros(3), np.eye(3), np.zeros((len(amplitudes), 6, TERMS)))
-    known = [none if one is None else one for one in errors]
     current = found
     for _ in range(ROUNDS):
-        step = _solved(current, known, amplitudes).step
-        amplitudes = amplitudes + step
-        samples = [
-            replace(run, values=run.values - _shifts(motion, run, one)[:, run.columns] @ step)
-            for motion, run, one in zip(current.motions, current.samples, known, strict=True)
-        ]
+        step = _solved(current).step
         current = fit(
             current.model,
-            samples,
+            freed_samples(current, step),
             current.state,
             current.free,
             grow=False,
@@ -106,8 +91,42 @@ def with_calibration(
         )
         if np.abs(step).max() < CONVERGED:
             break
-    joint = _solved(current, known, amplitudes)
+    joint = _solved(current)
+    amplitudes = amplitudes_of(current.samples)
     return Calibrated(replace(current, covariance=joint.shared), amplitudes, joint.spread)
+
+
+def amplitudes_of(samples: Sequence[Samples]) -> Array:
+    """What is taken out of some runs' poses of the errors that they share, (r,).
+
+    Raises:
+        ValueError: when the runs' errors have different numbers of modes.
+    """
+    counts = {len(run.errors.modes) for run in samples if run.errors is not None}
+    if len(counts) > 1:
+        raise ValueError(
+            f"calibration errors with {sorted(counts)} modes: all runs must come from one tracking"
+        )
+    known = next((run.freed for run in samples if run.freed is not None), None)
+    return np.zeros(counts.pop() if counts else 0) if known is None else known
+
+
+def freed_samples(found: LikelihoodFit, step: Array) -> list[Samples]:
+    """A fit's samples with so much more of the errors that they share taken out.
+
+    Args:
+        found: the fit, at whose motions the errors are taken.
+        step: of the amplitudes, (r,).
+    """
+    amplitudes = amplitudes_of(found.samples) + step
+    return [
+        replace(
+            run,
+            values=run.values - motion_shifts(motion, run, len(step))[:, run.columns] @ step,
+            freed=amplitudes,
+        )
+        for motion, run in zip(found.motions, found.samples, strict=True)
+    ]
 
 
 def freed(run: SwingRun, amplitudes: Array) -> SwingRun:
@@ -155,9 +174,22 @@ def mode_shifts(zetas: Array, rates: Array, errors: PoseErrors) -> Array:
     return shifts
 
 
-def _shifts(motion: Motion, samples: Samples, errors: PoseErrors) -> Array:
+def motion_shifts(motion: Motion, samples: Samples, count: int) -> Array:
+    """`mode_shifts` at the samples of a motion, (n, 6, r): none where a run states no errors.
+
+    Args:
+        motion: of the run.
+        samples: its.
+        count: of the modes, r.
+
+    Source:
+        JCGM 100:2008, Guide to the Expression of Uncertainty in Measurement, eq. (13):
+        propagation.
+    """
+    if samples.errors is None:
+        return np.zeros((len(samples.times_s), 6, count))
     zetas, rates, _ = motion.at(samples.times_s)
-    return mode_shifts(zetas, rates, errors)
+    return mode_shifts(zetas, rates, samples.errors)
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,18 +207,19 @@ class _Joint:
     shared: Array
 
 
-def _solved(current: LikelihoodFit, errors: Sequence[PoseErrors], amplitudes: Array) -> _Joint:
+def _solved(current: LikelihoodFit) -> _Joint:
     """All runs, the priors, and amplitudes of unit deviation about zero.
 
     Coloured residuals say less than their number: the samples count by `correlation`.
     """
     problem = Problem(current.model, current.samples, current.free)
+    amplitudes = amplitudes_of(current.samples)
     n_modes, n_shared = len(amplitudes), problem.layout.size
     layout = problem.layout.joined(MODES, n_modes)
     weight = 1.0 / np.sqrt(current.enlargement)
     rows = []
-    for motion, run, one in zip(current.motions, current.samples, errors, strict=True):
-        shifts = _shifts(motion, run, one)
+    for motion, run in zip(current.motions, current.samples, strict=True):
+        shifts = motion_shifts(motion, run, n_modes)
         found = reduce_run(linearise(motion), run, current.scales, shifts).rows[:-1]
         shared = problem.shared_map(len(rows), current.state)
         by_shared = found[:, : len(shared)] @ shared

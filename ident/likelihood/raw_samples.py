@@ -51,6 +51,7 @@ def prepare(run: SwingRun, window_s: tuple[float, float]) -> Samples:
         span_s=(float(times[0]), float(times[-1])),
         payload=run.payload,
         slow=inside.slow,
+        errors=run.pose_errors,
     )
 
 

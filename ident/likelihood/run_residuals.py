@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from freeswing.cdpr.effects import effect_named
+from freeswing.cdpr.measured.pose_errors import PoseErrors
 from freeswing.cdpr.measured.slow_errors import STATED_BY_RUN, SlowErrors
 from freeswing.cdpr.model.batch import evaluate, moved_columns, with_jacobian
 from freeswing.cdpr.model.equations import Model
@@ -43,6 +44,8 @@ class Samples:
         payload: a known mass on the platform, or None.
         temper: factor on its noise, where the model is known to follow it worse than others.
         slow: how far its poses err together, None where that is not known.
+        errors: what causes that all runs share may do to its poses, None where that is not known.
+        freed: amplitudes of these errors that are taken out of its values, (r,); None: none are.
     """
 
     name: str
@@ -57,6 +60,8 @@ class Samples:
     payload: Payload | None = None
     temper: float = 1.0
     slow: SlowErrors | None = None
+    errors: PoseErrors | None = None
+    freed: Array | None = None
 
     def until(self, end_s: float) -> Samples:
         """The samples up to a time."""

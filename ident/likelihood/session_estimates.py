@@ -64,7 +64,7 @@ def ml_estimate(
         ValueError: when no run's samples can give a motion, or the fit breaks down.
     """
     asked = asked or Asked()
-    kept, samples, states, more = begun(model, runs, free, inertia, asked.mass_kg)
+    _, samples, states, more = begun(model, runs, free, inertia, asked.mass_kg)
     payloads = [run.payload for run in samples]
     unknowns = first_unknowns(model, inertia, payloads, mass_kg=asked.mass_kg)
     state = state_of(unknowns, model, states, np.ones(2))
@@ -72,10 +72,11 @@ def ml_estimate(
     if asked.consistent and not is_possible(found.inertia):
         held = _held(found, progress)
         found, cost = held, held.deviance - found.deviance
-    errors = [run.run.pose_errors for run in kept]
-    if not any(errors):  # which are weighed against coloured residuals by themselves
+    if not any(
+        run.errors for run in samples
+    ):  # which are weighed against coloured residuals by themselves
         found = weighed_against_priors(found, consistent=cost is not None)
-    told = with_calibration(found, errors, consistent=cost is not None)
+    told = with_calibration(found, consistent=cost is not None)
     entry = _entry(told.fit, dropped + more, cost)
     return replace(
         entry,
@@ -190,12 +191,21 @@ def started(
     Raises:
         ValueError: when the samples cannot give a state.
     """
+    samples = sampled(run, free)
+    return samples, first_state(model, samples, inertia)
+
+
+def sampled(run: PreparedRun, free: tuple[str, ...] | None) -> Samples:
+    """A run's samples; free coordinates alone come with cable lengths.
+
+    Raises:
+        ValueError: when too few are known.
+    """
     seen = run.run
     if free is not None:
         trajectory = seen.trajectory.select(free)
         seen = replace(seen, trajectory=trajectory, lengths_m=run.lengths_m)
-    samples = prepare(seen, run.signals.window_s)
-    return samples, first_state(model, samples, inertia)
+    return prepare(seen, run.signals.window_s)
 
 
 def _entry(

@@ -275,6 +275,11 @@ HELD = (
         ),
         DECISION,
     ),
+    Held(
+        "ident/diagnose/own_values.py",
+        ("SIZES_A_DECADE", "SMALLEST_SIZE"),
+        "tests/ident/diagnose/test_own_values.py",
+    ),
     Held("ident/diagnose/diagnose.py", ("LARGEST_EXCESS_LEFT",), DECISION),
     Held("ident/diagnose/decision.py", ("INERTIA_RANGE",), RESIDUALS),
     Held("ident/diagnose/removal.py", ("LARGEST_RISE",), RESIDUALS),

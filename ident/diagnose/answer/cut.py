@@ -25,7 +25,8 @@ def settled_places(model: Model) -> np.ndarray:
     """Which of the model's values lengths have settled, places among them, (g,)."""
     own = [p for name in model.effects for p in effect_named(name).parameters(model.robot)]
     pairs = zip(model.parameters, own, strict=True)
-    return np.array([k for k, (known, p) in enumerate(pairs) if known != p], dtype=np.int64)
+    told = [k for k, (known, p) in enumerate(pairs) if (known.low, known.high) != (p.low, p.high)]
+    return np.array(told, dtype=np.int64)
 
 
 def cut(last: Refit, noise_scales: Array) -> Refit:
@@ -59,8 +60,9 @@ def with_settled(covariance: Array, held: Refit) -> Array:
     known = np.linalg.inv(whitener.T @ whitener)[np.ix_(places, places)]
     evidence = held.evidence
     rows = np.vstack([*evidence.triangles, evidence.prior_rows])[:, :-1]
-    free, geometry = np.flatnonzero(held.fit.free[: rows.shape[1]]), held.fit.inertia.size + places
-    moved = -np.linalg.lstsq(rows[:, free], rows[:, geometry], rcond=None)[0]
+    free, geometry = np.flatnonzero(held.fit.free), held.fit.inertia.size + places
+    others = evidence.columns(free)[:-1]
+    moved = -np.linalg.lstsq(rows[:, others], rows[:, geometry], rcond=None)[0][: len(free)]
     together = np.concatenate([free, geometry])
     slopes = np.vstack([moved, np.eye(len(places))])
     wider = covariance.copy()

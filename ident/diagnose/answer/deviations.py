@@ -5,7 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from scipy.special import gammaincc
 
+from freeswing.cdpr.effects import effect_named
 from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.robot import Array
 from freeswing.ident.diagnose.refit import Refit
@@ -30,10 +32,34 @@ def honest_covariance(found: LikelihoodFit, scored: Refit) -> Array:
     stds = found.std
     free = np.flatnonzero(scored.fit.free)
     jackknife = np.zeros(len(stds))
-    jackknife[free] = scored.score.jackknife_std
+    jackknife[free] = scored.score.jackknife_std[: len(free)]
     safe = np.where(stds > 0.0, stds, 1.0)
     factors = np.where(np.isfinite(stds), np.maximum(1.0, jackknife / safe), 1.0)
     return found.covariance * np.outer(factors, factors)
+
+
+def chance_of_nothing(found: LikelihoodFit, covariance: Array, name: str) -> float:
+    """How often an effect that is not there would be found with values as far from nothing.
+
+    Zero for one whose size each run has for itself.
+
+    Args:
+        found: the final fit.
+        covariance: of its shared unknowns as it is told, (p, p).
+        name: of the effect.
+
+    Source:
+        Wald 1943, Tests of statistical hypotheses concerning several parameters: a chi-square of
+        all values together.
+    """
+    block, columns = found.unknowns.block(name), found.unknowns.columns(name)
+    parameters = effect_named(name).parameters(found.model.robot)
+    amounts = np.array([p.amplitude for p in parameters]) & block.mask
+    if not amounts.any():
+        return 0.0
+    away = (block.value - [p.start for p in parameters])[amounts]
+    told = covariance[np.ix_(columns[amounts], columns[amounts])]
+    return float(gammaincc(0.5 * len(away), 0.5 * away @ np.linalg.pinv(told) @ away))
 
 
 def directions(model: Model, places: np.ndarray, covariance: Array) -> list[dict[str, Any]]:

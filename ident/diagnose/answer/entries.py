@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 
 from freeswing.cdpr.effects import effect_named
-from freeswing.cdpr.robot import Array
+from freeswing.cdpr.robot import INERTIA_NAMES, Array
 from freeswing.ident.diagnose.answer.cut import settled_places
 from freeswing.ident.diagnose.answer.deviations import directions
 from freeswing.ident.diagnose.answer.next_swing import NextSwing
 from freeswing.ident.diagnose.decision import Candidate
 from freeswing.ident.diagnose.experiments import separating_experiment
+from freeswing.ident.likelihood.blocks import INERTIA
 from freeswing.ident.likelihood.fit_swings import LikelihoodFit
 
 
@@ -73,3 +74,28 @@ def accepted_entries(
         entry = {"effect": name, "parameters": rows, "confounded_with": group}
         entries.append(entry | ({"directions": seen} if seen else {}))
     return entries
+
+
+def parameter_entries(found: LikelihoodFit, covariance: Array) -> list[dict[str, Any]]:
+    """The inertia of results/diagnosis.json, with a covariance of the shared unknowns, (p, p)."""
+    stds = np.sqrt(np.diag(covariance))[found.unknowns.place(INERTIA)]
+    return [
+        {"name": name, "value": float(value), "std": float(std)}
+        for name, value, std in zip(INERTIA_NAMES, found.inertia, stds, strict=True)
+    ]
+
+
+def moved_percent(first: LikelihoodFit, final: LikelihoodFit) -> dict[str, float]:
+    """By how much each inertial parameter has moved between two fits, per cent of the first."""
+    size = np.maximum(np.abs(first.inertia), 1e-12)
+    change = 100.0 * (final.inertia - first.inertia) / size
+    return dict(zip(INERTIA_NAMES, change.tolist(), strict=True))
+
+
+def share_closed(before: dict[str, Any], after: dict[str, Any]) -> float | None:
+    """Share of the distance between the prediction error and the noise floor that was closed."""
+    error, floor = before["prediction_rmse_m"], before["noise_floor_m"]
+    left = after["prediction_rmse_m"]
+    if error is None or left is None or error <= floor:
+        return None
+    return float((error - left) / (error - floor))

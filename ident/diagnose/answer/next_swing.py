@@ -13,7 +13,8 @@ from freeswing.cdpr.robot import Array
 from freeswing.cdpr.simulation.free_swing import Motion, simulate
 from freeswing.cdpr.simulation.sensitivity import linearise
 from freeswing.ident.diagnose.refit import Refit, colour_of
-from freeswing.ident.diagnose.screen import value_priors
+from freeswing.ident.diagnose.screen import known_rows
+from freeswing.ident.likelihood.calibration_modes import motion_shifts
 from freeswing.ident.likelihood.run_residuals import Samples, predicted, reduce_run
 
 # Times what was recorded: how far from the middle of that run a swing starts, how long it lasts.
@@ -136,15 +137,16 @@ def _recorded(best: Refit, noise_scales: Array, scales: Array) -> Array:
     triangles = best.evidence.triangles * float(noise_scales[0] / scales[0])
     rows = triangles.reshape(-1, triangles.shape[-1]).copy()
     rows[:, -1] = 0.0
-    known = value_priors(best.fit.model, best.fit.values)
+    known = known_rows(best.fit.model, best.fit.values, best.fit.samples)
     known[:, -1] = 0.0
     return np.vstack([rows, known])
 
 
 def _apart(motion: Motion, samples: Samples, scales: Array, recorded: Array, best: Refit) -> float:
     """Deviations that remain where the first model fits what the second one does."""
-    new = reduce_run(linearise(motion), samples, scales).rows
-    columns = np.append(np.flatnonzero(best.fit.free), new.shape[1] - 1)
+    shifts = motion_shifts(motion, samples, best.evidence.common)
+    new = reduce_run(linearise(motion), samples, scales, shifts).rows
+    columns = best.evidence.columns(np.flatnonzero(best.fit.free))
     together = np.vstack([new, recorded])[:, columns]
     triangle = np.asarray(np.linalg.qr(together, mode="r"), dtype=np.float64)
     return float(abs(triangle[-1, -1]))

@@ -134,3 +134,52 @@ def test_one_effect_in_thirty_is_there_beforehand():
     none, one = rivals(1, (3,), 0.0)
     blind = Rival(one.triangles * np.array([0.0, 0.0, 0.0, 1.0]), one.prior, 1)
     assert 28.0 < 1.0 / model_probabilities([none, blind], COUNTS, MANY)[1] < 32.0
+
+
+def rival_of(columns, right, stds, effects):
+    """A model of these columns (RUNS, SAMPLES, n), their unknowns known to `stds` beforehand."""
+    together = np.concatenate([columns, right], axis=2)
+    prior = np.column_stack([np.diag(1.0 / np.asarray(stds)), np.zeros(len(stds))])
+    return Rival(np.asarray(np.linalg.qr(together, mode="r")), prior, effects)
+
+
+def feigned(seed: int, size: float) -> list[list[Rival]]:
+    """An error that all runs share does nearly what an effect does: nothing there, and the effect.
+
+    First for those who know of the error, then for those who do not.
+    """
+    rng = np.random.default_rng(seed)
+    effect = rng.normal(size=(RUNS, SAMPLES, 1)) / np.sqrt(SAMPLES) * 30.0
+    error = effect + 0.05 * rng.normal(size=effect.shape)
+    right = rng.normal(size=(RUNS, SAMPLES, 1)) - size * error
+    both = np.concatenate([effect, error], axis=2)
+    known = [rival_of(error, right, [0.5], 0), rival_of(both, right, [1.0, 0.5], 1)]
+    return [known, [rival_of(effect[..., :0], right, [], 0), rival_of(effect, right, [1.0], 1)]]
+
+
+def chi_square(rival: Rival) -> float:
+    """Of the first unknown, by all runs together."""
+    rows = np.vstack([*rival.triangles, rival.prior])
+    curves = rows[:, :-1].T @ rows[:, :-1]
+    value = np.linalg.solve(curves, rows[:, :-1].T @ rows[:, -1])[0]
+    return float(value**2 / np.linalg.inv(curves)[0, 0])
+
+
+def test_what_an_error_of_all_poses_feigns_is_not_there() -> None:
+    """Those who do not know of the error are sure."""
+    for seed, size in enumerate((0.1, 0.3, 0.6)):
+        known, blind = feigned(seed, size)
+        assert model_probabilities(known, COUNTS, MANY)[1] < 0.1
+        assert model_probabilities(blind, COUNTS, MANY)[1] > 0.95
+
+
+def test_nothing_is_accepted_that_its_own_values_do_not_show() -> None:
+    """Evidence charges an unknown for what it might have been: it never asks less than they do."""
+    told = []
+    for seed in range(60):
+        for fewer, more in (*feigned(seed, 0.01 * seed), rivals(seed, (1,), 0.003 * seed)):
+            chance = model_probabilities([fewer, more], COUNTS, MANY)[1]
+            told.append((chance, chi_square(more)))
+    sure = [square for chance, square in told if chance > 0.95]
+    assert len(sure) > 10, told
+    assert min(sure) > 3.84, told

@@ -28,6 +28,7 @@ def test_effects_are_added_one_after_another(monkeypatch, there, found) -> None:
     monkeypatch.setattr(Search, "_geometry", lambda self, current: current)
     monkeypatch.setattr(module, "colour_of", lambda *_: 1.0)
     monkeypatch.setattr(module, "rescored", lambda base, *_: anything(fit=None, left=base.left))
+    monkeypatch.setattr(module, "freed", lambda one, *_: one)
     monkeypatch.setattr(module, "excess_of", lambda current: 100.0)
     monkeypatch.setattr(module, "too_small", lambda _: False)
     search = Search(np.ones(2), (), workers=1)

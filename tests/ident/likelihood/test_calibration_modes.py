@@ -108,7 +108,7 @@ def test_a_calibration_that_must_be_far_off_is_said(estimates) -> None:
 
 def test_without_known_errors_nothing_changes(estimates) -> None:
     _, fitted = estimates[1]
-    same = with_calibration(fitted, [None] * len(EQUILIBRIA))
+    same = with_calibration(fitted)
     assert same.fit is fitted, "another fit"
     assert len(same.amplitudes) == 0, same.amplitudes
 

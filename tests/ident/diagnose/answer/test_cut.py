@@ -9,6 +9,7 @@ from freeswing.cdpr.model.equations import build_model
 from freeswing.cdpr.model.known_values import with_known
 from freeswing.ident.diagnose.answer import cut as module
 from freeswing.ident.diagnose.answer.cut import cut, settled_places, with_settled
+from freeswing.ident.diagnose.leave_one_out import Evidence
 from tests.oracle.scenes.robots import declared_robot
 
 PLACES = np.arange(3, 6)
@@ -30,7 +31,8 @@ def held(free_geometry):
     rng = np.random.default_rng(0)
     triangles = rng.normal(size=(4, 40, 10 + count))
     fit = SimpleNamespace(model=model, free=free, inertia=np.ones(9), values=np.ones(count))
-    evidence = SimpleNamespace(triangles=triangles, prior_rows=np.zeros((0, 10 + count)))
+    names = ("a", "b", "c", "d")
+    evidence = Evidence(names, triangles, np.full(4, 40.0), np.zeros((0, 10 + count)))
     return SimpleNamespace(fit=fit, evidence=evidence)
 
 

@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 
 from freeswing.cdpr.model.equations import build_model
-from freeswing.ident.diagnose.answer.deviations import directions, honest_covariance
+from freeswing.ident.diagnose import diagnose
+from freeswing.ident.diagnose.answer.deviations import (
+    chance_of_nothing,
+    directions,
+    honest_covariance,
+)
 from tests.oracle.scenes.robots import declared_robot
 
 
@@ -36,3 +41,28 @@ def test_the_larger_of_posterior_and_jackknife_is_told():
     told = honest_covariance(found, scored)  # pyright: ignore[reportArgumentType]
     assert np.sqrt(np.diag(told)) == pytest.approx([2.0, 3.0, 0.0])
     assert told[0, 1] / 6.0 == pytest.approx(0.5)
+
+
+def told_drag(deviations):
+    """A fit of the three-cable robot with a drag so many deviations from nothing."""
+    model = build_model(declared_robot("three-cable"), ("constant_force", "rotational_drag"))
+    block = SimpleNamespace(value=np.array([1e-3 * deviations]), mask=np.ones(1, bool))
+    unknowns = SimpleNamespace(block=lambda _: block, columns=lambda _: np.array([12]))
+    return SimpleNamespace(model=model, unknowns=unknowns), 1e-6 * np.eye(13)
+
+
+@pytest.mark.parametrize(("deviations", "chance"), [(0.0, 1.0), (1.0, 0.317), (2.0, 0.0455)])
+def test_values_within_their_deviations_come_by_chance(deviations, chance):
+    found, covariance = told_drag(deviations)
+    told = chance_of_nothing(found, covariance, "rotational_drag")  # pyright: ignore[reportArgumentType]
+    assert told == pytest.approx(chance, rel=0.01)
+
+
+@pytest.mark.parametrize(("deviations", "believed"), [(1.9, False), (2.0, True)])
+def test_no_effect_is_told_whose_values_are_nothing_within_their_deviations(deviations, believed):
+    """On a clean session a force of (23 +- 28, 36 +- 130, 15 +- 180) um/s2 was told as accepted."""
+    found, covariance = told_drag(deviations)
+    won = SimpleNamespace(by_lengths=False, decision=SimpleNamespace(key="rotational_drag"))
+    text = diagnose._doubt([won], found, covariance)  # pyright: ignore[reportArgumentType]
+    assert (text == "") == believed, text
+    assert believed or "not accepted" in text, text

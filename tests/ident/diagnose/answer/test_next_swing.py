@@ -1,5 +1,8 @@
 """The swing that parts two models of losses best, of a made-up pair of fits."""
 
+# Stubs stand for what is not looked at.
+# pyright: reportArgumentType=false, reportOptionalMemberAccess=false
+
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -10,6 +13,7 @@ from freeswing.cdpr.model.equations import build_model
 from freeswing.cdpr.robot import POSE_COORDINATES
 from freeswing.cdpr.simulation.free_swing import simulate
 from freeswing.ident.diagnose.answer import next_swing as chosen
+from freeswing.ident.diagnose.leave_one_out import Evidence
 from freeswing.ident.likelihood.raw_samples import prepare
 from tests.ident.swings import TRUE_INERTIA, paper_model, recorded, swing
 
@@ -34,9 +38,9 @@ def fitted(name, value):
         samples=(samples,),
         free=np.ones(9 + len(values), dtype=bool),
     )
-    return SimpleNamespace(
-        fit=fit, evidence=SimpleNamespace(triangles=1e3 * np.eye(10 + len(values))[None])
-    )
+    size = 10 + len(values)
+    evidence = Evidence(("a",), 1e3 * np.eye(size)[None], np.ones(1), np.zeros((0, size)))
+    return SimpleNamespace(fit=fit, evidence=evidence)
 
 
 @pytest.fixture(autouse=True)

@@ -1,0 +1,68 @@
+"""What a calibration does to all poses alike is no effect, however sharply the swings show it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from freeswing.ident.diagnose.decision import excess_of, included
+from freeswing.ident.diagnose.heldout import held_out
+from freeswing.ident.diagnose.refit import Refit, colour_of, freed, refit, rescored
+from freeswing.ident.judge.prediction import Stage
+from freeswing.ident.likelihood.blocks import first_unknowns, state_of
+from freeswing.ident.likelihood.calibration_modes import amplitudes_of
+from freeswing.ident.likelihood.fit_swings import fit
+from freeswing.ident.likelihood.raw_samples import UNIT_NOISE_M
+from freeswing.ident.likelihood.session_estimates import begun
+from tests.ident.likelihood.test_calibration_modes import NOISE_M, prepared, runs
+from tests.ident.swings import TRUE_INERTIA, paper_model
+
+# A base frame turned by 0.3 mrad about x and y: all anchors seem off by tenths of a millimetre.
+TURNED = np.array([0.0, 0.0, 0.0, 3.0, 3.0, 0.0, 0.0])
+SCALES = np.full(2, NOISE_M / UNIT_NOISE_M)
+
+
+@cache
+def searched(known: bool) -> tuple[Refit, Refit]:
+    """The declared model and one with displaced anchors, as the search fits them."""
+    ready = prepared(runs(TURNED, seed=6))
+    if not known:
+        ready = [replace(one, run=replace(one.run, pose_errors=None)) for one in ready]
+    model = paper_model()
+    _, samples, states, _ = begun(model, ready, None, TRUE_INERTIA)
+    unknowns = first_unknowns(model, TRUE_INERTIA, [None] * len(samples))
+    start = state_of(unknowns, model, states, SCALES)
+    found = fit(model, samples, start, estimate_scales=False, grow=False)
+    colour = colour_of(found, SCALES)
+    current = freed(rescored(found, SCALES, colour), SCALES, colour)
+    return current, refit(current.fit, "anchor_offset", np.zeros(12), SCALES, colour)
+
+
+def test_anchors_that_a_turned_base_frame_displaces_are_where_they_are() -> None:
+    current, moved = searched(known=True)
+    assert included(current, moved, "anchor_offset", SCALES) < 0.1
+    assert excess_of(current) < 0.1, excess_of(current)
+
+
+def test_without_the_calibrations_errors_they_are_claimed() -> None:
+    """The negative control: this is what ignoring them does."""
+    current, moved = searched(known=False)
+    assert included(current, moved, "anchor_offset", SCALES) > 0.95
+    assert current.evidence.common == 0
+
+
+def test_runs_kept_apart_are_predicted_without_the_errors_found() -> None:
+    current, _ = searched(known=True)
+    found = current.fit
+    held = prepared(runs(TURNED, seed=9))[:1]
+    amplitudes = amplitudes_of(found.samples)
+    stages = [Stage(found.model, found.inertia, found.values, one) for one in (None, amplitudes)]
+    recorded, told = (one.runs[0].prediction for one in held_out(stages, held, None)())
+    assert recorded is not None
+    assert told is not None
+    moved = np.abs(told.measured - recorded.measured).max(axis=0)
+    assert moved[:3].max() > 2.0 * NOISE_M, moved
+    assert told.rmse_m == pytest.approx(NOISE_M, rel=0.1)
