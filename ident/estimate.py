@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -10,9 +11,9 @@ from numpy.typing import NDArray
 
 from freeswing.cdpr.frozen import freeze
 from freeswing.cdpr.robot import INERTIA_NAMES, Array
-from freeswing.ident.fidim.calibration_share import CalibrationShare
 from freeswing.ident.fidim.fidim import FidimEstimate
 from freeswing.ident.fidim.payload_mass import MassEstimate
+from freeswing.ident.fidim.shares import Share
 from freeswing.ident.fidim.weighted_least_squares import WeightedSolution
 from freeswing.ident.judge.consistency import Consistency, consistency
 from freeswing.ident.runs import DroppedRun
@@ -105,7 +106,7 @@ def fidim_entry(
     dropped: tuple[DroppedRun, ...],
     notes: tuple[str, ...],
     weighted: WeightedSolution | None = None,
-    share: CalibrationShare | None = None,
+    shares: Sequence[Share] = (),
 ) -> Estimate:
     """An estimate from FIDIM's result.
 
@@ -114,7 +115,7 @@ def fidim_entry(
         dropped: runs left out.
         notes: beside those of `found`.
         weighted: the covariance-weighted form, to be taken in its place.
-        share: what the cameras' calibration adds to the covariance.
+        shares: what errors beside the scatter add to the covariance.
     """
     solution = found.solution
     values, covariance = solution.values, solution.covariance
@@ -126,10 +127,12 @@ def fidim_entry(
     names = [name for name, kept in zip(INERTIA_NAMES, found.essential, strict=True) if kept]
     reduced = found.reduced
     reduced_std = reduced.std
-    if share is not None:
+    for share in shares:
         covariance = covariance + share.covariance
         reduced_std = np.sqrt(reduced_std**2 + np.diag(share.reduced))
-        extra["calibration_std"] = np.sqrt(np.diag(share.covariance)).tolist()
+        extra.update(share.document())
+    if shares and weighted is None:
+        extra["published_std"] = solution.std.tolist()
     return Estimate(
         values=values,
         covariance=covariance,

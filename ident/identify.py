@@ -205,7 +205,7 @@ def _estimated(
         The runs that serve, FIDIM's estimates, maximum likelihood's, why others are absent, and
         whether it is because no run follows any law.
     """
-    how = settings.weighting, progress, settings.consistent
+    how = settings.weighting, progress, settings.consistent, settings.signals
     taut, by_fidim, failures = fidim_estimates(model, prepared, *how)
     if not settings.maximum_likelihood:
         return taut, by_fidim, {}, failures, False

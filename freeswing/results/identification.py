@@ -59,7 +59,10 @@ class Estimate(Entry):
         weighting: of FIDIM, where it is not the published one.
         noise_ratio: of FIDIM's weighted form.
         calibration_std: the cameras' calibration's share of the deviations (FIDIM).
-        published_std: deviations as published (FIDIM), where those between runs are larger.
+        published_std: deviations as published (FIDIM): the samples' scatter alone.
+        lengths_std: the stated cable lengths' share of the deviations (FIDIM).
+        noise_bias: foreseen because noise reaches the columns unevenly (FIDIM).
+        smoothing_bias: foreseen because smoothing takes some of the swing (FIDIM).
         calibration_modes: calibration errors fitted beside (maximum likelihood).
     """
 
@@ -79,6 +82,9 @@ class Estimate(Entry):
     noise_ratio: float | None = absent(default=None)
     calibration_std: Numbers | None = absent(default=None)
     published_std: Numbers | None = absent(default=None)
+    lengths_std: Numbers | None = absent(default=None)
+    noise_bias: Numbers | None = absent(default=None)
+    smoothing_bias: Numbers | None = absent(default=None)
     calibration_modes: Any = absent(default=None)
 
 

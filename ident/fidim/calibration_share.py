@@ -8,70 +8,47 @@ problem solved again: the changes of the solution add up to a covariance.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from freeswing.cdpr.model.batch import evaluate
 from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.model.free_motion import coordinate_indices
 from freeswing.cdpr.model.regressor import SwingMotion, regressor
 from freeswing.cdpr.robot import Array
-from freeswing.ident.fidim.total_least_squares import total_least_squares
+from freeswing.ident.fidim.shares import Share, Stack
 from freeswing.ident.likelihood.calibration_modes import mode_shifts
 from freeswing.ident.signals.motions import free_motion
 from freeswing.ident.signals.prepare import PreparedRun, motion_of, signals_used
 
 
-@dataclass(frozen=True, slots=True)
-class CalibrationShare:
-    """Covariance that the calibration adds to FIDIM's parameters.
-
-    Attributes:
-        covariance: of all nine, (9, 9).
-        reduced: of the essential ones solved alone, (e, e).
-    """
-
-    covariance: Array
-    reduced: Array
-
-
 def calibration_share(
-    model: Model, runs: Sequence[PreparedRun], full: bool, essential: NDArray[np.bool_]
-) -> CalibrationShare | None:
+    model: Model, runs: Sequence[PreparedRun], full: bool, stack: Stack
+) -> Share | None:
     """The share of the runs' calibration errors; None where none of them has any.
 
     Args:
         model: the robot.
         runs: those FIDIM was solved for.
         full: by full poses, or by free coordinates alone.
-        essential: which parameters the reduced problem keeps, (9,).
+        stack: their regressors.
     """
     errors = [run.run.pose_errors for run in runs]
     counts = [len(one.modes) for one in errors if one is not None]
     if not counts:
         return None
-    kept = np.concatenate([[True], essential])
-    plain = [regressor(model, motion_of(run, full)) for run in runs]
     shifts = [_shifts(run, full, max(counts)) for run in runs]
-    solution, alone = _solution(plain), _solution(plain, kept)
-    changes, reduced = [], []
-    for mode in range(max(counts)):
-        moved = [
-            regressor(model, _moved(model, run, full, own[:, :, mode]))
-            for run, own in zip(runs, shifts, strict=True)
-        ]
-        changes.append(_solution(moved) - solution)
-        reduced.append(_solution(moved, kept) - alone)
-    return CalibrationShare(
-        np.array(changes).T @ np.array(changes), np.array(reduced).T @ np.array(reduced)
-    )
-
-
-def _solution(regressors: list[Array], kept: NDArray[np.bool_] | None = None) -> Array:
-    W = np.concatenate([one.reshape(-1, one.shape[-1]) for one in regressors])
-    return total_least_squares(W if kept is None else W[:, kept]).values
+    changes = [
+        stack.alone(
+            [
+                regressor(model, _moved(model, run, full, own[:, :, mode]))
+                for run, own in zip(runs, shifts, strict=True)
+            ]
+        )
+        for mode in range(max(counts))
+    ]
+    return Share("the calibration's errors", "calibration_std", np.array(changes))
 
 
 def _shifts(run: PreparedRun, full: bool, count: int) -> Array:

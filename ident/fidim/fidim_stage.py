@@ -11,19 +11,22 @@ from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.model.regressor import regressor
 from freeswing.cdpr.robot import Array
 from freeswing.ident.estimate import Estimate, fidim_entry
+from freeswing.ident.fidim.bias import noise_bias, smoothing_bias
 from freeswing.ident.fidim.calibration_share import calibration_share
 from freeswing.ident.fidim.fidim import FidimEstimate, fidim
+from freeswing.ident.fidim.length_share import length_share
 from freeswing.ident.fidim.payload_mass import LoadedCentre, MassEstimate, mass_from_payloads
+from freeswing.ident.fidim.shares import Share, Stack, shares_sentence
 from freeswing.ident.fidim.weighted_least_squares import (
-    UNEVEN,
+    NoisyRegressor,
     noisy_regressor,
-    unevenness,
     weighted_fidim,
 )
 from freeswing.ident.judge.comparison import between_runs
 from freeswing.ident.judge.consistency import nearest_possible
 from freeswing.ident.likelihood.between_runs import widened
 from freeswing.ident.runs import DroppedRun
+from freeswing.ident.signals.derivatives import SignalSettings
 from freeswing.ident.signals.motions import lowest_tension
 from freeswing.ident.signals.prepare import (
     PreparedRun,
@@ -39,7 +42,6 @@ from freeswing.ident.signals.prepare import (
 Weighting = Literal["published", "covariance"]
 # Two standard deviations: what the swings themselves leave open.
 REACH = 2.0
-_THINNED = 10  # samples skipped where only an impression of the regressor's noise is wanted
 
 
 def fidim_estimates(
@@ -48,10 +50,13 @@ def fidim_estimates(
     weighting: Weighting,
     progress: Progress | None,
     consistent: bool = False,
+    settings: SignalSettings | None = None,
 ) -> tuple[PreparedRuns, dict[str, Estimate], dict[str, str]]:
     """FIDIM by full poses and by free coordinates; slack runs found with its result leave.
 
     With `consistent` an inertia that no body can have is replaced by the nearest possible one.
+    `settings` made the signals; without them deviations hold the scatter and the calibration
+    alone, which is enough where values to start from are wanted.
 
     Returns:
         The runs without the slack ones, `fidim_full` and `fidim_free` as far as they exist, and
@@ -74,7 +79,7 @@ def fidim_estimates(
                 prepared = without(prepared, slack)
                 unloaded = usable(prepared, full, None)
                 raw = fidim([regressor(model, motion_of(run, full)) for run in unloaded])
-            entry = _completed(model, prepared, unloaded, raw, full, weighting)
+            entry = _completed(model, prepared, raw, full, weighting, settings)
             found[name] = _consistent(entry, consistent)
         except (ValueError, np.linalg.LinAlgError) as error:
             failures[name] = str(error)
@@ -87,57 +92,73 @@ def fidim_estimates(
 def _completed(
     model: Model,
     prepared: PreparedRuns,
-    unloaded: list[PreparedRun],
     raw: FidimEstimate,
     full: bool,
     weighting: Weighting,
+    settings: SignalSettings | None,
 ) -> Estimate:
-    """The entry of one FIDIM solution: weighting, noise check, mass."""
+    """The entry of one FIDIM solution: weighting, what moves it beside the scatter, mass."""
     notes: list[str] = []
-    weighted = None
-    asked = weighting == "covariance"
-    noisy = [
-        noisy_regressor(
-            model, signals_used(run, full), motion_of(run, full), 1 if asked else _THINNED
-        )
-        for run in (unloaded if asked else unloaded[:3])
-    ]
-    if asked:
+    unloaded, weighted = usable(prepared, full, None), None
+    noisy = _noisy(model, unloaded, full) if weighting == "covariance" or settings else []
+    if weighting == "covariance":
         try:
             weighted = weighted_fidim(noisy, raw.values)
         except (ValueError, np.linalg.LinAlgError) as error:
             notes.append(f"as published: the weighted form cannot be had ({error})")
-    elif (ratio := unevenness(noisy)) > UNEVEN:
-        notes.append(
-            f"plain total least squares takes the regressor's columns to be equally noisy; theirs "
-            f"differs up to {ratio:.0f} times, so values and standard deviations may be off; "
-            'weighting = "covariance" gives the weighted form'
-        )
-    mass = _mass(model, prepared, raw, full, notes)
-    share = calibration_share(model, unloaded, full, raw.essential)
-    entry = fidim_entry(raw, left_out(prepared, full), tuple(notes), weighted, share)
+    shares = _shares(model, unloaded, raw, full, settings, noisy if weighted is None else [])
+    scatter = raw.solution.covariance if weighted is None else weighted.covariance
+    if said := shares_sentence(shares, np.sqrt(np.diag(scatter))):
+        notes.append(said)
+    entry = fidim_entry(raw, left_out(prepared, full), tuple(notes), weighted, shares)
     entry = entry if weighted is not None else _as_runs_say(entry, raw)
+    mass, why = _mass(model, prepared, entry, full, settings)
     names = [run.name for run in unloaded]
     without_run = dict(zip(names, raw.without_run, strict=True)) if weighted is None else {}
-    return replace(entry, mass=mass, without_run=without_run)
+    return replace(entry, mass=mass, notes=(*entry.notes, *why), without_run=without_run)
+
+
+def _noisy(model: Model, runs: list[PreparedRun], full: bool) -> list[NoisyRegressor]:
+    return [noisy_regressor(model, signals_used(run, full), motion_of(run, full)) for run in runs]
+
+
+def _shares(
+    model: Model,
+    runs: list[PreparedRun],
+    raw: FidimEstimate,
+    full: bool,
+    settings: SignalSettings | None,
+    noisy: list[NoisyRegressor],
+) -> list[Share]:
+    """What moves a solution beside its equations' scatter; `noisy` where columns count alike."""
+    stack = Stack([regressor(model, motion_of(run, full)) for run in runs], raw.essential)
+    found = [calibration_share(model, runs, full, stack)]
+    if settings is not None:
+        found.append(None if full else length_share(model, runs, stack))
+        found.append(noise_bias(noisy, stack) if noisy else None)
+        found.append(smoothing_bias(model, runs, full, settings, stack))
+    return [share for share in found if share is not None]
 
 
 def _as_runs_say(entry: Estimate, raw: FidimEstimate) -> Estimate:
     """The entry with deviations of what runs say apart, where chance does not make them so large.
 
     Total least squares takes what is left for noise. Where a model's errors make it, they repeat
-    with the swings, and its deviations (FIDIM 2022, eq. 33) are too small by several times.
+    with the swings, and its deviations (FIDIM 2022, eq. 33) are too small by several times. What
+    the entry's own deviations hold beside the scatter may explain it, and is not counted again.
     """
     between = between_runs(raw.without_run)
-    covariance = widened(entry.covariance, between, len(raw.without_run))
-    wider = float(np.sqrt(np.diag(covariance) / np.diag(entry.covariance)).max())
+    scatter = widened(raw.solution.covariance, between, len(raw.without_run))
+    factors = np.maximum(1.0, np.sqrt(np.diag(scatter) / np.diag(entry.covariance)))
+    wider = float(factors.max())
     if not wider > 1.0:
         return entry
+    covariance = entry.covariance * np.outer(factors, factors)
     note = (
         f"runs say apart up to {wider:.1f} times what the samples' scatter lets expect (FIDIM "
         "2022, eq. 33): standard deviations are those of leaving out one run at a time"
     )
-    extra = {**entry.extra, "published_std": entry.std.tolist()}
+    extra = {**entry.extra, "published_std": raw.std.tolist()}
     return replace(entry, covariance=covariance, notes=(*entry.notes, note), extra=extra)
 
 
@@ -153,31 +174,38 @@ def _consistent(entry: Estimate, enforced: bool) -> Estimate:
 
 
 def _mass(
-    model: Model, prepared: PreparedRuns, raw: FidimEstimate, full: bool, notes: list[str]
-) -> MassEstimate | None:
-    """Mass from payload runs, each payload identified by itself (eqs. 23, 24)."""
+    model: Model,
+    prepared: PreparedRuns,
+    unloaded: Estimate,
+    full: bool,
+    settings: SignalSettings | None,
+) -> tuple[MassEstimate | None, list[str]]:
+    """Mass from payload runs, each payload identified by itself (eqs. 23, 24), and why not."""
     payloads = {
         (run.run.payload.mass_kg, tuple(run.run.payload.position_m)): run.run.payload
         for run in prepared.runs
         if run.run.payload is not None and run.run.role == "identify"
     }
     loaded: list[LoadedCentre] = []
+    notes: list[str] = []
     for payload in payloads.values():
         runs = usable(prepared, full, payload)
         try:
             one = fidim([regressor(model, motion_of(run, full)) for run in runs])
+            noisy = _noisy(model, runs, full) if settings else []
+            shares = _shares(model, runs, one, full, settings, noisy)
         except (ValueError, np.linalg.LinAlgError) as error:
             notes.append(f"payload of {payload.mass_kg:g} kg not used: {error}")
             continue
-        covariance = one.solution.covariance[:3, :3]
-        loaded.append(LoadedCentre(payload, one.values[:3], covariance))
+        entry = _as_runs_say(fidim_entry(one, (), (), None, shares), one)
+        loaded.append(LoadedCentre(payload, one.values[:3], entry.covariance[:3, :3]))
     if not loaded:
-        return None
+        return None, notes
     try:
-        return mass_from_payloads(raw.values[:3], raw.solution.covariance[:3, :3], loaded)
+        found = mass_from_payloads(unloaded.values[:3], unloaded.covariance[:3, :3], loaded)
     except ValueError as error:
-        notes.append(str(error))
-        return None
+        return None, [*notes, str(error)]
+    return found, notes
 
 
 def within_reach(raw: FidimEstimate) -> Array:

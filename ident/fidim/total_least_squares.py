@@ -75,11 +75,7 @@ def total_least_squares(W: Array) -> TotalLeastSquares:
         raise ValueError(f"{rows} equations for {columns - 1} unknowns: more samples are needed")
     if not np.isfinite(W).all():
         raise ValueError("the regressor holds numbers that are not finite")
-    _, sizes, right = np.linalg.svd(np.linalg.qr(W, mode="r"))
-    chi = right[-1]
-    if abs(chi[0]) < 1e-12 * np.abs(chi).max():
-        raise ValueError("the solution has no share of the mass column: rank is lost")
-    values = chi[1:] / chi[0]
+    values, sizes, right = _decomposed(W)
     sigma = float(sizes[-1] / np.sqrt(rows - columns))
     # W-hat^T W-hat = V diag(s_1^2 .. s_p^2, 0) V^T, without its first row and column (eq. 32).
     kept = right[:-1, 1:]
@@ -96,3 +92,24 @@ def total_least_squares(W: Array) -> TotalLeastSquares:
         blind=frozen_array(blind / np.linalg.norm(blind), blind.shape, "blind direction"),
         n_equations=rows,
     )
+
+
+def values_alone(W: Array) -> Array:
+    """The values that `total_least_squares` gives, (p,); of triangular factors as well.
+
+    Args:
+        W: regressor, or runs' triangular factors one below the other, (m, p + 1) with m > p.
+
+    Raises:
+        ValueError: when rank is lost.
+    """
+    return _decomposed(W)[0]
+
+
+def _decomposed(W: Array) -> tuple[Array, Array, Array]:
+    """Values (p,), singular values and right vectors of W, by its triangular factor."""
+    _, sizes, right = np.linalg.svd(np.linalg.qr(W, mode="r"))
+    chi = right[-1]
+    if abs(chi[0]) < 1e-12 * np.abs(chi).max():
+        raise ValueError("the solution has no share of the mass column: rank is lost")
+    return chi[1:] / chi[0], sizes, right

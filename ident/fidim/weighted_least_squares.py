@@ -22,8 +22,6 @@ from freeswing.cdpr.robot import Array, frozen_array
 from freeswing.ident.signals.derivatives import Signals
 from freeswing.ident.signals.motions import free_motion
 
-# Noise beyond which the inverse of its variance would weigh one column nine times another.
-UNEVEN = 3.0
 _SWEEPS = 12
 # About the period of a swing: errors of the model come back with it.
 _CORRELATED_S = 1.0
@@ -48,13 +46,6 @@ class NoisyRegressor:
     def __post_init__(self) -> None:
         freeze(self, "W", "answers", "covariances")
 
-    def column_std(self) -> Array:
-        """Root mean square noise of each column of W, (10,)."""
-        spread = np.einsum(
-            "njec,njk,nkec->c", self.answers, self.covariances, self.answers, optimize=True
-        )
-        return np.sqrt(np.maximum(spread, 0.0) / (self.W.shape[0] * self.W.shape[1]))
-
 
 @dataclass(frozen=True, slots=True)
 class WeightedSolution:
@@ -72,18 +63,14 @@ class WeightedSolution:
     noise_ratio: float
 
 
-def noisy_regressor(
-    model: Model, signals: Signals, motion: SwingMotion, every: int = 1
-) -> NoisyRegressor:
+def noisy_regressor(model: Model, signals: Signals, motion: SwingMotion) -> NoisyRegressor:
     """Differentiate a run's regressor by its signals (central differences at their own noise).
 
     Args:
         model: the robot.
         signals: of the full pose, or of the free coordinates that `motion` was made from.
         motion: the motion the regressor is taken along.
-        every: thins the samples where only an impression of the noise is wanted.
     """
-    signals, motion = _thinned(signals, motion, every)
     steps = np.sqrt(np.median(signals.covariances.diagonal(axis1=1, axis2=2), axis=0))
     steps = np.maximum(steps, 1e-9)
     answers = [
@@ -97,14 +84,6 @@ def noisy_regressor(
         covariances=signals.covariances,
         period_s=float(np.median(np.diff(signals.times_s))),
     )
-
-
-def _thinned(signals: Signals, motion: SwingMotion, every: int) -> tuple[Signals, SwingMotion]:
-    names = ("times_s", "values", "velocities", "accelerations", "covariances")
-    kept = {name: getattr(signals, name)[::every] for name in names}
-    taken = ("times_s", "zetas", "rates", "accelerations")
-    along = {name: getattr(motion, name)[::every] for name in taken}
-    return replace(signals, **kept), replace(motion, **along)
 
 
 def _moved(model: Model, signals: Signals, motion: SwingMotion, j: int, step: float) -> Array:
@@ -134,13 +113,6 @@ def _held(model: Model, zetas: Array, motion: SwingMotion) -> Array:
     block = evaluated[3][:, :, dependent]
     corrected[:, dependent] -= np.linalg.solve(block, gap[..., None])[..., 0]
     return corrected
-
-
-def unevenness(runs: list[NoisyRegressor]) -> float:
-    """Largest over smallest noise of W's columns: plain total least squares assumes 1."""
-    power = np.mean([run.column_std() ** 2 for run in runs], axis=0)
-    smallest = float(power.min())
-    return float(np.sqrt(power.max() / smallest)) if smallest > 0.0 else float("inf")
 
 
 def weighted_fidim(runs: list[NoisyRegressor], start: Array) -> WeightedSolution:

@@ -33,7 +33,6 @@ def prepare(run: SwingRun, window_s: tuple[float, float]) -> Samples:
             f"at least {LEAST_SAMPLES} are needed"
         )
     groups = np.array([0 if name in POSE_COORDINATES[:3] else 1 for name in inside.coordinates])
-    std = UNSTATED_LENGTH_STD_M if run.lengths_std_m is None else run.lengths_std_m
     times = inside.times_s[known]
     return Samples(
         name=run.name,
@@ -47,12 +46,17 @@ def prepare(run: SwingRun, window_s: tuple[float, float]) -> Samples:
         ),
         groups=groups,
         lengths_m=run.lengths_m,
-        lengths_std_m=max(std, SMALLEST_LENGTH_STD_M),
+        lengths_std_m=max(length_std(run), SMALLEST_LENGTH_STD_M),
         span_s=(float(times[0]), float(times[-1])),
         payload=run.payload,
         slow=inside.slow,
         errors=run.pose_errors,
     )
+
+
+def length_std(run: SwingRun) -> float:
+    """Standard deviation of a run's stated cable lengths, m; 1 mm where it states none."""
+    return UNSTATED_LENGTH_STD_M if run.lengths_std_m is None else run.lengths_std_m
 
 
 def _whitener(covariances: Array | None, groups: np.ndarray, count: int) -> Array:

@@ -78,21 +78,6 @@ def test_a_cable_pushes_where_all_within_two_deviations_say_so(monkeypatch, off,
     assert list(found) == slack
 
 
-@pytest.mark.parametrize(("ratio", "said"), [(2.85, 0), (3.15, 1)])
-def test_columns_three_times_as_noisy_as_others_are_told(monkeypatch, ratio, said):
-    heard = []
-    monkeypatch.setattr(fidim_stage, "unevenness", lambda _: ratio)
-    monkeypatch.setattr(fidim_stage, "_mass", lambda *_: None)
-    monkeypatch.setattr(fidim_stage, "calibration_share", lambda *_: 0.0)
-    monkeypatch.setattr(fidim_stage, "left_out", lambda *_: None)
-    monkeypatch.setattr(fidim_stage, "fidim_entry", lambda *words: heard.extend(words[2]))
-    monkeypatch.setattr(fidim_stage, "_as_runs_say", lambda *_: None)
-    monkeypatch.setattr(fidim_stage, "replace", lambda *_, **__: None)
-    raw = SimpleNamespace(essential=None, without_run=())
-    fidim_stage._completed(None, None, [], raw, True, "published")
-    assert len(heard) == said, heard
-
-
 def test_errors_of_the_equations_repeat_within_a_second(monkeypatch):
     """Errors that never change: their sum's variance grows by Bartlett's weights of a second."""
     n, period_s = 20000, 0.01

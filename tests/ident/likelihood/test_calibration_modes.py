@@ -12,14 +12,14 @@ from freeswing.cdpr.model.regressor import regressor
 from freeswing.cdpr.robot import POSE_COORDINATES, Array
 from freeswing.cdpr.rotation import matrix_from_angles
 from freeswing.ident.fidim.calibration_share import calibration_share
-from freeswing.ident.fidim.fidim import fidim
+from freeswing.ident.fidim.shares import Stack
 from freeswing.ident.identify import identify
 from freeswing.ident.judge.prediction import predict
 from freeswing.ident.likelihood.calibration_modes import freed, mode_shifts, with_calibration
 from freeswing.ident.likelihood.session_estimates import ml_estimate
 from freeswing.ident.runs import SwingRun
 from freeswing.ident.signals.derivatives import SignalSettings
-from freeswing.ident.signals.prepare import PreparedRun, prepare_runs
+from freeswing.ident.signals.prepare import PreparedRun, motion_of, prepare_runs
 from tests.ident.swings import TRUE_INERTIA, paper_model, recorded, swing
 
 SHIFT_M, TURN_RAD, SCALE = 1e-4, 1e-4, 1e-4
@@ -153,12 +153,14 @@ def test_fidim_claims_what_the_calibration_does_to_it(full: bool) -> None:
     generator = np.random.default_rng(11)
     amplitudes = generator.standard_normal(7)
     plain, off = (prepared(runs(a, seed=1)) for a in (np.zeros(7), amplitudes))
-    solutions = []
-    for one in (plain, off):
-        motions = [run.full if full else run.free for run in one]
-        solutions.append(fidim([regressor(paper_model(), m) for m in motions if m is not None]))
-    change = solutions[1].values - solutions[0].values
-    share = calibration_share(paper_model(), plain, full, solutions[0].essential)
+    stacks = [
+        Stack(
+            [regressor(paper_model(), motion_of(run, full)) for run in one], np.ones(9, dtype=bool)
+        )
+        for one in (plain, off)
+    ]
+    change = (stacks[1].values - stacks[0].values)[:9]
+    share = calibration_share(paper_model(), plain, full, stacks[0])
     assert share is not None
     z = change / np.sqrt(np.diag(share.covariance))
     assert 0.1 < np.abs(z).max() < 4.0, f"z = {np.round(z, 2)}"

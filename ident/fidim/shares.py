@@ -1,0 +1,109 @@
+"""What moves FIDIM's solution beside the scatter of its equations, and by how much.
+
+Total least squares knows the noise of single equations, alike in all columns of the regressor
+(FIDIM 2022, eqs. 32, 33). Errors that many equations share move the solution and leave no scatter:
+each kind is carried through to the solution here, and adds its squares to the covariance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from freeswing.cdpr.frozen import freeze
+from freeswing.cdpr.robot import INERTIA_NAMES, Array
+from freeswing.ident.fidim.total_least_squares import values_alone
+
+
+@dataclass(frozen=True, slots=True)
+class Share:
+    """One kind of error and what it does to FIDIM's parameters.
+
+    Attributes:
+        name: of the kind, for people.
+        key: of its size in the result file.
+        changes: of the nine parameters and of the essential ones solved alone, a row an
+            independent cause of one standard deviation, or the one row of a bias, (k, 9 + e).
+        is_bias: whether the change is one that can be foreseen, its sign included.
+    """
+
+    name: str
+    key: str
+    changes: Array
+    is_bias: bool = False
+
+    def __post_init__(self) -> None:
+        freeze(self, "changes")
+
+    @property
+    def covariance(self) -> Array:
+        """Of all nine, (9, 9)."""
+        return self.changes[:, :9].T @ self.changes[:, :9]
+
+    @property
+    def reduced(self) -> Array:
+        """Of the essential ones solved alone, (e, e)."""
+        return self.changes[:, 9:].T @ self.changes[:, 9:]
+
+    def document(self) -> dict[str, Any]:
+        """For the estimate's entry: the bias, or the standard deviations, of the nine."""
+        sizes = self.changes[0, :9] if self.is_bias else np.sqrt(np.diag(self.covariance))
+        return {self.key: sizes.tolist()}
+
+
+class Stack:
+    """Runs' regressors one below the other, each of which can be exchanged and all solved again.
+
+    Args:
+        regressors: a run each, (n, 6 - n_cables, 10).
+        essential: which parameters the reduced problem keeps, (9,).
+    """
+
+    def __init__(self, regressors: Sequence[Array], essential: NDArray[np.bool_]) -> None:
+        self.factors = [_factor(one) for one in regressors]
+        self.kept = np.append(True, essential)
+        self.values = self._solved(self.factors)
+
+    def change(self, instead: dict[int, Array]) -> Array:
+        """What other regressors of some runs, by place, change the solution by, (9 + e,)."""
+        others = dict(enumerate(self.factors)) | {k: _factor(W) for k, W in instead.items()}
+        return self._solved(list(others.values())) - self.values
+
+    def alone(self, regressors: Sequence[Array]) -> Array:
+        """How far from its solution that of other runs lies, (9 + e,)."""
+        return self._solved([_factor(one) for one in regressors]) - self.values
+
+    def _solved(self, factors: list[Array]) -> Array:
+        rows = np.concatenate(factors)
+        return np.concatenate([values_alone(rows), values_alone(rows[:, self.kept])])
+
+
+def _factor(W: Array) -> Array:
+    return np.asarray(np.linalg.qr(W.reshape(-1, W.shape[-1]), mode="r"))
+
+
+def shares_sentence(shares: Sequence[Share], scatter: Array) -> str:
+    """Which errors move a parameter by more than the scatter, and how far; empty where none does.
+
+    Args:
+        shares: found.
+        scatter: standard deviations as published (eq. 33), (9,).
+    """
+    said = []
+    for share in shares:
+        sizes = np.sqrt(np.diag(share.covariance))
+        worst = int(np.argmax(sizes / scatter))
+        if sizes[worst] > scatter[worst]:
+            size = f"{share.changes[0, worst]:+.2g}" if share.is_bias else f"{sizes[worst]:.2g}"
+            times = sizes[worst] / scatter[worst]
+            said.append(f"{share.name}: {INERTIA_NAMES[worst]} by {size}, {times:.1f} times it")
+    if not said:
+        return ""
+    return (
+        "standard deviations hold what moves the solution by more than the samples' scatter (FIDIM "
+        f"2022, eq. 33) tells: {'; '.join(said)}"
+    )
