@@ -108,7 +108,7 @@ def track_run(
 def _shared(poses: Poses, frame: Array | None, doubt: Array | None) -> Array | None:
     """Causes that runs have in common beside the calibration's, (n, 6, m); None without any."""
     causes = [] if frame is None else [frame_causes(poses, frame)]
-    causes += [] if doubt is None else [doubt[:, :, None]]
+    causes += [] if doubt is None else [doubt]
     return np.concatenate(causes, axis=2) if causes else None
 
 

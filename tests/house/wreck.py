@@ -434,6 +434,7 @@ HELD = (
     Held("vision/untagged/refine.py", ("_REST_STD_PX",), UNTAGGED),
     Held("vision/fuse/fuse_cameras.py", ("LEAST_FLOOR_PX", "_REJECT"), FUSE),
     Held("vision/fuse/calibration_share.py", ("_LEFT_OUT",), FUSE),
+    Held("vision/fuse/growth.py", ("USUAL_PX",), "tests/vision/fuse/test_growth.py"),
     Held("vision/fuse/noise.py", ("ALIKE", "SURE_SIGMAS"), "tests/vision/fuse/test_noise.py"),
     Held(
         "vision/fuse/poses.py",

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.cdpr.rotation import invert
+from freeswing.vision.fuse.noise import outwards
 from freeswing.vision.fuse.poses import Poses
 from freeswing.vision.fuse.rolling_shutter import rolling_bias
 from freeswing.vision.fuse.run_views import Block, CameraViews
@@ -93,6 +94,10 @@ def _block(
     things = things.astype(np.int64)
     starts = np.searchsorted(instant, np.arange(last - first + 1))
     counts = np.where((things >= 0) & (things < watch.first_base), 4, 1)
+    growths = np.array([view.growth_px / view.camera.focal_px.mean() for view in views])
+    grown = (counts == 4) & (growths[camera_of.astype(np.int64)] != 0.0)
+    own = growths[camera_of[grown].astype(np.int64)]
+    rays[grown] -= own[:, None] * outwards(rays[grown])
     return Block(
         first,
         starts.astype(np.int64),

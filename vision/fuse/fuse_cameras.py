@@ -134,6 +134,11 @@ def _usual(variances: Sequence[Array]) -> Array | None:
     return np.sqrt(np.median(found, axis=0)) if len(found) else None
 
 
+def agreeing(scores: Array) -> Mask:
+    """Which sightings agree with the poses, by their mean squared whitened residual, (n_o,)."""
+    return (scores >= 0.0) & (scores < _REJECT)
+
+
 def free_of(watch: Watch) -> int:
     """6 where the target gives a pose, 3 where it is a reference point alone."""
     return 6 if watch.platform_points >= 3 else 3
@@ -183,7 +188,7 @@ class _Account:
         """Takes a block in; which sightings agree with the poses, (n_o,)."""
         scores, residuals = solved.scores, linear.residuals
         known = np.repeat(solved.known, np.diff(block.starts))
-        good = known & (scores >= 0.0) & (scores < _REJECT)
+        good = known & agreeing(scores)
         bad = known & ~good
         focal = np.array([v.camera.focal_px.mean() for v in views])[block.camera_of]
         pixels = residuals * focal[:, None]

@@ -119,6 +119,24 @@ def turns_of(rays: Array) -> Array:
     return turns.reshape(-1, 8, 2)
 
 
+def outwards(rays: Array) -> Array:
+    """Corners of tags (n_o, 8) when each edge moves outwards by one, less where they are.
+
+    Source:
+        Hartley, Zisserman 2004, Multiple View Geometry in Computer Vision, sec. 2.2: corners as
+        meets of lines.
+    """
+    corners = rays.reshape(-1, 4, 2)
+    along = np.roll(corners, -1, axis=1) - corners  # the edge that leaves each corner
+    area = np.sum(corners[..., 0] * np.roll(corners[..., 1], -1, axis=1), axis=1)
+    area -= np.sum(corners[..., 1] * np.roll(corners[..., 0], -1, axis=1), axis=1)
+    normals = np.stack([along[..., 1], -along[..., 0]], axis=2) * np.sign(area)[:, None, None]
+    normals /= np.maximum(np.linalg.norm(normals, axis=2, keepdims=True), 1e-300)
+    before = np.roll(normals, 1, axis=1)
+    meet = 1.0 + np.sum(before * normals, axis=2, keepdims=True)
+    return ((before + normals) / np.maximum(meet, 1e-3)).reshape(-1, 8)
+
+
 class NoiseSums:
     """What a pass over the sightings says of the noise's parts.
 

@@ -65,6 +65,7 @@ class CameraViews:
         status: (n_f,).
         labels: things that replace those of the pieces, once markers have names, (n_o,) or None.
         shrinks: factors on the rays of labelled balls, (n_o,) or None.
+        growth_px: by how much tags look larger to each side.
     """
 
     camera: Camera
@@ -74,6 +75,7 @@ class CameraViews:
     status: Ints = field(init=False)
     labels: Ints | None = field(init=False, default=None)
     shrinks: Array | None = field(init=False, default=None)
+    growth_px: float = field(init=False, default=0.0)
     sightings: int = field(init=False, default=0)
     _first_sighting: Ints = field(init=False)
     _bounds: Ints = field(init=False)
@@ -102,7 +104,13 @@ class CameraViews:
         copy.paths, copy.numbers, copy.stamps_s = self.paths, self.numbers, self.stamps_s
         copy.status, copy._bounds = self.status, self._bounds
         copy._first_sighting, copy.sightings = self._first_sighting, self.sightings
-        copy.labels, copy.shrinks = self.labels, self.shrinks
+        copy.labels, copy.shrinks, copy.growth_px = self.labels, self.shrinks, self.growth_px
+        return copy
+
+    def grown(self, growth_px: float) -> CameraViews:
+        """The same sightings by a camera in which tags look larger to each side."""
+        copy = self.believed(self.camera)
+        copy.growth_px = growth_px
         return copy
 
     def middle_times(self) -> Array:

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.rotation import log_rotation
-from freeswing.vision.fuse.fuse_cameras import Fit, fuse
+from freeswing.vision.fuse.fuse_cameras import LEAST_FLOOR_PX, Fit, fuse
+from freeswing.vision.fuse.growth import growth_of
 from freeswing.vision.fuse.poses import Poses
 from freeswing.vision.fuse.run_views import CameraViews, instants_of
 from freeswing.vision.look.label import label_markers
@@ -57,8 +58,8 @@ class Corrected:
         findings: the effects found.
         remarks: what else was found, in words.
         doubt: how far the poses would go where cameras that no base tag holds disagree beyond
-            their noise, position and small rotation, zero where they agree; None where all are
-            held, (n, 6).
+            their noise, and by what is left of how much larger tags look: position and small
+            rotation, a column a cause, (n, 6, m).
     """
 
     views: tuple[CameraViews, ...]
@@ -116,21 +117,56 @@ def correct_rig(
         if own
     )
     if not (moved or clocks.any() or lines.any()):
-        refuse_disagreement(views, before)
-        doubt, said = untied_shifts(views, watch, poses, before, survey_std_m)
+        views, poses, after, doubt, said = _settled(views, watch, poses, before, survey_std_m)
         poses = widened_poses(poses, jitter)
-        return Corrected(tuple(views), poses, before, before, (), (*remarks, *said), doubt)
+        return Corrected(views, poses, before, after, (), (*remarks, *said), doubt)
     final = [
         _decided(view, own, clock, line)
         for view, own, clock, line in zip(current, calibrated, clocks, lines, strict=True)
     ]
     _refuse_far(calibrated, final)
     poses, after = fuse(final, watch, instants_of(final), start=_restarted(final, watch, start))
-    refuse_disagreement(final, after)
-    doubt, said = untied_shifts(final, watch, poses, after, survey_std_m)
-    findings = _findings(calibrated, final, moved, clocks, lines, last)
+    settled, poses, after, doubt, said = _settled(final, watch, poses, after, survey_std_m)
+    findings = _findings(calibrated, settled, moved, clocks, lines, last)
     poses = widened_poses(poses, jitter)
-    return Corrected(tuple(final), poses, before, after, findings, (*remarks, *said), doubt)
+    return Corrected(settled, poses, before, after, findings, (*remarks, *said), doubt)
+
+
+def _settled(
+    views: Sequence[CameraViews], watch: Watch, poses: Poses, fit: Fit, survey_std_m: float
+) -> tuple[tuple[CameraViews, ...], Poses, Fit, Array | None, tuple[str, ...]]:
+    """Cameras, poses and agreement without the growth of tags, what is in doubt, and remarks.
+
+    Raises:
+        DataError: where the cameras do not agree.
+    """
+    refuse_disagreement(views, fit)
+    growth, said, causes = growth_of(poses, fit, views, watch), [], []
+    if growth.is_real:
+        views = [view.grown(float(px)) for view, px in zip(views, growth.px, strict=True)]
+        poses, fit = fuse(views, watch, poses.times_s, start=poses)
+        causes.append(growth.causes())
+    if growth.is_real or growth.is_too_large:
+        said += [
+            _growth_sentence(view.camera.name, px, growth.is_real)
+            for view, px in zip(views, growth.px, strict=True)
+            if abs(px) > LEAST_FLOOR_PX
+        ]
+    doubt, untied = untied_shifts(views, watch, poses, fit, survey_std_m)
+    if doubt is not None:
+        causes.insert(0, doubt[:, :, None])  # runs have it or not: the growth's stay in place
+    whole = np.concatenate(causes, axis=2) if causes else None
+    return tuple(views), poses, fit, whole, (*said, *untied)
+
+
+def _growth_sentence(camera: str, px: float, removed: bool) -> str:
+    size = f"{camera}: tags look {abs(px):.4f} px {'larger' if px > 0.0 else 'smaller'}"
+    if removed:
+        return f"{size} to each side, as squeezed pictures make them: taken off"
+    return (
+        f"{size} to each side than target.toml says, more than squeezed pictures make them: "
+        "left as it is; check size_m"
+    )
 
 
 def _missed(views: Sequence[CameraViews], watch: Watch, survey_std_m: float) -> Missed:
