@@ -131,14 +131,17 @@ def deviations_apart(best: Missed, rival: Missed) -> float:
     """By how many deviations the rival misses more, over the frames that both compared.
 
     Both look at the same corners, so that what their noise does cancels in each frame's difference.
-    Starts without common frames are held against each other by the logarithm of their variances,
-    two numbers a frame, since the errors of one frame's corners are much alike.
+    It is taken of the frame's squares together, so that one frame that the rival misses by far more
+    than others speaks for the best, and not for scatter. Starts without common frames are held
+    against each other by the logarithm of their variances, two numbers a frame, since the errors of
+    one frame's corners are much alike.
     """
     if not np.isfinite(rival.size_px):
         return float("inf")
     both = sorted(best.squares_px2.keys() & rival.squares_px2.keys())
     if len(both) >= _LEAST_COMPARED:
-        more = np.array([rival.squares_px2[k] - best.squares_px2[k] for k in both])
+        theirs, own = (np.array([one.squares_px2[k] for k in both]) for one in (rival, best))
+        more = (theirs - own) / np.maximum(theirs + own, 1e-300)
         return float(more.mean() / max(float(more.std(ddof=1)), 1e-300) * np.sqrt(len(more)))
     counts = (max(len(one.squares_px2), 1) for one in (best, rival))
     spread = np.sqrt(sum(1.0 / count for count in counts))

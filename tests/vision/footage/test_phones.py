@@ -48,16 +48,24 @@ def test_two_phones_started_by_hand_are_placed_in_time(phones) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(
-    reason="by two of three seeds com y is 3.1 and 3.4 deviations (of 6 um) off: H.264 makes tags "
-    "look 0.003 px larger to each side, which turns all poses alike by 50 urad"
-)
 def test_two_phones_started_by_hand_give_the_centre_of_mass(phones) -> None:
+    """H.264 makes tags look 0.003 px larger, and lengths are told with errors of 0.3 mm."""
     folder, _, body = phones
     assert main(["identify", str(folder), "--quiet"]) == 0
     found = json.loads((folder / "results" / "identification.json").read_text())
-    told = {p["name"]: p for p in found["estimates"]["ml_full"]["parameters"]}
-    for axis, true in zip("xyz", body.com_m, strict=True):
-        entry = told[f"com_{axis}_m"]
-        z = (entry["value"] - true) / entry["std"]
-        assert abs(z) < 3.0, f"com_{axis}: {z:.2f} deviations ({1e3 * entry['std']:.4f} mm)"
+    assert set(found["estimates"]) == {"ml_full", "ml_free", "fidim_full", "fidim_free"}
+    for name, estimate in found["estimates"].items():
+        told = {p["name"]: p for p in estimate["parameters"]}
+        for axis, true in zip("xyz", body.com_m, strict=True):
+            entry = told[f"com_{axis}_m"]
+            z = (entry["value"] - true) / entry["std"]
+            assert abs(z) < 3.0, f"{name} com_{axis}: {z:.2f} of {1e3 * entry['std']:.4f} mm"
+    best = {p["name"]: p["std"] for p in found["estimates"]["ml_full"]["parameters"]}
+    assert best["com_y_m"] < 3e-5, "deviations that hold anything"
+
+
+@pytest.mark.slow
+def test_two_phones_tags_are_freed_of_what_squeezing_adds(phones) -> None:
+    _, tracking, _ = phones
+    for run in tracking["runs"]:
+        assert any("larger to each side" in text for text in run["problems"]), run["problems"]

@@ -179,6 +179,20 @@ def test_starts_are_compared_frame_by_frame() -> None:
     assert deviations_apart(best, Missed(float("inf"), {})) == float("inf")
 
 
+def test_a_frame_that_a_rival_misses_by_far_does_not_speak_for_it() -> None:
+    """Thirty times the others' difference in one of 100 frames: seen between rendered phones."""
+    rng = np.random.default_rng(5)
+    best = Missed(0.02, dict(enumerate(5e-4 * rng.chisquare(8, 100) / 8.0)))
+    rival = Missed(
+        0.035, {k: v + 1.5e-3 * rng.uniform(0.5, 1.5) for k, v in best.squares_px2.items()}
+    )
+    told = deviations_apart(best, rival)
+    astray = Missed(0.035, {**rival.squares_px2, 50: 0.063})
+    assert told > 20.0, told
+    assert deviations_apart(best, astray) > 0.9 * told
+    assert deviations_apart(rival, best) == pytest.approx(-told)
+
+
 def test_a_start_that_ends_where_the_best_does_is_no_rival() -> None:
     view = stub(camera=VIEW, believed=lambda camera: camera)
     pair = stub(lag_s=1.0, decided_m=0.01, rivals=[(1.07, 0.011), (2.0, 0.012)])
