@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from freeswing.starter.filmed import FAMILY, Filmed
+from freeswing.starter.filmed import FAMILY, Filmed, opening_lines
 from freeswing.starter.kinds import MISSING
 
 KINDS_ABOVE = ("trifilar", "bifilar")
@@ -20,11 +20,7 @@ def above_session(name: str, filmed: Filmed, cables: int) -> str:
     lengths = f"cable_lengths_m = [{', '.join([MISSING] * cables)}]"
     camera = filmed.cameras[0]
     lines = [
-        'format = "freeswing-session/1"',
-        f'name = "{name}"',
-        'robot = "robot.toml"',
-        'target = "target.toml"',
-        f"frame_rate_hz = {filmed.rate_hz:g}",
+        *opening_lines(name, filmed.rate_hz),
         "planar = true      # one phone from above: chi, x, y of the printed sheet",
         "",
         "# Glue the sheet flat on the platform, its cross in the middle of the wires' lower ends",

@@ -88,16 +88,23 @@ def tag_target(filmed: Filmed) -> str:
     return "\n".join([*lines, ""])
 
 
+def opening_lines(name: str, rate_hz: float) -> list[str]:
+    """How session.toml of any session with cameras begins."""
+    return [
+        'format = "freeswing-session/1"',
+        f'name = "{name}"',
+        'robot = "robot.toml"',
+        'target = "target.toml"',
+        f"frame_rate_hz = {rate_hz:g}",
+    ]
+
+
 def filmed_session(name: str, filmed: Filmed, runs: Sequence[tuple[str, str]]) -> str:
     """session.toml of cameras: recordings to be put where it says."""
     (columns, rows), square, marker = filmed.board
     files = ", ".join(f"{camera}.mp4" for camera in filmed.cameras)
     lines = [
-        'format = "freeswing-session/1"',
-        f'name = "{name}"',
-        'robot = "robot.toml"',
-        'target = "target.toml"',
-        f"frame_rate_hz = {filmed.rate_hz:g}",
+        *opening_lines(name, filmed.rate_hz),
         "",
         "[calibration]      # film the printed board, held near and far and tilted every way",
         f'recordings = "calibration"       # {files} in that folder, all started together',

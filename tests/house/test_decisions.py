@@ -7,6 +7,7 @@ from collections import Counter
 import pytest
 
 from tests.house.constants import listed, named_numbers, numbers_of
+from tests.house.in_place import can_be_in_place, early_names
 from tests.house.wreck import HELD, LARGER, SMALLER, line_of, wrecked
 from tests.places import ROOT
 
@@ -39,6 +40,18 @@ def test_a_wreck_changes_one_number_and_nothing_else() -> None:
     assert wrecked(text, "C", SMALLER) == "A = 3\nB = 0.5  # why\nC = 16\n"
     with pytest.raises(ValueError, match="no line gives D a number"):
         line_of(text, "D")
+
+
+def test_what_is_read_when_a_file_is_imported_is_not_changed_in_memory() -> None:
+    text = "B = 2 * A\nclass C:\n    x: float = D\n@e(F)\ndef g(h=H):\n    return I\n"
+    text += "j = lambda k=K: L\n"
+    read = early_names(text)
+    assert {"A", "D", "F", "H", "K"} <= read
+    assert not {"B", "I", "L"} & read
+    assert can_be_in_place(
+        "vision/planar/dots.py", "REACH", "tests/vision/planar/test_planar_limits.py"
+    )
+    assert not can_be_in_place("calib/tags/tag_kernel.py", "_LEAST_CONTRAST", __file__)
 
 
 NUMBERS = named_numbers()
