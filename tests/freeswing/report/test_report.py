@@ -16,6 +16,7 @@ from freeswing.report.material import FILES, RESULTS, Material
 from freeswing.report.page import PANELS, render_page
 from freeswing.report.panels.advice import steps
 from freeswing.report.panels.answer import verdict
+from freeswing.report.panels.cameras import Cameras
 from freeswing.report.panels.ladder import EffectLadder
 from freeswing.report.space import enlargement
 from freeswing.results.diagnosis import Candidate, Diagnosis
@@ -93,9 +94,9 @@ def test_sections_stand_in_reading_order(page: str) -> None:
 
 def test_cameras_are_no_section_of_other_recordings() -> None:
     without = dataclasses.replace(whole_material(), calibration=None, tracking=None)
-    assert "The cameras" not in render_page(without)
+    assert "The cameras" not in render_page(without, (Cameras(),))
     nothing = dataclasses.replace(without, identification=None)
-    assert "The cameras" in render_page(nothing), "they may still come"
+    assert "The cameras" in render_page(nothing, (Cameras(),)), "they may still come"
 
 
 def test_candidates_with_and_without_a_probability_share_a_table() -> None:
@@ -105,7 +106,7 @@ def test_candidates_with_and_without_a_probability_share_a_table() -> None:
     candidates = (dataclasses.replace(first, probability=0.9), *others)
     for order in (candidates, candidates[::-1]):
         mixed = dataclasses.replace(material.diagnosis, candidates=order)
-        page = render_page(dataclasses.replace(material, diagnosis=mixed))
+        page = render_page(dataclasses.replace(material, diagnosis=mixed), (EffectLadder(),))
         assert "probability (%)" in page
 
 
