@@ -10,12 +10,19 @@ import numpy as np
 from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.robot import POSE_COORDINATES, Array, Robot
 from freeswing.ident.bench.averaged import averaged
-from freeswing.ident.bench.begin import Glimpse, best_size, first_gains, glimpse, sight, thinned
 from freeswing.ident.bench.channel_blocks import channel_blocks
 from freeswing.ident.bench.channels import Channel
 from freeswing.ident.bench.chart import Chart
-from freeswing.ident.bench.considered import named_sway, reference
+from freeswing.ident.bench.first_guesses import (
+    Glimpse,
+    best_size,
+    first_gains,
+    glimpse,
+    sight,
+    thinned,
+)
 from freeswing.ident.bench.from_rest import zero_blocks
+from freeswing.ident.bench.held_uncertain import named_sway, reference
 from freeswing.ident.bench.modal import SQUARE, ModalSwing
 from freeswing.ident.bench.objects import body_of, moments, specific
 from freeswing.ident.bench.runs import Bench, BenchRun, Load

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from freeswing.cdpr.robot import POSE_COORDINATES, Array
-from freeswing.ident.bench.begin import Glimpse
 from freeswing.ident.bench.channels import Channel
+from freeswing.ident.bench.first_guesses import Glimpse
 from freeswing.ident.bench.swing import BenchSwing
 from freeswing.ident.likelihood.unknowns import Gaussian, Unknown
 

@@ -10,7 +10,7 @@ from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.model.statics import Equilibrium, modes
 from freeswing.cdpr.robot import Array
 from freeswing.ident.bench.assemble import UNSTATED_LENGTH_STD_M, Assembled
-from freeswing.ident.bench.considered import Held, considered, gauge, holding, sees_sway, unseen
+from freeswing.ident.bench.held_uncertain import Held, considered, gauge, holding, sees_sway, unseen
 from freeswing.ident.bench.mass_verdict import CONTRADICTED, MassVerdict, doubt, weighed_mass
 from freeswing.ident.bench.noise import WIDE_SCATTER, rescaled, scatter_block, scatter_std
 from freeswing.ident.bench.objects import moments, specific

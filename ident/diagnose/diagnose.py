@@ -13,7 +13,6 @@ from freeswing.cdpr.effects import Recorded, catalogue, effect_named
 from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.model.equations import build_model
 from freeswing.cdpr.robot import POSE_COORDINATES, Array, Robot
-from freeswing.ident.diagnose.answer.cut import cut, settled_places, with_settled
 from freeswing.ident.diagnose.answer.decay import swing_decay
 from freeswing.ident.diagnose.answer.deviations import chance_of_nothing, honest_covariance
 from freeswing.ident.diagnose.answer.entries import (
@@ -24,8 +23,9 @@ from freeswing.ident.diagnose.answer.entries import (
     parameter_entries,
     share_closed,
 )
-from freeswing.ident.diagnose.answer.last_words import last_words, rivals_of
+from freeswing.ident.diagnose.answer.final_verdicts import final_verdicts, rivals_of
 from freeswing.ident.diagnose.answer.next_swing import NextSwing, next_swing
+from freeswing.ident.diagnose.answer.settled_geometry import cut, settled_places, with_settled
 from freeswing.ident.diagnose.decision import (
     ACCEPTED,
     LEAST_SHARE_EXPLAINED,
@@ -192,7 +192,7 @@ def diagnose(
     _tell(progress, "diagnosis", 1.0)
     return Diagnosis(
         found.ladder,
-        last_words(search.rounds, found.last.effects if accepted else (), barred, names),
+        final_verdicts(search.rounds, found.last.effects if accepted else (), barred, names),
         rivals_of(accepted),
         found.first,
         found.final,

@@ -353,7 +353,7 @@ HELD = (
     Held("ident/bench/identify_bench.py", ("LEAST_OVER_NOISE",), BENCH),
     Held("ident/bench/diagnose/removal.py", ("SURE",), BENCH_DIAGNOSE),
     Held("ident/bench/diagnose/diagnose.py", ("LEAST_RUNS",), BENCH_DIAGNOSE),
-    Held("ident/bench/diagnose/left.py", ("COLOURED", "SLOWEST_PARTS"), BENCH_DIAGNOSE),
+    Held("ident/bench/diagnose/unexplained.py", ("COLOURED", "SLOWEST_PARTS"), BENCH_DIAGNOSE),
     Held(
         "ident/signals/prepare.py",
         ("LARGEST_AMPLIFICATION", "LEAST_SIGNAL"),
@@ -368,7 +368,7 @@ HELD = (
         LOOK,
     ),
     Held(
-        "vision/look/label.py",
+        "vision/look/marker_names.py",
         ("_GATE_M", "_CLEAR", "_MATCH_M", "_RAYS_MEET_M", "_FORGET", "_START_EVERY"),
         LOOK,
     ),

@@ -19,7 +19,7 @@ from freeswing.vision.fuse.fuse_cameras import LEAST_FLOOR_PX, Fit, fuse
 from freeswing.vision.fuse.growth import growth_of
 from freeswing.vision.fuse.poses import Poses
 from freeswing.vision.fuse.run_views import CameraViews, instants_of
-from freeswing.vision.look.label import label_markers
+from freeswing.vision.look.marker_names import label_markers
 from freeswing.vision.look.watched_target import Watch
 from freeswing.vision.rig.alignment import Missed, aligned
 from freeswing.vision.rig.gross_faults import moved_too_far, refuse_disagreement, refuse_gross

@@ -9,13 +9,13 @@ import numpy as np
 
 from freeswing.cdpr.files.problems import DataError
 from freeswing.cdpr.robot import Array, Robot
-from freeswing.ident.bench.considered import considered
 from freeswing.ident.bench.diagnose.causes import Cause, causes_of, dressed
 from freeswing.ident.bench.diagnose.channels_only import ByChannels, by_channels
 from freeswing.ident.bench.diagnose.errors import Errors, errors_of
 from freeswing.ident.bench.diagnose.removal import Removed, removals
 from freeswing.ident.bench.diagnose.search import Ground, Round, searched
 from freeswing.ident.bench.diagnose.weigh import Fit
+from freeswing.ident.bench.held_uncertain import considered
 from freeswing.ident.bench.identify_bench import BenchResult, identify_bench
 from freeswing.ident.bench.mass_verdict import CONTRADICTED, MassVerdict
 from freeswing.ident.bench.modal import ModalSwing

@@ -23,8 +23,8 @@ from freeswing.ident.bench.diagnose.entries import (
     removed_entry,
     told_entry,
 )
-from freeswing.ident.bench.diagnose.left import remaining
 from freeswing.ident.bench.diagnose.search import Word
+from freeswing.ident.bench.diagnose.unexplained import remaining
 from freeswing.ident.bench.solve import Solved
 from freeswing.ident.bench.swing import COMMON
 from freeswing.ident.bench.told.contradicted import group_sentence, wires_sentence

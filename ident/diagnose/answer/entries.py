@@ -8,9 +8,9 @@ import numpy as np
 
 from freeswing.cdpr.effects import effect_named
 from freeswing.cdpr.robot import INERTIA_NAMES, Array
-from freeswing.ident.diagnose.answer.cut import settled_places
 from freeswing.ident.diagnose.answer.deviations import directions
 from freeswing.ident.diagnose.answer.next_swing import NextSwing
+from freeswing.ident.diagnose.answer.settled_geometry import settled_places
 from freeswing.ident.diagnose.decision import Candidate
 from freeswing.ident.diagnose.experiments import separating_experiment
 from freeswing.ident.likelihood.blocks import INERTIA

@@ -22,8 +22,8 @@ from freeswing.ident.bench.diagnose.causes import (
     wanting,
 )
 from freeswing.ident.bench.diagnose.document import bench_document, experiment_of
-from freeswing.ident.bench.diagnose.left import remaining
 from freeswing.ident.bench.diagnose.removal import Removed, _wires
+from freeswing.ident.bench.diagnose.unexplained import remaining
 from freeswing.ident.bench.modal import ModalSwing
 from freeswing.ident.bench.swing import COMMON, BenchSwing, Column
 from freeswing.ident.likelihood.fit_blocks import linear_problem

@@ -10,7 +10,7 @@ import pytest
 from freeswing.cdpr.model.equations import build_model
 from freeswing.ident.bench.assemble import EFFECTS, Assembled, assembled
 from freeswing.ident.bench.channels import Channel
-from freeswing.ident.bench.considered import believed, considered, gauge, unseen
+from freeswing.ident.bench.held_uncertain import believed, considered, gauge, unseen
 from freeswing.ident.bench.modal import ModalSwing
 from freeswing.ident.bench.runs import Bench, BenchRun, KnownBody, Signal
 from freeswing.ident.bench.swing import BenchSwing

@@ -8,7 +8,7 @@ import pytest
 from freeswing.cdpr.model.equations import build_model
 from freeswing.cdpr.model.statics import modes
 from freeswing.ident.bench.assemble import EFFECTS
-from freeswing.ident.bench.begin import glimpse, sight
+from freeswing.ident.bench.first_guesses import glimpse, sight
 from freeswing.ident.bench.swing import Column
 from tests.ident.bench.test_swing_slopes import trifilar
 

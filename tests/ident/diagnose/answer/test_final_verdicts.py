@@ -5,7 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any
 
-from freeswing.ident.diagnose.answer.last_words import last_words, rivals_of
+from freeswing.ident.diagnose.answer.final_verdicts import final_verdicts, rivals_of
 from freeswing.ident.diagnose.decision import Candidate, Decision
 from freeswing.ident.diagnose.search import Round
 
@@ -31,7 +31,7 @@ def rounds() -> list[Round]:
 
 
 def test_effects_found_beside_one_another_are_no_rivals() -> None:
-    told = {one.effect: one for one in last_words(rounds(), ("drag", "swivel"), {}, ())}
+    told = {one.effect: one for one in final_verdicts(rounds(), ("drag", "swivel"), {}, ())}
     assert told["swivel"].verdict == "accepted"
     assert told["swivel"].confounded_with == ()
     assert told["drag"].verdict == "confounded"
@@ -46,12 +46,12 @@ def test_a_group_of_what_is_all_in_the_model_is_accepted() -> None:
     (one, two) = rounds()
     pair = tuple(word(a, "confounded", (b,)) for a, b in (("drag", "swivel"), ("swivel", "drag")))
     one = Round(one.before, Decision(pair, one.before, "drag", ("drag", "swivel")))
-    told = {c.effect: c for c in last_words([one, two], ("drag", "swivel"), {}, ())}
+    told = {c.effect: c for c in final_verdicts([one, two], ("drag", "swivel"), {}, ())}
     assert told["drag"].verdict == told["swivel"].verdict == "accepted"
 
 
 def test_what_the_final_model_has_not_is_rejected() -> None:
-    told = last_words(rounds(), (), {"clock": "no clock"}, ("clock",))
+    told = final_verdicts(rounds(), (), {"clock": "no clock"}, ("clock",))
     assert {one.effect: one.verdict for one in told} == {
         "drag": "rejected",
         "swivel": "rejected",

@@ -20,7 +20,7 @@ def rivals_of(accepted: Sequence[Round]) -> dict[str, tuple[str, ...]]:
     return found
 
 
-def last_words(
+def final_verdicts(
     rounds: Sequence[Round], final: tuple[str, ...], barred: dict[str, str], names: tuple[str, ...]
 ) -> tuple[Candidate, ...]:
     """Each effect's verdict in the round that accepted it, else in the last that looked at it.

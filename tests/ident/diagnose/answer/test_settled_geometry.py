@@ -7,8 +7,8 @@ import pytest
 
 from freeswing.cdpr.model.equations import build_model
 from freeswing.cdpr.model.known_values import with_known
-from freeswing.ident.diagnose.answer import cut as module
-from freeswing.ident.diagnose.answer.cut import cut, settled_places, with_settled
+from freeswing.ident.diagnose.answer import settled_geometry as module
+from freeswing.ident.diagnose.answer.settled_geometry import cut, settled_places, with_settled
 from freeswing.ident.diagnose.leave_one_out import Evidence
 from tests.oracle.scenes.robots import declared_robot
 
