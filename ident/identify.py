@@ -13,6 +13,7 @@ from freeswing.cdpr.model.equations import Model, build_model
 from freeswing.cdpr.robot import Robot
 from freeswing.ident.estimate import Estimate
 from freeswing.ident.fidim.fidim_stage import Weighting, fidim_estimates
+from freeswing.ident.inertia_starts import likelihood_starts
 from freeswing.ident.judge.comparison import ParameterComparison, between_runs, compare
 from freeswing.ident.judge.far_samples import far_from_prediction
 from freeswing.ident.judge.free_swing_law import LawlessError, fidim_complaint
@@ -21,7 +22,6 @@ from freeswing.ident.judge.prediction import Prediction, fitted_motions
 from freeswing.ident.judge.validate import ValidatedRun, validate_run
 from freeswing.ident.likelihood.cable_ends import GeometryPriors, corrected
 from freeswing.ident.likelihood.calibration_modes import freed
-from freeswing.ident.likelihood.inertia_starts import likelihood_starts
 from freeswing.ident.likelihood.session_estimates import Asked
 from freeswing.ident.runs import SwingRun
 from freeswing.ident.signals.derivatives import SignalSettings

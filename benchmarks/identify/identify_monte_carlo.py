@@ -27,9 +27,10 @@ from freeswing.cdpr.model.regressor import regressor
 from freeswing.cdpr.robot import INERTIA_NAMES, Array
 from freeswing.cdpr.simulation.free_swing import Motion
 from freeswing.ident.fidim.fidim import fidim
-from freeswing.ident.likelihood.fit_swings import fit
+from freeswing.ident.likelihood.blocks import first_unknowns
+from freeswing.ident.likelihood.fit import fit
+from freeswing.ident.likelihood.fit_swings import FreeSwing, Swings
 from freeswing.ident.likelihood.guess_run_start import first_state
-from freeswing.ident.likelihood.joint_problem import State
 from freeswing.ident.likelihood.raw_samples import prepare
 from freeswing.ident.runs import SwingRun
 from freeswing.ident.signals.derivatives import SignalSettings
@@ -64,8 +65,9 @@ def likelihood(runs: list[SwingRun], start: Array, at: list[Motion] | None = Non
         starts = np.array([first_state(model, one, start) for one in samples])
     else:
         starts = np.array([np.concatenate([m.zetas[0], m.rates[0]]) for m in at])
-    state = State(start, model.start_values, starts, np.ones(2))
-    return fit(model, samples, state, estimate_scales=at is None, grow=at is None)
+    unknowns = first_unknowns(model, start, starts, [None] * len(samples))
+    swings = Swings(model, tuple(samples), np.ones(2))
+    return fit(swings, unknowns, FreeSwing(grow=at is None, own_noise=at is None))
 
 
 def bound_of(motions: list[Motion], error_m: float) -> Array:
@@ -97,7 +99,7 @@ def one_draw(motions: list[Motion], seed: int, draw: int, error_m: float) -> dic
         "draw": draw,
         "length_error_mm": 1e3 * error_m,
         "ml": found.inertia.tolist(),
-        "ml_std": found.std.tolist(),
+        "ml_std": found.stds.tolist(),
         "fidim": published.values.tolist(),
         "fidim_std": published.std.tolist(),
         "noise_m": found.noise[0],

@@ -16,7 +16,8 @@ from freeswing.cdpr.robot import Array
 from freeswing.ident.bench.channels import Channel
 from freeswing.ident.bench.runs import Bench, BenchRun
 from freeswing.ident.bench.swing import IZZ, BenchSwing
-from freeswing.ident.likelihood.fit_blocks import How, Solution, fit
+from freeswing.ident.likelihood.fit import Solution, fit
+from freeswing.ident.likelihood.fit_blocks import Dense
 from freeswing.ident.likelihood.unknowns import Mask, Unknowns
 
 COM = np.isin(np.arange(10), (1, 2, 3))  # of a body's ten numbers
@@ -119,7 +120,7 @@ def considered(swings: Sequence[BenchSwing], found: Solution, held: Held) -> Sol
             spread.append(block.prior.std[mask])
     if not picked:
         return found
-    joint = fit(swings, freed, How(steps=0)).covariance
+    joint = fit(swings, freed, Dense(steps=0)).covariance
     told = believed(joint, np.concatenate(picked), np.concatenate(spread))
     return replace(found, covariance=told)
 

@@ -11,7 +11,8 @@ from freeswing.cdpr.robot import Array
 from freeswing.ident.bench.assemble import Assembled
 from freeswing.ident.bench.runs import Bench
 from freeswing.ident.bench.swing import BenchSwing
-from freeswing.ident.likelihood.fit_blocks import How, Solution, fit
+from freeswing.ident.likelihood.fit import Solution, fit
+from freeswing.ident.likelihood.fit_blocks import Dense
 from freeswing.ident.likelihood.unknowns import Gaussian, Unknowns
 
 CONTRADICTED = 3.0  # standard deviations between what runs say and what is stated
@@ -41,7 +42,7 @@ def weighed_mass(
     swings: tuple[BenchSwing, ...],
     found: Solution,
     start: Assembled,
-    how: How,
+    how: Dense,
 ) -> tuple[Solution, MassVerdict | None]:
     """The declared mass is taken where payload runs do not contradict it."""
     declared = model.robot.platform.mass_kg

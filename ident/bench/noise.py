@@ -13,7 +13,7 @@ import numpy as np
 
 from freeswing.cdpr.robot import Array
 from freeswing.ident.bench.swing import BenchSwing
-from freeswing.ident.likelihood.fit_blocks import Solution
+from freeswing.ident.likelihood.fit import Solution
 from freeswing.ident.likelihood.unknowns import Gaussian, Unknown
 
 BAND = 3.0  # times the fastest swing: a cubic map moves power up to three times its frequency

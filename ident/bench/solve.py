@@ -16,11 +16,12 @@ from freeswing.ident.bench.noise import WIDE_SCATTER, rescaled, scatter_block, s
 from freeswing.ident.bench.objects import moments, specific
 from freeswing.ident.bench.runs import Bench
 from freeswing.ident.bench.swing import COMMON, IZZ, BenchSwing
-from freeswing.ident.likelihood.fit_blocks import How, Solution, fit
+from freeswing.ident.likelihood.fit import Solution, fit
+from freeswing.ident.likelihood.fit_blocks import Dense
 from freeswing.ident.likelihood.unknowns import Unknowns
 
-ROUGH = How(steps=30, tolerance=3.0)
-FINE = How(steps=30, tolerance=0.1)
+ROUGH = Dense(steps=30, tolerance=3.0)
+FINE = Dense(steps=30, tolerance=0.1)
 LEAST_FOR_SCATTER = 5  # runs: fewer cannot tell scatter from what is looked for
 
 

@@ -13,8 +13,15 @@ from freeswing.cdpr.robot import Array
 from freeswing.ident.diagnose.outstanding_runs import tempered
 from freeswing.ident.diagnose.spectrum import residual_powers
 from freeswing.ident.judge.consistency import is_possible
-from freeswing.ident.likelihood.blocks import first_unknowns, state_of
-from freeswing.ident.likelihood.fit_swings import CONVERGED_DECREASE, LikelihoodFit, fit
+from freeswing.ident.likelihood.blocks import INERTIA, first_unknowns
+from freeswing.ident.likelihood.fit import fit
+from freeswing.ident.likelihood.fit_swings import (
+    CONVERGED_DECREASE,
+    ONWARD,
+    FreeSwing,
+    LikelihoodFit,
+    Swings,
+)
 from freeswing.ident.likelihood.session_estimates import astray, begun
 from freeswing.ident.signals.prepare import PreparedRun
 
@@ -61,9 +68,9 @@ def base_fit(
         try:
             kept, samples, states, left = begun(model, runs, free, inertia)
             refuse_few(kept)
-            unknowns = first_unknowns(model, inertia, [run.payload for run in samples])
-            start = state_of(unknowns, model, states, noise_scales)
-            rough = fit(model, samples, start, progress=progress, tolerance=ROUGH_TOLERANCE)
+            unknowns = first_unknowns(model, inertia, states, [run.payload for run in samples])
+            swings = Swings(model, tuple(samples), noise_scales)
+            rough = fit(swings, unknowns, FreeSwing(tolerance=ROUGH_TOLERANCE, progress=progress))
         except (ValueError, np.linalg.LinAlgError) as error:
             failure = failure or str(error)
             continue
@@ -76,12 +83,11 @@ def base_fit(
     most = max(len(kept) for _, kept, _ in found)
     best = min((one for one in found if len(one[1]) == most), key=lambda one: one[0].deviance)
     rough, kept, dropped = best
-    exact, samples = replace(rough.state, scales=noise_scales), tempered(rough, noise_scales)
+    swings = replace(rough.swings, samples=tempered(rough, noise_scales), scales=noise_scales)
     # In units of the noise a residual far above it would be followed to its last digit.
     power = rough.cost / rough.n_samples * float(np.max(rough.scales / noise_scales)) ** 2
     tolerance = CONVERGED_DECREASE * max(1.0, power)
-    found_exact = fit(model, samples, exact, estimate_scales=False, grow=False, tolerance=tolerance)
-    return found_exact, kept, dropped
+    return fit(swings, rough.unknowns, replace(ONWARD, tolerance=tolerance)), kept, dropped
 
 
 def refuse_few(runs: list[PreparedRun]) -> None:
@@ -99,7 +105,7 @@ def _is_same(one: LikelihoodFit, other: LikelihoodFit) -> bool:
         return False
     level = abs(one.deviance - other.deviance) < 2.0 * ROUGH_TOLERANCE
     apart = np.abs(one.inertia - other.inertia)
-    return level and bool(np.all(apart < SAME_FIT * one.std[: len(apart)]))
+    return level and bool(np.all(apart < SAME_FIT * one.std(INERTIA)))
 
 
 def _follows(found: LikelihoodFit, noise_scales: Array) -> bool:

@@ -42,10 +42,11 @@ from freeswing.ident.diagnose.unexplained import Unexplained, unexplained
 from freeswing.ident.diagnose.variants import effect_of
 from freeswing.ident.fidim.fidim_stage import fidim_estimates
 from freeswing.ident.identify import session_notes
+from freeswing.ident.inertia_starts import likelihood_starts
 from freeswing.ident.judge.prediction import Stage
 from freeswing.ident.likelihood.calibration_modes import amplitudes_of, with_calibration
-from freeswing.ident.likelihood.fit_swings import LikelihoodFit, fit
-from freeswing.ident.likelihood.inertia_starts import likelihood_starts
+from freeswing.ident.likelihood.fit import fit
+from freeswing.ident.likelihood.fit_swings import FreeSwing, LikelihoodFit
 from freeswing.ident.likelihood.raw_samples import UNIT_NOISE_M, UNIT_NOISE_RAD
 from freeswing.ident.runs import SwingRun
 from freeswing.ident.signals.derivatives import SignalSettings
@@ -357,8 +358,7 @@ def _with_own_noise(found: LikelihoodFit) -> LikelihoodFit:
 
     Its scales follow its residuals, and errors of the cameras' calibration are unknowns too.
     """
-    own = fit(found.model, found.samples, found.state, found.free, grow=False)
-    return with_calibration(own).fit
+    return with_calibration(fit(found.swings, found.unknowns, FreeSwing(grow=False))).fit
 
 
 def _share_explained(search: Search, last: Refit) -> float:

@@ -19,7 +19,7 @@ from freeswing.ident.likelihood.run_residuals import Samples
 OUTSTANDING = 4.0
 
 
-def tempered(found: LikelihoodFit, noise_scales: Array) -> list[Samples]:
+def tempered(found: LikelihoodFit, noise_scales: Array) -> tuple[Samples, ...]:
     """The fit's samples, runs of more than `OUTSTANDING` times the median power held at that.
 
     Args:
@@ -30,4 +30,5 @@ def tempered(found: LikelihoodFit, noise_scales: Array) -> list[Samples]:
     powers = residual_powers(found, noise_scales) * held_back**2
     limit = OUTSTANDING * max(1.0, float(np.median(powers)))
     factors = np.sqrt(np.maximum(1.0, powers / limit))
-    return [replace(s, temper=float(f)) for s, f in zip(found.samples, factors, strict=True)]
+    pairs = zip(found.samples, factors, strict=True)
+    return tuple(replace(s, temper=float(f)) for s, f in pairs)

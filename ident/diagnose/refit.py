@@ -16,10 +16,15 @@ from freeswing.ident.diagnose.outstanding_runs import tempered
 from freeswing.ident.diagnose.screen import screen
 from freeswing.ident.diagnose.spectrum import residual_powers
 from freeswing.ident.diagnose.variants import effect_of, inside
-from freeswing.ident.likelihood.blocks import each_run, effect_blocks, free_of
+from freeswing.ident.likelihood.blocks import (
+    each_run,
+    effect_blocks,
+    effect_values,
+    with_effect_values,
+)
 from freeswing.ident.likelihood.calibration_modes import CONVERGED, freed_samples
-from freeswing.ident.likelihood.fit_swings import LikelihoodFit, correlation_factor, fit
-from freeswing.ident.likelihood.joint_problem import State, with_motions
+from freeswing.ident.likelihood.fit import fit
+from freeswing.ident.likelihood.fit_swings import ONWARD, LikelihoodFit, Swings, correlation_factor
 from freeswing.ident.likelihood.unknowns import Unknowns
 
 RANKING_STEPS = 12
@@ -88,9 +93,9 @@ def refit(
     """
     runs = len(current.samples)
     model, unknowns = _joined(current.model, current.unknowns, candidate, values, runs)
-    state = current.start_of(unknowns, model, noise_scales * np.sqrt(colour))
-    state = with_motions(state, model, current.motions, RANKING_ACCURACY_M)
-    return rescored(_fitted(model, current, state, free_of(unknowns, model)), noise_scales, colour)
+    swings = replace(current.swings, scales=noise_scales * np.sqrt(colour))
+    swings = swings.under(model, unknowns, RANKING_ACCURACY_M)
+    return rescored(_ranked(swings, unknowns, current.cost), noise_scales, colour)
 
 
 def _joined(
@@ -132,8 +137,7 @@ def displaced(
     for key in keys:
         nothing = [p.start for p in effect_named(effect_of(key)).parameters(model.robot)]
         model, unknowns = _joined(model, unknowns, key, np.array(nothing), len(found.samples))
-    state = found.start_of(unknowns, model, scales)
-    values = state.values.copy()
+    values = effect_values(unknowns, model)
     chosen = np.concatenate(
         [
             np.arange(len(values))[model.place_of(effect_of(key))][inside(model.robot, key)]
@@ -142,16 +146,16 @@ def displaced(
     )
     values[chosen] = centre
     known = with_known(model, chosen, centre, covariance, BY_LENGTHS)
-    start = replace(state, values=values)
-    return polished(_fitted(known, found, start, free_of(unknowns, model)), noise_scales)
+    unknowns = with_effect_values(unknowns, known, values)
+    swings = Swings(known, found.samples, scales)
+    return polished(_ranked(swings, unknowns, found.cost), noise_scales)
 
 
 def polished(found: LikelihoodFit, noise_scales: Array) -> Refit:
     """A fit that goes on to convergence."""
     colour = colour_of(found, noise_scales)
-    state = replace(found.state, scales=noise_scales * np.sqrt(colour))
-    samples = tempered(found, noise_scales)
-    exact = fit(found.model, samples, state, found.free, estimate_scales=False, grow=False)
+    samples, scales = tempered(found, noise_scales), noise_scales * np.sqrt(colour)
+    exact = fit(replace(found.swings, samples=samples, scales=scales), found.unknowns, ONWARD)
     return freed(rescored(exact, noise_scales, colour), noise_scales, colour)
 
 
@@ -167,9 +171,8 @@ def freed(one: Refit, noise_scales: Array, colour: float) -> Refit:
     step = one.score.change[len(one.score.change) - common :]
     if np.abs(step).max(initial=0.0) < CONVERGED:
         return one
-    state = replace(found.state, scales=noise_scales * np.sqrt(colour))
-    samples = freed_samples(found, step)
-    exact = fit(found.model, samples, state, found.free, estimate_scales=False, grow=False)
+    samples, scales = freed_samples(found, step), noise_scales * np.sqrt(colour)
+    exact = fit(replace(found.swings, samples=samples, scales=scales), found.unknowns, ONWARD)
     return rescored(exact, noise_scales, colour_of(exact, noise_scales))
 
 
@@ -177,26 +180,19 @@ def without(found: LikelihoodFit, name: str, noise_scales: Array) -> Refit:
     """A fit without one of its effects, from where it stands, converged."""
     mine = (name, each_run(name)) if each_run(name) in found.unknowns else (name,)
     unknowns, fewer = found.unknowns.without(*mine), without_effect(found.model, name)
-    state = found.start_of(unknowns, fewer, found.scales)
-    exact = fit(
-        fewer, found.samples, state, free_of(unknowns, fewer), estimate_scales=False, grow=False
-    )
+    exact = fit(Swings(fewer, found.samples, found.scales), unknowns, ONWARD)
     return rescored(exact, noise_scales, colour_of(exact, noise_scales))
 
 
-def _fitted(model: Model, current: LikelihoodFit, state: State, free: np.ndarray) -> LikelihoodFit:
-    """Converged to a ten-thousandth of the cost: enough to rank candidates."""
-    return fit(
-        model,
-        current.samples,
-        state,
-        free,
-        estimate_scales=False,
-        grow=False,
+def _ranked(swings: Swings, unknowns: Unknowns, cost: float) -> LikelihoodFit:
+    """Converged to a ten-thousandth of the cost before: enough to rank candidates."""
+    how = replace(
+        ONWARD,
         steps=RANKING_STEPS,
-        tolerance=max(0.1, 1e-4 * current.cost),
+        tolerance=max(0.1, 1e-4 * cost),
         accuracy_m=RANKING_ACCURACY_M,
     )
+    return fit(swings, unknowns, how)
 
 
 def plausible(refitted: Refit, key: str) -> list[str]:
@@ -205,7 +201,7 @@ def plausible(refitted: Refit, key: str) -> list[str]:
     where = refitted.values_of(name)
     chosen = np.flatnonzero(inside(refitted.fit.model.robot, key))
     parameters = [refitted.fit.model.parameters[where][k] for k in chosen]
-    stds = refitted.fit.std_of(name)[chosen]
+    stds = refitted.fit.std(name)[chosen]
     values = refitted.fit.values[where][chosen]
     complaints = []
     for parameter, value, std in zip(parameters, values, stds, strict=True):

@@ -10,11 +10,12 @@ import numpy as np
 from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.robot import POSE_COORDINATES, Array, frozen_array
 from freeswing.cdpr.rotation import pose_differences
-from freeswing.ident.likelihood.blocks import first_unknowns, none_free, state_of
-from freeswing.ident.likelihood.fit_swings import LikelihoodFit, fit
-from freeswing.ident.likelihood.joint_problem import State
+from freeswing.ident.likelihood.blocks import STARTS, each_run, first_unknowns, split_own
+from freeswing.ident.likelihood.fit import fit
+from freeswing.ident.likelihood.fit_swings import ONWARD, FreeSwing, LikelihoodFit, Swings
 from freeswing.ident.likelihood.run_residuals import Samples, predicted, residuals
 from freeswing.ident.likelihood.session_estimates import sampled, started
+from freeswing.ident.likelihood.unknowns import Unknowns
 from freeswing.ident.signals.band import independent_numbers
 from freeswing.ident.signals.prepare import PreparedRun
 
@@ -138,39 +139,45 @@ def _fitted_to(
     """A run's own unknowns under a model, from where they were under another or from a guess."""
     model = stage.model
     if before is not None:
-        samples = _thinned(sampled(run, free))
-        unknowns = first_unknowns(model, stage.inertia, [samples.payload], stage.values)
-        state = _carried(state_of(unknowns, model, before.state.starts, np.ones(2)), model, before)
-        found = _near(model, samples, state, _AS_GOOD * _error(before))
+        swings = Swings(model, (_thinned(sampled(run, free)),), np.ones(2))
+        unknowns = _carried(_held(stage, swings, before.value(STARTS)), model, before)
+        found = _near(swings, unknowns, _AS_GOOD * _error(before))
         if found is not None:
             return _weighed(found)
     samples, first = started(model, run, free, stage.inertia)
-    samples = _thinned(samples)
-    unknowns = first_unknowns(model, stage.inertia, [samples.payload], stage.values)
-    return _weighed(_followed(model, samples, state_of(unknowns, model, first[None], np.ones(2))))
+    swings = Swings(model, (_thinned(samples),), np.ones(2))
+    return _weighed(_followed(swings, _held(stage, swings, first[None])))
 
 
-def _carried(state: State, model: Model, before: LikelihoodFit) -> State:
-    """A state with what the run had for itself before, by name."""
+def _held(stage: Stage, swings: Swings, starts: Array) -> Unknowns:
+    """Unknowns of a run of which only its own are looked for."""
+    payloads = [run.payload for run in swings.samples]
+    unknowns = first_unknowns(stage.model, stage.inertia, starts, payloads, stage.values)
+    return unknowns.all_held()
+
+
+def _carried(unknowns: Unknowns, model: Model, before: LikelihoodFit) -> Unknowns:
+    """The same with what the run had for itself before, by name."""
     known = dict(zip(before.model.names, before.motions[0].values, strict=True))
-    own = np.zeros((1, 0)) if state.own_values is None else state.own_values.copy()
-    for place, k in enumerate(model.own_values):
-        own[0, place] = known.get(model.names[k], own[0, place])
-    return replace(state, own_values=own)
+    own = {}
+    for name, values in split_own(model, model.own_values[None]).items():
+        told = unknowns.value(each_run(name))[0]
+        pairs = zip(values[0], told, strict=True)
+        own[each_run(name)] = np.array([[known.get(model.names[k], was) for k, was in pairs]])
+    return unknowns.moved(own)
 
 
-def _near(model: Model, samples: Samples, state: State, error: float) -> LikelihoodFit | None:
+def _near(swings: Swings, unknowns: Unknowns, error: float) -> LikelihoodFit | None:
     """The fit from a start that is near already; None where it turns out not to be.
 
     Args:
-        model: with the state's values.
-        samples: of the run.
-        state: where to start.
+        swings: the run.
+        unknowns: where to start.
         error: that of the fit that the start is from, or a little more: what is no worse is no
             more astray than that was.
     """
     try:
-        found = _fitted(model, samples, state, grow=False)
+        found = _fitted(swings, unknowns, grow=False)
     except (ValueError, np.linalg.LinAlgError):
         return None
     good = not _is_astray(found) or _error(found) <= error
@@ -200,19 +207,19 @@ def fitted_motions(found: LikelihoodFit) -> tuple[Prediction, ...]:
     return tuple(told)
 
 
-def _followed(model: Model, samples: Samples, state: State) -> LikelihoodFit:
+def _followed(swings: Swings, unknowns: Unknowns) -> LikelihoodFit:
     """The fit of the start over the whole run at once, or grown into it where that is astray.
 
     A start too far off leaves the simulated swing out of phase, lets no step lower the cost, or
     cannot be simulated so long.
     """
     try:
-        quick = _fitted(model, samples, state, grow=False)
+        quick = _fitted(swings, unknowns, grow=False)
     except (ValueError, np.linalg.LinAlgError):
-        return _fitted(model, samples, state, grow=True)
+        return _fitted(swings, unknowns, grow=True)
     if quick.stop.converged and not _is_astray(quick):
         return quick
-    careful = _fitted(model, samples, state, grow=True)
+    careful = _fitted(swings, unknowns, grow=True)
     return min(quick, careful, key=lambda one: one.deviance)
 
 
@@ -239,13 +246,12 @@ def _weighed(found: LikelihoodFit) -> LikelihoodFit:
     (samples,), (motion,) = found.samples, found.motions
     white = residuals(motion, samples, found.scales)
     coloured = max(1.0, white.size / independent_numbers(white))
-    state = replace(found.state, scales=found.scales * np.sqrt(coloured))
-    free = none_free(found.model)
-    return fit(found.model, [samples], state, free, estimate_scales=False, grow=False)
+    swings = replace(found.swings, scales=found.scales * np.sqrt(coloured))
+    return fit(swings, found.unknowns, ONWARD)
 
 
-def _fitted(model: Model, samples: Samples, state: State, grow: bool) -> LikelihoodFit:
-    return fit(model, [samples], state, free=none_free(model), grow=grow)
+def _fitted(swings: Swings, unknowns: Unknowns, grow: bool) -> LikelihoodFit:
+    return fit(swings, unknowns, FreeSwing(grow=grow))
 
 
 def _seen(found: LikelihoodFit) -> Array:

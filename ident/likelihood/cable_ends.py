@@ -16,7 +16,8 @@ import numpy as np
 from freeswing.cdpr.measured.slow_errors import STATED_BY_RUN
 from freeswing.cdpr.model.equations import Model, build_model
 from freeswing.cdpr.robot import Array, Robot
-from freeswing.ident.likelihood.fit_swings import LikelihoodFit, fit
+from freeswing.ident.likelihood.fit import fit
+from freeswing.ident.likelihood.fit_swings import ONWARD, LikelihoodFit
 
 _ENTRY, _ATTACHMENT = "anchor_offset", "attachment_offset"
 
@@ -91,21 +92,14 @@ def weighed_against_priors(found: LikelihoodFit, consistent: bool = False) -> Li
     """
     if not len(found.values) or found.enlargement == 1.0 or found.rank < int(found.free.sum()):
         return found
-    start = replace(found.state, scales=found.scales * np.sqrt(found.enlargement))
-    again = fit(
-        found.model,
-        found.samples,
-        start,
-        estimate_scales=False,
-        grow=False,
-        consistent=consistent,
-    )
+    swings = replace(found.swings, scales=found.scales * np.sqrt(found.enlargement))
+    again = fit(swings, found.unknowns, replace(ONWARD, consistent=consistent))
     return replace(again, covariance=again.covariance / again.enlargement)
 
 
 def geometry_document(found: LikelihoodFit) -> dict[str, Any]:
     """`geometry` of an estimate's entry: each coordinate's correction; empty where it was exact."""
-    stds = np.concatenate([np.zeros(0), *(found.std_of(name) for name in found.model.effects)])
+    stds = np.concatenate([np.zeros(0), *(found.std(name) for name in found.model.effects)])
     rows = [
         {"name": name, "value": float(value), "std": float(std), "prior_std": parameter.prior_std}
         for name, value, std, parameter in zip(

@@ -21,7 +21,9 @@ from freeswing.cdpr.robot import Array
 from freeswing.cdpr.rotation import angle_rate_matrix, matrix_from_angles
 from freeswing.cdpr.simulation.free_swing import Motion
 from freeswing.cdpr.simulation.sensitivity import linearise
-from freeswing.ident.likelihood.fit_swings import LikelihoodFit, fit
+from freeswing.ident.likelihood.blocks import state_of
+from freeswing.ident.likelihood.fit import fit
+from freeswing.ident.likelihood.fit_swings import FreeSwing, LikelihoodFit
 from freeswing.ident.likelihood.joint_problem import Problem
 from freeswing.ident.likelihood.run_residuals import Samples, reduce_run
 from freeswing.ident.runs import SwingRun
@@ -81,14 +83,8 @@ def with_calibration(found: LikelihoodFit, consistent: bool = False) -> Calibrat
     current = found
     for _ in range(ROUNDS):
         step = _solved(current).step
-        current = fit(
-            current.model,
-            freed_samples(current, step),
-            current.state,
-            current.free,
-            grow=False,
-            consistent=consistent,
-        )
+        swings = replace(current.swings, samples=freed_samples(current, step))
+        current = fit(swings, current.unknowns, FreeSwing(grow=False, consistent=consistent))
         if np.abs(step).max() < CONVERGED:
             break
     joint = _solved(current)
@@ -111,7 +107,7 @@ def amplitudes_of(samples: Sequence[Samples]) -> Array:
     return np.zeros(counts.pop() if counts else 0) if known is None else known
 
 
-def freed_samples(found: LikelihoodFit, step: Array) -> list[Samples]:
+def freed_samples(found: LikelihoodFit, step: Array) -> tuple[Samples, ...]:
     """A fit's samples with so much more of the errors that they share taken out.
 
     Args:
@@ -119,14 +115,14 @@ def freed_samples(found: LikelihoodFit, step: Array) -> list[Samples]:
         step: of the amplitudes, (r,).
     """
     amplitudes = amplitudes_of(found.samples) + step
-    return [
+    return tuple(
         replace(
             run,
             values=run.values - motion_shifts(motion, run, len(step))[:, run.columns] @ step,
             freed=amplitudes,
         )
         for motion, run in zip(found.motions, found.samples, strict=True)
-    ]
+    )
 
 
 def freed(run: SwingRun, amplitudes: Array) -> SwingRun:
@@ -216,15 +212,16 @@ def _solved(current: LikelihoodFit) -> _Joint:
     amplitudes = amplitudes_of(current.samples)
     n_modes, n_shared = len(amplitudes), problem.layout.size
     layout = problem.layout.joined(MODES, n_modes)
+    state = state_of(current.unknowns, current.model, current.scales)
     weight = 1.0 / np.sqrt(current.enlargement)
     rows = []
     for motion, run in zip(current.motions, current.samples, strict=True):
         shifts = motion_shifts(motion, run, n_modes)
         found = reduce_run(linearise(motion), run, current.scales, shifts).rows[:-1]
-        shared = problem.shared_map(len(rows), current.state)
+        shared = problem.shared_map(len(rows), state)
         by_shared = found[:, : len(shared)] @ shared
         rows.append(weight * np.hstack([by_shared, found[:, len(shared) :]]))
-    prior = problem.prior_rows(current.state)
+    prior = problem.prior_rows(state)
     rows.append(np.hstack([prior[:, :-1], np.zeros((len(prior), n_modes)), prior[:, -1:]]))
     rows.append(np.hstack([np.zeros((n_modes, n_shared)), np.eye(n_modes), amplitudes[:, None]]))
     kept = np.concatenate([problem.free, np.ones(n_modes, dtype=bool)])

@@ -1,4 +1,4 @@
-"""One fit for every kind of unknown: Levenberg-Marquardt over named blocks.
+"""The fit of runs that tell their slopes by block: Levenberg-Marquardt over all of them.
 
 Unknowns that each run has for itself are eliminated run by run through QR; what is left goes into
 one small triangle (Bjoerck, Numerical Methods for Least Squares Problems, 1996, sec. 6.3).
@@ -15,9 +15,9 @@ import numpy as np
 
 from freeswing.cdpr.descent import LevenbergMarquardt, Stop, Undamped, converged
 from freeswing.cdpr.robot import Array
+from freeswing.ident.likelihood.fit import RANK_LIMIT, Solution, shared_covariance
 from freeswing.ident.likelihood.unknowns import Unknown, Unknowns
 
-RANK_LIMIT = 1e-9  # singular values of the scaled triangle below so much of the largest are none
 FIRST_DAMPING = 1e-4  # of a column's own curvature, where a full step has failed
 LARGEST_DAMPING = 1e8  # from here on a step is too small to lower anything
 ROUNDING = 1e-12  # share of the cost by which a step may raise it and still stand
@@ -49,8 +49,8 @@ class Swing(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class How:
-    """How to fit.
+class Dense:
+    """How to fit runs whose rows are told by block.
 
     Attributes:
         steps: at most so many.
@@ -63,58 +63,21 @@ class How:
     tolerance: float = 1e-3
     farthest: float = 5.0
 
+    def fitted(self, swings: Sequence[Swing], unknowns: Unknowns) -> Solution:
+        """The least sum of squares near where the unknowns start.
 
-@dataclass(frozen=True, slots=True)
-class Solution:
-    """What a fit gave.
-
-    Attributes:
-        unknowns: at the minimum.
-        covariance: of all shared unknowns in the order of their blocks, zero where held, infinite
-            on the diagonal where the rank does not suffice.
-        cost: sum of the squared whitened residuals and prior distances.
-        residuals: of each run, whitened.
-        singular_values: of the scaled triangle in the estimated shared unknowns, descending.
-        rank: how many of them count.
-        steps: taken.
-        stop: why it ended.
-    """
-
-    unknowns: Unknowns
-    covariance: Array
-    cost: float
-    residuals: tuple[Array, ...]
-    singular_values: Array
-    rank: int
-    steps: int
-    stop: Stop
-
-    @property
-    def reason(self) -> str:
-        """Why it ended, a sentence."""
-        return self.stop.sentence
-
-    @property
-    def converged(self) -> bool:
-        """Whether it ended because nothing could be gained any more."""
-        return self.stop.converged
-
-    def place(self, name: str) -> slice:
-        """Where a shared block stands in the covariance."""
-        return self.unknowns.place(name)
-
-    def value(self, name: str) -> Array:
-        """Values of a block."""
-        return self.unknowns.block(name).value
-
-    def covariance_of(self, *names: str) -> Array:
-        """Joint covariance of some shared blocks."""
-        places = self.unknowns.columns(*names)
-        return self.covariance[np.ix_(places, places)]
-
-    def std(self, name: str) -> Array:
-        """Standard deviations of a shared block."""
-        return np.sqrt(np.diag(self.covariance_of(name)))
+        Raises:
+            ValueError: when the start itself has no residuals, naming the run.
+        """
+        damping = Undamped(
+            raised=FIRST_DAMPING, relief=3.0, least=FIRST_DAMPING, largest=LARGEST_DAMPING
+        )
+        search = LevenbergMarquardt(
+            self.steps, damping, level=True, slack=ROUNDING, farthest=self.farthest
+        )
+        start = _Place(tuple(swings), unknowns, _simulated(swings, unknowns))
+        place, taken, stop = search.descend(_Blocks(self), start)
+        return _packed(place.parts, place.unknowns, place.cost, taken, stop)
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,31 +94,6 @@ class _Step:
         """Largest change of an unknown, in its scale."""
         changes = (*self.shared.values(), *self.own.values())
         return max(float(np.abs(change).max(initial=0.0)) for change in changes)
-
-
-def fit(swings: Sequence[Swing], unknowns: Unknowns, how: How | None = None) -> Solution:
-    """Minimise the sum of squares of all runs' residuals and the unknowns' prior distances.
-
-    Args:
-        swings: the runs.
-        unknowns: where to start; blocks of each run have one row a swing.
-        how: settings.
-
-    Raises:
-        ValueError: without a run, or when the start itself has no residuals, naming the run.
-    """
-    how = how or How()
-    if not swings:
-        raise ValueError("no run to fit")
-    damping = Undamped(
-        raised=FIRST_DAMPING, relief=3.0, least=FIRST_DAMPING, largest=LARGEST_DAMPING
-    )
-    search = LevenbergMarquardt(
-        how.steps, damping, level=True, slack=ROUNDING, farthest=how.farthest
-    )
-    start = _Place(tuple(swings), unknowns, _simulated(swings, unknowns))
-    place, taken, stop = search.descend(_Blocks(how), start)
-    return _packed(place.parts, place.unknowns, place.cost, taken, stop)
 
 
 @dataclass(frozen=True)
@@ -183,7 +121,7 @@ class _Place:
 class _Blocks:
     """The fit as the search sees it."""
 
-    how: How
+    how: Dense
 
     def step(self, place: _Place, damping: float) -> _Step:
         return _step(place.parts, place.unknowns, damping)
@@ -373,14 +311,8 @@ def _packed(parts: list[Part], unknowns: Unknowns, cost: float, taken: int, stop
     step = _step(parts, unknowns, 0.0)
     free = _joined([block.mask for block in unknowns.shared]).astype(bool)
     scales = _joined([block.scale for block in unknowns.shared])
-    covariance = np.zeros((len(free), len(free)))
     kept = step.singular_values > RANK_LIMIT * step.singular_values.max(initial=0.0)
-    places = np.flatnonzero(free)
-    if not kept.all():
-        covariance[places, places] = np.inf
-    elif len(places):
-        inverse = np.linalg.inv(step.triangle) * scales[free][:, None]
-        covariance[np.ix_(places, places)] = inverse @ inverse.T
+    covariance = shared_covariance(step.triangle, bool(kept.all()), free, scales)
     n_own = sum(block.size for block in unknowns.own)
     white = tuple(residuals[: len(residuals) - n_own] for residuals, _, _ in parts)
     rank = int(kept.sum())

@@ -9,7 +9,7 @@ rough start. Derivatives are exact throughout.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,16 +17,24 @@ from freeswing.cdpr.descent import Stop
 from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.robot import Array
 from freeswing.cdpr.simulation.free_swing import Motion
+from freeswing.cdpr.simulation.nearby import obeys
 from freeswing.ident.likelihood.between_runs import jackknife_std
-from freeswing.ident.likelihood.blocks import model_unknowns, none_free, state_of
-from freeswing.ident.likelihood.fit_blocks import Solution
-from freeswing.ident.likelihood.joint_problem import TOLERANCE_M, Problem, State, Step
+from freeswing.ident.likelihood.blocks import (
+    effect_values,
+    free_of,
+    model_unknowns,
+    refuse_others,
+    state_of,
+)
+from freeswing.ident.likelihood.fit import Solution, shared_covariance
+from freeswing.ident.likelihood.joint_problem import INERTIA, TOLERANCE_M, Problem, State, Step
 from freeswing.ident.likelihood.minimise import minimised
 from freeswing.ident.likelihood.payload_runs import Loads
 from freeswing.ident.likelihood.run_residuals import Samples, differences, predicted, residuals
-from freeswing.ident.likelihood.unknowns import Unknowns
+from freeswing.ident.likelihood.unknowns import Mask, Unknowns
 
 Progress = Callable[[str, float], None]
+WHOLE = "maximum likelihood: whole runs"
 
 FIRST_STATES_S = 0.4  # short enough that no mode turns round: rough first states become good
 FIRST_STRETCH_S = 1.5
@@ -42,92 +50,111 @@ TIGHTER_LENGTH_STD_M = 2e-5
 
 
 @dataclass(frozen=True, slots=True)
-class LikelihoodFit:
-    """The estimate.
+class Swings:
+    """Runs of free swings as a fit sees them.
 
     Attributes:
-        model: the equations fitted.
-        inertia: `INERTIA_NAMES` values, (9,).
-        loads: what payload runs add to the unknowns (see `ident.likelihood.payload_runs`), (u,).
-        values: effect values, (k,); root mean squares over the runs of those that each run has
-            for itself (its motion holds them).
-        free: which of the shared unknowns were estimated: inertia, values, loads, (9 + k + u,).
-        covariance: of all shared unknowns, (9 + k + u, 9 + k + u), zero where not estimated,
-            infinite on the diagonal where the rank does not suffice; enlarged by `correlation`.
-        correlation: power of the residuals in the band of the motion over that of white noise of
-            the same variance: above 1 the model misses something, or the noise is not white.
+        model: the equations, with the effects to be estimated.
+        samples: one a run; see `ident.likelihood.raw_samples.prepare`.
         scales: factors on the stated (or unit) noise of metres and radians, (2,).
-        noise: rms of the residuals in metres and radians, (2,), NaN where there are none.
-        deviance: -2 log likelihood up to a constant.
-        cost: sum of squared whitened residuals.
-        motions: one fitted motion a run.
-        samples: what they were fitted to.
-        singular_values: of the whitened, column-scaled joint problem, descending.
-        rank: how many of them count.
-        steps: Gauss-Newton steps taken.
-        stop: why the iteration ended.
-        between: standard deviations of the shared unknowns by leaving out one run at a time,
-            (9 + k + u,), zero where not estimated or where there are fewer than three runs.
+        motions: of the runs, where known: not simulated again where the unknowns are theirs.
     """
 
     model: Model
-    inertia: Array
-    values: Array
-    loads: Array
-    free: np.ndarray
-    covariance: Array
-    correlation: float
+    samples: tuple[Samples, ...]
     scales: Array
+    motions: tuple[Motion, ...] = ()
+
+    def __len__(self) -> int:
+        """How many there are."""
+        return len(self.samples)
+
+    @property
+    def loads(self) -> Loads:
+        """What the runs carry."""
+        return Loads.of([run.payload for run in self.samples])
+
+    def under(self, model: Model, unknowns: Unknowns, tolerance_m: float) -> Swings:
+        """The same runs under another model; their motions stay where it has them too.
+
+        A candidate that does nothing yet changes no motion: none has to be simulated again.
+
+        Args:
+            model: which the motions may obey.
+            unknowns: of that model, starts those of the motions.
+            tolerance_m: local error that a segment may have.
+        """
+        state = state_of(unknowns, model, self.scales)
+        told = tuple(
+            replace(one, model=model, values=state.values_of(run, model.own_values))
+            for run, one in enumerate(self.motions)
+        )
+        kept = told if all(obeys(one, tolerance_m) for one in told) else ()
+        return replace(self, model=model, motions=kept)
+
+
+@dataclass(frozen=True, slots=True)
+class LikelihoodFit(Solution):
+    """The estimate.
+
+    Its `unknowns` are inertia, effects, payloads and starts (see `ident.likelihood.blocks`); of the
+    shared ones `covariance` is (p, p), p = 9 + k + u, and enlarged by `correlation`.
+
+    Attributes:
+        swings: the runs, with the noise scales and the motions found.
+        correlation: power of the residuals in the band of the motion over that of white noise of
+            the same variance: above 1 the model misses something, or the noise is not white.
+        noise: rms of the residuals in metres and radians, (2,), NaN where there are none.
+        deviance: -2 log likelihood up to a constant.
+        between: standard deviations of the shared unknowns by leaving out one run at a time, (p,),
+            zero where not estimated or where there are fewer than three runs.
+    """
+
+    swings: Swings
+    correlation: float
     noise: Array
     deviance: float
-    cost: float
-    motions: tuple[Motion, ...]
-    samples: tuple[Samples, ...]
-    singular_values: Array
-    rank: int
-    steps: int
-    stop: Stop
     between: Array
 
     @property
-    def reason(self) -> str:
-        """Why the iteration ended, a sentence."""
-        return self.stop.sentence
+    def model(self) -> Model:
+        """The equations fitted."""
+        return self.swings.model
 
     @property
-    def std(self) -> Array:
-        """Standard deviations of the shared unknowns, (9 + k + u,)."""
+    def samples(self) -> tuple[Samples, ...]:
+        """What was fitted, one a run."""
+        return self.swings.samples
+
+    @property
+    def motions(self) -> tuple[Motion, ...]:
+        """What was found, one a run."""
+        return self.swings.motions
+
+    @property
+    def scales(self) -> Array:
+        """Factors on the stated (or unit) noise of metres and radians, (2,)."""
+        return self.swings.scales
+
+    @property
+    def inertia(self) -> Array:
+        """`INERTIA_NAMES` values, (9,)."""
+        return self.value(INERTIA)
+
+    @property
+    def values(self) -> Array:
+        """Effect values, (k,); of those that each run has for itself root mean squares."""
+        return effect_values(self.unknowns, self.model)
+
+    @property
+    def free(self) -> Mask:
+        """Which of the shared unknowns were estimated, (p,)."""
+        return free_of(self.unknowns, self.model)
+
+    @property
+    def stds(self) -> Array:
+        """Standard deviations of the shared unknowns, (p,)."""
         return np.sqrt(np.diag(self.covariance))
-
-    @property
-    def unknowns(self) -> Unknowns:
-        """All of them by name (see `ident.likelihood.blocks`)."""
-        own = np.array([motion.values[self.model.own_values] for motion in self.motions])
-        loads = Loads.of([run.payload for run in self.samples])
-        return model_unknowns(
-            self.model, self.inertia, self.values, own, loads, self.loads, self.free
-        )
-
-    @property
-    def solution(self) -> Solution:
-        """The same as every fit of named blocks gives it."""
-        pairs = zip(self.motions, self.samples, strict=True)
-        white = tuple(residuals(motion, run, self.scales).ravel() for motion, run in pairs)
-        found = (self.unknowns, self.covariance, self.cost, white, self.singular_values)
-        return Solution(*found, self.rank, self.steps, self.stop)
-
-    def covariance_of(self, *names: str) -> Array:
-        """Joint covariance of some blocks of the shared unknowns."""
-        places = self.unknowns.columns(*names)
-        return self.covariance[np.ix_(places, places)]
-
-    def std_of(self, name: str) -> Array:
-        """Standard deviations of a block of the shared unknowns."""
-        return self.std[self.unknowns.place(name)]
-
-    def start_of(self, unknowns: Unknowns, model: Model, scales: Array) -> State:
-        """Where a fit of another model goes on from the runs' states as they are here."""
-        return state_of(unknowns, model, self.state.starts, scales)
 
     @property
     def enlargement(self) -> float:
@@ -139,74 +166,87 @@ class LikelihoodFit:
         """How many numbers were fitted."""
         return sum(run.values.size for run in self.samples)
 
-    @property
-    def state(self) -> State:
-        """All unknowns, to start another fit from."""
-        starts = np.array([np.concatenate([m.zetas[0], m.rates[0]]) for m in self.motions])
-        own = np.array([m.values[self.model.own_values] for m in self.motions])
-        return State(self.inertia, self.values, starts, self.scales, self.motions, own, self.loads)
 
+@dataclass(frozen=True, slots=True)
+class FreeSwing:
+    """How to fit free swings: each reduced to a triangle; a search that may climb.
 
-def fit(
-    model: Model,
-    samples: Sequence[Samples],
-    start: State,
-    free: np.ndarray | None = None,
-    progress: Progress | None = None,
-    estimate_scales: bool = True,
-    grow: bool = True,
-    steps: int = STEPS,
-    tolerance: float = CONVERGED_DECREASE,
-    accuracy_m: float = TOLERANCE_M,
-    consistent: bool = False,
-) -> LikelihoodFit:
-    """Fit inertia, effect values, initial states and lengths to the samples of the runs.
-
-    Args:
-        model: the equations, with the effects to be estimated.
-        samples: of the runs; see `ident.likelihood.raw_samples.prepare`.
-        start: first guesses; its motions are not needed.
-        free: which of the 9 + k shared unknowns to estimate; None for all.
-        progress: told a label and a fraction.
-        estimate_scales: whether noise scales follow the residuals.
-        grow: False when the start is close over the whole length of the runs already.
+    Attributes:
         steps: at most so many Gauss-Newton steps on the whole runs.
         tolerance: converged when an undamped step lowers the cost by less.
-        accuracy_m: local error of the simulated motions.
+        grow: False when the start is close over the whole length of the runs already.
+        own_noise: whether noise scales follow the residuals.
         consistent: hold the inertia, of which all is then free, to what a body can have.
-
-    Raises:
-        ValueError: when no run is given, or a start cannot be simulated, with the reason.
+        accuracy_m: local error of the simulated motions.
+        progress: told a label and a fraction.
     """
-    if not samples:
-        raise ValueError("no run to fit")
-    stages = stretches(samples) if grow else []
-    state, total = start, len(stages) + 1
-    none = none_free(model)
+
+    steps: int = STEPS
+    tolerance: float = CONVERGED_DECREASE
+    grow: bool = True
+    own_noise: bool = True
+    consistent: bool = False
+    accuracy_m: float = TOLERANCE_M
+    progress: Progress | None = None
+
+    def fitted(self, swings: Swings, unknowns: Unknowns) -> LikelihoodFit:
+        """Inertia, effect values, payloads, initial states and lengths that make runs likeliest.
+
+        Raises:
+            ValueError: when a block is not what the model makes of it, or a start cannot be
+                simulated, with the reason.
+        """
+        refuse_others(unknowns, swings.model, swings.loads)
+        free = free_of(unknowns, swings.model)
+        state = replace(state_of(unknowns, swings.model, swings.scales), motions=swings.motions)
+        if self.grow:
+            state = _grown(swings, state, free, self)
+        else:
+            self.tell(WHOLE, 0.0)
+        problem = _problem(swings.model, swings.samples, free, self, self.accuracy_m)
+        state, step, taken, stop = minimised(problem, state, self.steps, self.tolerance)
+        self.tell("maximum likelihood", 1.0)
+        return _packed(problem, state, step, taken, stop)
+
+    def tell(self, label: str, fraction: float) -> None:
+        """How far the fit is, to whom it may concern."""
+        if self.progress:
+            self.progress(label, fraction)
+
+
+ONWARD = FreeSwing(grow=False, own_noise=False)  # from where another fit stands, its noise told
+
+
+def _grown(swings: Swings, state: State, free: Mask, how: FreeSwing) -> State:
+    """Near enough to fit whole runs: fitted to growing stretches, lengths let down in stages."""
+    model, samples = swings.model, swings.samples
+    stages = stretches(samples)
+    total, none = len(stages) + 1, np.zeros_like(free)
     for index, end_s in enumerate(stages):
-        if progress:
-            progress(f"maximum likelihood: first {end_s:.1f} s", index / total)
+        how.tell(f"maximum likelihood: first {end_s:.1f} s", index / total)
         parts = [run.until(run.span_s[0] + end_s).loosened(LOOSE_LENGTH_STD_M) for run in samples]
         if index == 0:
             for first_s in (FIRST_STATES_S, end_s):
                 short = [run.until(run.span_s[0] + first_s) for run in parts]
-                states_alone = Problem(model, short, none, estimate_scales)
+                states_alone = Problem(model, short, none, how.own_noise)
                 state = minimised(states_alone, state, STEPS, ROUGH_DECREASE)[0]
-        problem = Problem(model, parts, free, estimate_scales, consistent=consistent)
-        state = minimised(problem, state, STEPS, ROUGH_DECREASE)[0]
-    if progress:
-        progress("maximum likelihood: whole runs", (total - 1) / total)
-    if grow:
-        for std in (LOOSE_LENGTH_STD_M, TIGHTER_LENGTH_STD_M):
-            if any(run.lengths_m is not None and run.lengths_std_m < std for run in samples):
-                loose = [run.loosened(std) for run in samples]
-                problem = Problem(model, loose, free, estimate_scales, consistent=consistent)
-                state = minimised(problem, state, STEPS, ROUGH_DECREASE)[0]
-    problem = Problem(model, samples, free, estimate_scales, accuracy_m, consistent)
-    state, step, taken, stop = minimised(problem, state, steps, tolerance)
-    if progress:
-        progress("maximum likelihood", 1.0)
-    return _packed(problem, state, step, taken, stop)
+        state = minimised(_problem(model, parts, free, how), state, STEPS, ROUGH_DECREASE)[0]
+    how.tell(WHOLE, (total - 1) / total)
+    for std in (LOOSE_LENGTH_STD_M, TIGHTER_LENGTH_STD_M):
+        if any(run.lengths_m is not None and run.lengths_std_m < std for run in samples):
+            problem = _problem(model, [run.loosened(std) for run in samples], free, how)
+            state = minimised(problem, state, STEPS, ROUGH_DECREASE)[0]
+    return state
+
+
+def _problem(
+    model: Model,
+    samples: Sequence[Samples],
+    free: Mask,
+    how: FreeSwing,
+    accuracy_m: float = TOLERANCE_M,
+) -> Problem:
+    return Problem(model, samples, free, how.own_noise, accuracy_m, how.consistent)
 
 
 def stretches(samples: Sequence[Samples]) -> list[float]:
@@ -220,9 +260,12 @@ def stretches(samples: Sequence[Samples]) -> list[float]:
 
 
 def _packed(problem: Problem, state: State, step: Step, taken: int, stop: Stop) -> LikelihoodFit:
-    correlation = correlation_factor(state.motions, problem.samples, state.scales)
+    pairs = list(zip(state.motions, problem.samples, strict=True))
+    white = [residuals(motion, run, state.scales) for motion, run in pairs]
+    times = [run.times_s for run in problem.samples]
+    correlation = low_band_factor(list(zip(white, times, strict=True)))
     squares, counts = np.zeros(2), np.zeros(2)
-    for motion, samples in zip(state.motions, problem.samples, strict=True):
+    for motion, samples in pairs:
         difference = differences(predicted(motion, samples.times_s), samples)
         for g in (0, 1):
             squares[g] += np.sum(difference[:, samples.groups == g] ** 2)
@@ -230,24 +273,23 @@ def _packed(problem: Problem, state: State, step: Step, taken: int, stop: Stop) 
     noise = np.full(2, np.nan)
     noise[counts > 0] = np.sqrt(squares[counts > 0] / counts[counts > 0])
     cost = problem.cost(state)
+    swings = Swings(problem.model, problem.samples, state.scales, state.motions)
+    found = replace(state, values=_values(problem, state))
+    determined = step.rank >= int(problem.free.sum())
+    covariance = shared_covariance(step.triangle, determined, problem.free, problem.unit)
     return LikelihoodFit(
-        model=problem.model,
-        inertia=state.inertia,
-        values=_values(problem, state),
-        loads=problem.loads_of(state),
-        free=problem.free,
-        covariance=_covariance(problem, step) * _enlargement(correlation),
-        correlation=correlation,
-        scales=state.scales,
-        noise=noise,
-        deviance=cost + 2.0 * float(counts @ np.log(state.scales)),
+        unknowns=model_unknowns(problem.model, problem.loads, found, problem.free),
+        covariance=covariance * _enlargement(correlation),
         cost=cost,
-        motions=state.motions,
-        samples=problem.samples,
+        residuals=tuple(run.ravel() for run in white),
         singular_values=step.singular_values,
         rank=step.rank,
         steps=taken,
         stop=stop,
+        swings=swings,
+        correlation=correlation,
+        noise=noise,
+        deviance=cost + 2.0 * float(counts @ np.log(state.scales)),
         between=jackknife_std(step.runs, step.priors, problem.free, problem.unit),
     )
 
@@ -261,18 +303,6 @@ def _values(problem: Problem, state: State) -> Array:
     each = np.array([motion.values[own] for motion in state.motions])
     values[own] = np.sqrt(np.mean(each**2, axis=0))
     return values
-
-
-def _covariance(problem: Problem, step: Step) -> Array:
-    count = len(problem.free)
-    covariance = np.zeros((count, count))
-    free = np.flatnonzero(problem.free)
-    if step.rank < len(free):
-        covariance[free, free] = np.inf
-    elif len(free):
-        inverse = np.linalg.inv(step.triangle) * problem.unit[free][:, None]
-        covariance[np.ix_(free, free)] = inverse @ inverse.T
-    return covariance
 
 
 def correlation_factor(

@@ -12,9 +12,10 @@ from freeswing.cdpr.model.free_motion import admissible_rates
 from freeswing.cdpr.model.known_values import prior_whitener
 from freeswing.cdpr.robot import Array
 from freeswing.cdpr.simulation.free_swing import LARGEST_TAIL, Motion, simulate, tails
-from freeswing.cdpr.simulation.nearby import Surroundings, obeys
+from freeswing.cdpr.simulation.nearby import Surroundings
 from freeswing.cdpr.simulation.sensitivity import linearise
 from freeswing.ident.judge.consistency import nearest_possible
+from freeswing.ident.likelihood.fit import RANK_LIMIT
 from freeswing.ident.likelihood.payload_runs import Loads
 from freeswing.ident.likelihood.run_residuals import (
     Reduced,
@@ -30,7 +31,6 @@ INERTIA, EFFECTS, PAYLOADS = "inertia", "effects", "payloads"
 TOLERANCE_M = 1e-8
 INERTIA_UNIT = np.array([0.05, 0.05, 0.05, 0.02, 0.02, 0.02, 0.01, 0.01, 0.01])
 STATE_UNIT = 0.05  # m, rad, and these a second: a start
-RANK_LIMIT = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,28 +63,6 @@ class State:
         if self.own_values is not None:
             values[own] = self.own_values[run]
         return values
-
-
-def with_motions(
-    state: State, model: Model, motions: Sequence[Motion], tolerance_m: float
-) -> State:
-    """A state that begins where other motions stand, with these where the model has them too.
-
-    A candidate that does nothing yet changes no motion: none has to be simulated again.
-
-    Args:
-        state: of the model, its starts those of the motions.
-        model: which they may obey.
-        motions: one a run.
-        tolerance_m: local error that a segment may have.
-    """
-    told = tuple(
-        replace(one, model=model, values=state.values_of(run, model.own_values))
-        for run, one in enumerate(motions)
-    )
-    if not all(obeys(one, tolerance_m) for one in told):
-        return state
-    return replace(state, motions=told)
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,7 +113,7 @@ class Problem:
     Args:
         model: the equations, with the effects to be estimated.
         samples: of the runs.
-        free: which of the first 9 + k shared unknowns to estimate; None for all.
+        free: which of the shared unknowns to estimate, (9 + k + u,); None for all.
         estimate_scales: whether noise scales follow the residuals.
         tolerance_m: local error of the simulated motions.
         consistent: whether the inertia is held to what a body can have; all nine are then free.
@@ -156,12 +134,8 @@ class Problem:
         self.loads = Loads.of([run.payload for run in samples])
         self.seen = Layout(((INERTIA, len(INERTIA_UNIT)), (EFFECTS, len(parameters))))
         self.layout = self.seen.joined(PAYLOADS, self.loads.count)
-        size = self.seen.size
-        known = np.ones(size, dtype=bool) if free is None else np.array(free[:size])
-        known[self.seen.place(EFFECTS)][model.own_values] = False
-        # Where the inertia is held, so is what payloads do to it.
-        body = known[self.seen.place(INERTIA)]
-        self.free = np.append(known, np.full(self.loads.count, body.any()))
+        self.free = np.ones(self.layout.size, dtype=bool) if free is None else np.array(free)
+        self.free[self.layout.place(EFFECTS)][model.own_values] = False
         self.consistent = consistent
         self.estimate_scales = estimate_scales
         self.tolerance_m = tolerance_m

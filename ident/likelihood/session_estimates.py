@@ -13,10 +13,11 @@ from freeswing.ident.fidim.fidim import WELL_IDENTIFIED_PERCENT, near_zero
 from freeswing.ident.judge.consistency import consistency, is_possible, nearest_possible
 from freeswing.ident.judge.free_swing_law import unexplained_motion
 from freeswing.ident.likelihood.between_runs import widened
-from freeswing.ident.likelihood.blocks import INERTIA, PAYLOADS, first_unknowns, state_of
+from freeswing.ident.likelihood.blocks import INERTIA, PAYLOADS, first_unknowns
 from freeswing.ident.likelihood.cable_ends import geometry_document, weighed_against_priors
 from freeswing.ident.likelihood.calibration_modes import with_calibration
-from freeswing.ident.likelihood.fit_swings import LikelihoodFit, fit
+from freeswing.ident.likelihood.fit import fit
+from freeswing.ident.likelihood.fit_swings import FreeSwing, LikelihoodFit, Swings
 from freeswing.ident.likelihood.guess_run_start import first_state
 from freeswing.ident.likelihood.payload_runs import Loads, mass_of
 from freeswing.ident.likelihood.raw_samples import prepare
@@ -66,9 +67,9 @@ def ml_estimate(
     asked = asked or Asked()
     _, samples, states, more = begun(model, runs, free, inertia, asked.mass_kg)
     payloads = [run.payload for run in samples]
-    unknowns = first_unknowns(model, inertia, payloads, mass_kg=asked.mass_kg)
-    state = state_of(unknowns, model, states, np.ones(2))
-    found, cost = fit(model, samples, state, progress=progress), None
+    unknowns = first_unknowns(model, inertia, states, payloads, mass_kg=asked.mass_kg)
+    swings = Swings(model, tuple(samples), np.ones(2))
+    found, cost = fit(swings, unknowns, FreeSwing(progress=progress)), None
     if asked.consistent and not is_possible(found.inertia):
         held = _held(found, progress)
         found, cost = held, held.deviance - found.deviance
@@ -177,8 +178,8 @@ def _held(found: LikelihoodFit, progress: Progress | None) -> LikelihoodFit:
     if found.rank < int(found.free.sum()):
         return found
     inertia = nearest_possible(found.inertia, found.covariance_of(INERTIA))
-    start = replace(found.state, inertia=inertia, motions=())
-    return fit(found.model, found.samples, start, progress=progress, consistent=True)
+    start = found.unknowns.moved({INERTIA: inertia})
+    return fit(found.swings, start, FreeSwing(consistent=True, progress=progress))
 
 
 def started(
@@ -212,7 +213,7 @@ def _entry(
     found: LikelihoodFit, dropped: tuple[DroppedRun, ...], held_cost: float | None
 ) -> Estimate:
     own = found.covariance_of(INERTIA)
-    between = found.between[found.unknowns.place(INERTIA)]
+    between = found.between[found.place(INERTIA)]
     covariance = widened(own, between, len(found.samples))
     if not np.isfinite(covariance).all():
         raise ValueError(
@@ -234,9 +235,9 @@ def _entry(
             "deviations are those of leaving out one run at a time"
         )
     mass = None
-    if len(found.loads):
+    if PAYLOADS in found.unknowns:
         try:
-            mass = mass_of(found.loads[0], float(found.std_of(PAYLOADS)[0]))
+            mass = mass_of(found.value(PAYLOADS)[0], float(found.std(PAYLOADS)[0]))
         except ValueError as error:
             notes.append(str(error))
     if said := consistency(found.inertia, covariance, held_cost).sentence():

@@ -93,6 +93,17 @@ class Unknown:
         """How many numbers (a run)."""
         return int(self.value.shape[-1])
 
+    def is_known_as(self, other: Unknown) -> bool:
+        """Whether another differs in nothing but the value."""
+        mine, others = self._known, other._known
+        alike = (self.name, self.each_run, len(mine)) == (other.name, other.each_run, len(others))
+        return alike and all(np.array_equal(a, b) for a, b in zip(mine, others, strict=True))
+
+    @property
+    def _known(self) -> list[Array]:
+        prior = [] if self.prior is None else [self.prior.mean, self.prior.std]
+        return [np.asarray(one) for one in (self.scale, self.mask, self.low, self.high, *prior)]
+
     def pull(self, value: Array) -> tuple[Array, Array]:
         """Whitened distance from the prior, (size,), and its slope; zero without a prior."""
         if self.prior is None:
@@ -177,6 +188,10 @@ class Unknowns:
                 return block
         raise ValueError(f"no unknown is called {name!r}; there are {', '.join(self.names)}")
 
+    def value(self, name: str) -> Array:
+        """Values of a block."""
+        return self.block(name).value
+
     def place(self, name: str) -> slice:
         """Where a block stands among the shared unknowns.
 
@@ -199,10 +214,18 @@ class Unknowns:
             self.block(name)
         return Unknowns(tuple(block for block in self.blocks if block.name not in names))
 
+    def exchanged(self, *others: Unknown) -> Unknowns:
+        """The same with other blocks of some names."""
+        return self._changed({self.block(one.name).name: one for one in others})
+
     def held(self, *names: str) -> Unknowns:
         """The same with some blocks held at their values."""
         changed = {name: replace(self.block(name), estimated=np.False_) for name in names}
         return self._changed(changed)
+
+    def all_held(self) -> Unknowns:
+        """The same with all that runs share held: what each has for itself is all there is."""
+        return self.held(*(block.name for block in self.shared))
 
     def estimating(self, name: str, mask: Mask) -> Unknowns:
         """The same with those numbers of a block estimated too that a mask (size,) picks."""

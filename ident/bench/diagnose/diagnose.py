@@ -22,7 +22,7 @@ from freeswing.ident.bench.modal import ModalSwing
 from freeswing.ident.bench.runs import Bench
 from freeswing.ident.bench.solve import FINE, Solved
 from freeswing.ident.bench.swing import COMMON
-from freeswing.ident.likelihood.fit_blocks import fit
+from freeswing.ident.likelihood.fit import fit
 
 Progress = Callable[[str, float], None]
 

@@ -19,7 +19,7 @@ from freeswing.ident.bench.diagnose.weigh import Fit, needed
 from freeswing.ident.bench.runs import Bench
 from freeswing.ident.bench.solve import FINE
 from freeswing.ident.diagnose.decision import ACCEPTED, LEAST_GAIN, MOST_WORSE, runs_worse
-from freeswing.ident.likelihood.fit_blocks import fit
+from freeswing.ident.likelihood.fit import fit
 from freeswing.ident.likelihood.unknowns import Unknowns
 
 SURE = 3.0  # deviations: a wire that differs by less is not named as the one

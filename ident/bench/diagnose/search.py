@@ -23,7 +23,8 @@ from freeswing.ident.diagnose.decision import (
     RIVAL,
     runs_worse,
 )
-from freeswing.ident.likelihood.fit_blocks import fit, linear_problem
+from freeswing.ident.likelihood.fit import fit
+from freeswing.ident.likelihood.fit_blocks import linear_problem
 
 MOST_CAUSES = 4  # more than that one bench never tells apart
 

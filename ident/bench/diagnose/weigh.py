@@ -14,7 +14,8 @@ from freeswing.ident.bench.noise import column_residuals
 from freeswing.ident.bench.swing import BenchSwing
 from freeswing.ident.diagnose.leave_one_out import Evidence, Score, score
 from freeswing.ident.diagnose.model_probabilities import Rival, model_probabilities
-from freeswing.ident.likelihood.fit_blocks import Linear, Solution, linear_problem
+from freeswing.ident.likelihood.fit import Solution
+from freeswing.ident.likelihood.fit_blocks import Linear, linear_problem
 
 
 @dataclass(frozen=True)

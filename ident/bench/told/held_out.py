@@ -15,7 +15,8 @@ from freeswing.ident.bench.noise import column_residuals
 from freeswing.ident.bench.runs import Bench, BenchRun
 from freeswing.ident.bench.solve import Solved
 from freeswing.ident.bench.swing import BenchSwing, Column
-from freeswing.ident.likelihood.fit_blocks import How, Solution, fit
+from freeswing.ident.likelihood.fit import Solution, fit
+from freeswing.ident.likelihood.fit_blocks import Dense
 from freeswing.ident.likelihood.unknowns import Mask, Unknowns
 
 
@@ -102,7 +103,7 @@ def confronted(
     unknowns = _known(start.unknowns, found, swing)
     half = swing.times_s[len(swing.times_s) // 2]
     first = _until(swing, half)
-    fitted = fit([first], unknowns, How(steps=15, tolerance=0.1))
+    fitted = fit([first], unknowns, Dense(steps=15, tolerance=0.1))
     values = fitted.unknowns.of_run(0)
     white = swing.residuals(values, swing.simulated(values))
     parts = column_residuals(swing, white)

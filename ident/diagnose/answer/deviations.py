@@ -29,7 +29,7 @@ def honest_covariance(found: LikelihoodFit, scored: Refit) -> Array:
     Source:
         Efron 1982, The Jackknife, the Bootstrap and Other Resampling Plans, ch. 3.
     """
-    stds = found.std
+    stds = found.stds
     free = np.flatnonzero(scored.fit.free)
     jackknife = np.zeros(len(stds))
     jackknife[free] = scored.score.jackknife_std[: len(free)]

@@ -78,7 +78,7 @@ def accepted_entries(
 
 def parameter_entries(found: LikelihoodFit, covariance: Array) -> list[dict[str, Any]]:
     """The inertia of results/diagnosis.json, with a covariance of the shared unknowns, (p, p)."""
-    stds = np.sqrt(np.diag(covariance))[found.unknowns.place(INERTIA)]
+    stds = np.sqrt(np.diag(covariance))[found.place(INERTIA)]
     return [
         {"name": name, "value": float(value), "std": float(std)}
         for name, value, std in zip(INERTIA_NAMES, found.inertia, stds, strict=True)

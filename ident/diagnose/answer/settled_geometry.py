@@ -18,7 +18,9 @@ from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.model.known_values import prior_whitener
 from freeswing.cdpr.robot import Array
 from freeswing.ident.diagnose.refit import Refit, colour_of, rescored
-from freeswing.ident.likelihood.fit_swings import fit
+from freeswing.ident.likelihood.blocks import with_effect_values
+from freeswing.ident.likelihood.fit import fit
+from freeswing.ident.likelihood.fit_swings import ONWARD
 
 
 def settled_places(model: Model) -> np.ndarray:
@@ -36,12 +38,16 @@ def cut(last: Refit, noise_scales: Array) -> Refit:
         last: the fit, whose samples and other unknowns it goes on from.
         noise_scales: of metres and radians, (2,).
     """
-    found, places = last.fit, settled_places(last.fit.model)
-    free, values = found.free.copy(), found.values.copy()
-    free[found.inertia.size + places] = False
-    values[places] = found.model.start_values[places]
-    state = replace(found.state, values=values, motions=())
-    exact = fit(found.model, found.samples, state, free, estimate_scales=False, grow=False)
+    found, model, values = last.fit, last.fit.model, last.fit.values.copy()
+    settled = np.zeros(len(values), dtype=bool)
+    settled[settled_places(model)] = True
+    values[settled] = model.start_values[settled]
+    unknowns = with_effect_values(found.unknowns, model, values)
+    for name in model.effects:
+        block = unknowns.block(name)
+        free = block.mask & ~settled[model.place_of(name)]
+        unknowns = unknowns.exchanged(replace(block, estimated=free))
+    exact = fit(found.swings, unknowns, ONWARD)
     return rescored(exact, noise_scales, colour_of(exact, noise_scales))
 
 

@@ -14,7 +14,8 @@ from freeswing.ident.bench.held_uncertain import believed, considered, gauge, un
 from freeswing.ident.bench.modal import ModalSwing
 from freeswing.ident.bench.runs import Bench, BenchRun, KnownBody, Signal
 from freeswing.ident.bench.swing import BenchSwing
-from freeswing.ident.likelihood.fit_blocks import How, fit
+from freeswing.ident.likelihood.fit import fit
+from freeswing.ident.likelihood.fit_blocks import Dense
 from tests.ident.bench.test_swing_slopes import slopes_are_those_of_differences, trifilar
 
 LARGE = 1.5e-4  # 0.1 % of the amplitude: what the fourth power of it does
@@ -103,7 +104,7 @@ def test_a_fit_counts_what_it_holds() -> None:
     tight = start.unknowns
     for name in held:
         tight = tight.held(name)
-    found = fit(start.swings, tight, How(steps=0))
+    found = fit(start.swings, tight, Dense(steps=0))
     told = considered(start.swings, found, held)
     spread = start.unknowns.block("platform").prior
     assert spread is not None

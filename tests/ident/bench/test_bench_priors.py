@@ -189,7 +189,9 @@ def test_a_run_whose_izz_is_a_hundredth_off_is_lost(monkeypatch) -> None:
     monkeypatch.setattr(solve, "_rough", lambda swings, unknowns: unknowns)
     monkeypatch.setattr(solve, "_fastest", lambda *_: 1.0)
     monkeypatch.setattr(solve, "rescaled", lambda swings, *_, **__: swings)
-    monkeypatch.setattr(solve, "_mass", lambda bench, model, swings, found, *_: (found, None))
+    monkeypatch.setattr(
+        solve, "weighed_mass", lambda bench, model, swings, found, *_: (found, None)
+    )
     monkeypatch.setattr(solve, "considered", lambda swings, found, held: found)
     monkeypatch.setattr(solve, "replace", lambda found, **_: found)
     monkeypatch.setattr(solve, "scatter_std", lambda found: 0.0)

@@ -12,9 +12,10 @@ from freeswing.ident.diagnose.decision import excess_of, included
 from freeswing.ident.diagnose.heldout import held_out
 from freeswing.ident.diagnose.refit import Refit, colour_of, freed, refit, rescored
 from freeswing.ident.judge.prediction import Stage
-from freeswing.ident.likelihood.blocks import first_unknowns, state_of
+from freeswing.ident.likelihood.blocks import first_unknowns
 from freeswing.ident.likelihood.calibration_modes import amplitudes_of
-from freeswing.ident.likelihood.fit_swings import fit
+from freeswing.ident.likelihood.fit import fit
+from freeswing.ident.likelihood.fit_swings import ONWARD, Swings
 from freeswing.ident.likelihood.raw_samples import UNIT_NOISE_M
 from freeswing.ident.likelihood.session_estimates import begun
 from tests.ident.likelihood.test_calibration_modes import NOISE_M, prepared, runs
@@ -33,9 +34,8 @@ def searched(known: bool) -> tuple[Refit, Refit]:
         ready = [replace(one, run=replace(one.run, pose_errors=None)) for one in ready]
     model = paper_model()
     _, samples, states, _ = begun(model, ready, None, TRUE_INERTIA)
-    unknowns = first_unknowns(model, TRUE_INERTIA, [None] * len(samples))
-    start = state_of(unknowns, model, states, SCALES)
-    found = fit(model, samples, start, estimate_scales=False, grow=False)
+    unknowns = first_unknowns(model, TRUE_INERTIA, states, [None] * len(samples))
+    found = fit(Swings(model, tuple(samples), SCALES), unknowns, ONWARD)
     colour = colour_of(found, SCALES)
     current = freed(rescored(found, SCALES, colour), SCALES, colour)
     return current, refit(current.fit, "anchor_offset", np.zeros(12), SCALES, colour)

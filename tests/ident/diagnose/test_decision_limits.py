@@ -297,7 +297,7 @@ def test_a_cable_does_not_weigh_less_than_nothing(value, complaints) -> None:
     """Beyond a range by chance it may lie; on the wrong side of nothing it is none."""
     parameter = Parameter("linear_density_over_mass_1_m", 0.0, 0.05, 0.002)
     model = SimpleNamespace(robot=declared_robot("three-cable"), parameters=(parameter,))
-    fit = SimpleNamespace(model=model, values=np.array([value]), std_of=lambda _: np.array([3e-5]))
+    fit = SimpleNamespace(model=model, values=np.array([value]), std=lambda _: np.array([3e-5]))
     one = SimpleNamespace(fit=fit, values_of=lambda _: slice(0, 1))
     found = refit.plausible(one, "cable_mass")
     assert len(found) == complaints, found

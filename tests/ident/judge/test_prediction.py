@@ -9,14 +9,13 @@ import pytest
 
 import freeswing.ident.judge.prediction
 from freeswing.cdpr.measured.trajectory import Trajectory
-from freeswing.cdpr.model.equations import Model, build_model
+from freeswing.cdpr.model.equations import build_model
 from freeswing.cdpr.model.statics import modes
 from freeswing.cdpr.robot import POSE_COORDINATES
 from freeswing.ident.judge.prediction import predict
-from freeswing.ident.likelihood.fit_swings import LikelihoodFit
-from freeswing.ident.likelihood.joint_problem import State
+from freeswing.ident.likelihood.fit_swings import LikelihoodFit, Swings
 from freeswing.ident.likelihood.rest_pose import taut_equilibrium
-from freeswing.ident.likelihood.run_residuals import Samples
+from freeswing.ident.likelihood.unknowns import Unknowns
 from freeswing.ident.signals.derivatives import SignalSettings
 from freeswing.ident.signals.prepare import PreparedRun, prepare_runs
 from tests.ident.swings import PAPER_LENGTHS_M, paper_model, recorded, swing
@@ -68,10 +67,10 @@ def test_a_start_that_cannot_be_simulated_over_the_run_is_grown_into_it(
 ):
     fitted = freeswing.ident.judge.prediction._fitted
 
-    def short_only(model: Model, samples: Samples, state: State, grow: bool) -> LikelihoodFit:
+    def short_only(swings: Swings, unknowns: Unknowns, grow: bool) -> LikelihoodFit:
         if not grow:
             raise ValueError("the free motion cannot be followed beyond 0.7 s")
-        return fitted(model, samples, state, grow)
+        return fitted(swings, unknowns, grow)
 
     monkeypatch.setattr(freeswing.ident.judge.prediction, "_fitted", short_only)
     off = predict(paper_model(), filmed(7, 40, ("x", "y"), seed=1), ("x", "y"), LIGHT).rmse_m

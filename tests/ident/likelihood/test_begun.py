@@ -9,7 +9,10 @@ import pytest
 
 from freeswing.cdpr.model.equations import build_model
 from freeswing.cdpr.model.free_motion import admissible_rates
-from freeswing.ident.likelihood.joint_problem import Problem, State, with_motions
+from freeswing.ident.likelihood.blocks import model_unknowns
+from freeswing.ident.likelihood.fit_swings import Swings
+from freeswing.ident.likelihood.joint_problem import Problem, State
+from freeswing.ident.likelihood.payload_runs import Loads
 from freeswing.ident.likelihood.run_residuals import Samples
 from tests.cdpr.model_cases import swing_start
 
@@ -59,9 +62,14 @@ def test_others_are_simulated(what: str) -> None:
 def test_motions_are_carried_into_a_model_that_adds_nothing_yet() -> None:
     _, state = problem_and_state()
     wider = build_model(state.motions[0].model.robot, ("translational_drag", "rotational_drag"))
-    fresh = replace(state, values=np.append(state.values, 0.0), motions=())
-    carried = with_motions(fresh, wider, state.motions, 1e-8)
+    swings = Swings(state.motions[0].model, (), np.ones(2), state.motions)
+    free = np.ones(9 + len(state.values) + 1, dtype=bool)
+    nothing, there = (
+        model_unknowns(wider, Loads.of([None]), replace(state, values=values), free)
+        for values in (np.append(state.values, 0.0), np.append(state.values, 0.05))
+    )
+    carried = swings.under(wider, nothing, 1e-8)
+    assert carried.model is wider
     assert carried.motions[0].model is wider
     assert carried.motions[0].accelerations is state.motions[0].accelerations
-    there = replace(fresh, values=np.append(state.values, 0.05))
-    assert with_motions(there, wider, state.motions, 1e-8).motions == ()
+    assert swings.under(wider, there, 1e-8).motions == ()

@@ -1,5 +1,7 @@
 """A fit's unknowns by name: what a refit with fewer or more effects starts from."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,13 +11,20 @@ from freeswing.ident.diagnose.refit import BY_LENGTHS, _joined
 from freeswing.ident.likelihood.blocks import (
     INERTIA,
     PAYLOADS,
+    STARTS,
     columns_of,
     each_run,
     effect_blocks,
+    effect_values,
     free_of,
+    model_unknowns,
+    state_of,
+    with_effect_values,
 )
-from freeswing.ident.likelihood.fit_swings import fit
+from freeswing.ident.likelihood.fit import fit
+from freeswing.ident.likelihood.fit_swings import ONWARD, Swings
 from freeswing.ident.likelihood.joint_problem import State
+from freeswing.ident.likelihood.payload_runs import Loads
 from freeswing.ident.likelihood.raw_samples import prepare
 from freeswing.ident.runs import Payload
 from tests.ident.swings import TRUE_INERTIA, paper_model, recorded, swing
@@ -27,21 +36,23 @@ EFFECTS = ("harmonic_force", "translational_drag")
 def found():
     """One step from near the truth: a run alone, one with a payload, two effects."""
     motions = [swing(k, duration_s=0.6) for k in (2, 3)]
-    payloads = (None, Payload(1.0, [0.2, 0.1, 0.0]))
+    payloads = (None, Payload(1.0, np.array([0.2, 0.1, 0.0])))
     runs = [
         recorded(motion, f"run-{k}", payload=payload)
         for k, (motion, payload) in enumerate(zip(motions, payloads, strict=True))
     ]
     model = build_model(paper_model().robot, EFFECTS)
-    samples = [prepare(run, run.window_s) for run in runs]
+    samples = [prepare(run, (0.0, 0.6)) for run in runs]
     starts = np.array([np.concatenate([m.zetas[0], m.rates[0]]) for m in motions])
     own = np.arange(1.0, 1.0 + 2 * len(model.own_values)).reshape(2, -1) * 1e-3
+    loads = Loads.of(payloads)
     state = State(
         TRUE_INERTIA, model.start_values, starts, np.ones(2), own_values=own, loads=np.zeros(7)
     )
-    free = np.ones(9 + len(model.parameters), dtype=bool)
+    free = np.ones(9 + len(model.parameters) + loads.count, dtype=bool)
     free[columns_of(model, "translational_drag")[0]] = False
-    return fit(model, samples, state, free, estimate_scales=False, grow=False, steps=1)
+    unknowns = model_unknowns(model, loads, state, free)
+    return fit(Swings(model, tuple(samples), np.ones(2)), unknowns, replace(ONWARD, steps=1))
 
 
 def test_the_blocks_are_the_vectors(found):
@@ -52,6 +63,7 @@ def test_the_blocks_are_the_vectors(found):
         each_run(EFFECTS[0]),
         EFFECTS[1],
         PAYLOADS,
+        STARTS,
     )
     assert unknowns.block(INERTIA).value.tolist() == found.inertia.tolist()
     for name in EFFECTS:
@@ -61,17 +73,14 @@ def test_the_blocks_are_the_vectors(found):
         assert (
             unknowns.block(name).mask.tolist() == found.free[columns_of(found.model, name)].tolist()
         )
-    assert unknowns.block(PAYLOADS).value.tolist() == found.loads.tolist()
-    assert found.std_of(PAYLOADS).tolist() == found.std[-len(found.loads) :].tolist()
+    assert found.std(PAYLOADS).tolist() == found.stds[-7:].tolist()
     assert found.covariance_of(INERTIA).tolist() == found.covariance[:9, :9].tolist()
-    solution = found.solution
-    assert solution.covariance_of(PAYLOADS, INERTIA).tolist() == (
-        found.covariance_of(PAYLOADS, INERTIA).tolist()
-    )
-    assert solution.std(PAYLOADS).tolist() == found.std_of(PAYLOADS).tolist()
-    white = float(sum(np.sum(run**2) for run in solution.residuals))
-    assert 0.0 < white <= solution.cost == found.cost, (white, solution.cost)
-    assert (solution.rank, solution.stop) == (found.rank, found.stop)
+    joint = found.covariance_of(PAYLOADS, INERTIA)
+    assert joint[:7, 7:].tolist() == found.covariance[-7:, :9].tolist()
+    white = float(sum(np.sum(run**2) for run in found.residuals))
+    assert 0.0 < white <= found.cost, (white, found.cost)
+    starts = [np.concatenate([m.zetas[0], m.rates[0]]).tolist() for m in found.motions]
+    assert unknowns.value(STARTS).tolist() == starts
     own = np.array([m.values[found.model.own_values] for m in found.motions])
     assert unknowns.block(each_run(EFFECTS[0])).value.tolist() == own.tolist()
 
@@ -79,16 +88,18 @@ def test_the_blocks_are_the_vectors(found):
 def test_nothing_is_lost_where_an_effect_leaves(found):
     """Payloads stay, and so does what each run has for itself of another effect."""
     fewer = without_effect(found.model, EFFECTS[1])
-    left = found.unknowns.without(EFFECTS[1])
-    state = found.start_of(left, fewer, found.scales)
-    assert state.loads.tolist() == found.loads.tolist()
-    assert np.abs(state.loads).max() > 0.0, "the payloads have been fitted"
-    assert state.values.tolist() == found.values[found.model.place_of(EFFECTS[0])].tolist()
-    assert state.own_values.tolist() == found.state.own_values.tolist()
+    left = state_of(found.unknowns.without(EFFECTS[1]), fewer, found.scales)
+    assert np.abs(found.value(PAYLOADS)).max() > 0.0, "the payloads have been fitted"
+    np.testing.assert_array_equal(left.loads, found.value(PAYLOADS))  # pyright: ignore[reportArgumentType]
+    assert left.values.tolist() == found.values[found.model.place_of(EFFECTS[0])].tolist()
+    own = found.value(each_run(EFFECTS[0]))
+    assert own.any()
+    np.testing.assert_array_equal(left.own_values, own)  # pyright: ignore[reportArgumentType]
     none = found.unknowns.without(EFFECTS[0], each_run(EFFECTS[0]))
-    bare = found.start_of(none, without_effect(found.model, EFFECTS[0]), found.scales)
+    bare = state_of(none, without_effect(found.model, EFFECTS[0]), found.scales)
+    assert bare.own_values is not None
     assert bare.own_values.shape == (2, 0)
-    assert bare.loads.tolist() == found.loads.tolist()
+    np.testing.assert_array_equal(bare.loads, found.value(PAYLOADS))  # pyright: ignore[reportArgumentType]
     assert bare.values.tolist() == found.values[found.model.place_of(EFFECTS[1])].tolist()
 
 
@@ -98,12 +109,12 @@ def test_a_candidate_comes_before_the_payloads(found):
     model, unknowns = _joined(found.model, found.unknowns, "anchor_offset:2", values, 2)
     assert model.effects == (*EFFECTS, "anchor_offset")
     free = free_of(unknowns, model)
-    assert len(free) == 9 + len(model.parameters)
+    assert len(free) == 9 + len(model.parameters) + 7
     assert free[: 9 + len(found.values)].tolist() == found.free[: 9 + len(found.values)].tolist()
     assert free[columns_of(model, "anchor_offset")].sum() == 3
-    state = found.start_of(unknowns, model, found.scales)
+    state = state_of(unknowns, model, found.scales)
     assert len(state.values) == len(model.parameters)
-    assert state.loads.tolist() == found.loads.tolist()
+    np.testing.assert_array_equal(state.loads, found.value(PAYLOADS))  # pyright: ignore[reportArgumentType]
     again, more = _joined(model, unknowns, "anchor_offset:1", values, 2)
     assert again is model
     assert free_of(more, model)[columns_of(model, "anchor_offset")].sum() == 6
@@ -124,3 +135,33 @@ def test_what_is_known_says_by_whom(found):
     assert block.prior is not None
     assert block.prior.source == BY_LENGTHS
     assert [bool(p.source) for p in known.parameters[:4]] == [True, True, True, False]
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        (lambda u: u.known(EFFECTS[1], None), "prior"),
+        (lambda u: u.held(STARTS), "mask"),
+        (lambda u: u.exchanged(replace(u.block(INERTIA), low=np.zeros(9))), "bounds"),
+        (lambda u: u.joined(replace(u.block(INERTIA), name="sway")), "sway"),
+        (lambda u: u.without(EFFECTS[1]), EFFECTS[1]),
+    ],
+)
+def test_what_would_not_be_heard_is_refused(found, changed, said):
+    with pytest.raises(ValueError, match=said):
+        fit(found.swings, changed(found.unknowns), replace(ONWARD, steps=1))
+
+
+def test_other_values_of_effects_leave_all_else(found):
+    values = np.arange(1.0, 1.0 + len(found.values))
+    told = with_effect_values(found.unknowns, found.model, values)
+    assert effect_values(told, found.model).tolist() == values.tolist()
+    assert free_of(told, found.model).tolist() == found.free.tolist()
+    for name in (INERTIA, each_run(EFFECTS[0]), PAYLOADS, STARTS):
+        assert told.value(name).tolist() == found.value(name).tolist()
+
+
+def test_all_that_runs_share_is_held_and_their_own_is_not(found):
+    held = found.unknowns.all_held()
+    assert not free_of(held, found.model).any()
+    assert all(block.mask.all() for block in held.own)

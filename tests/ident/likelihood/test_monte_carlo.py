@@ -45,7 +45,7 @@ def test_maximum_likelihood_reaches_the_bound_and_fidim_stays_far_off(length_err
         total += float(off @ np.linalg.solve(covariance, off))
         by_ml.append(off / bound)
         by_fidim.append((published - TRUE_INERTIA) / bound)
-        covered.append(np.abs(found.inertia - TRUE_INERTIA) < 1.96 * found.std)
+        covered.append(np.abs(found.inertia - TRUE_INERTIA) < 1.96 * found.stds)
     ml, tls = (float(np.sqrt(np.mean(np.square(errors)))) for errors in (by_ml, by_fidim))
     assert low < total < high, f"chi-square {total:.1f}, {low:.1f} to {high:.1f}; rmse {ml:.2f}"
     assert tls > 5.0, f"rmse over bound: maximum likelihood {ml:.2f}, FIDIM {tls:.1f}"

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from freeswing.ident.likelihood.fit_blocks import How, fit
+from freeswing.ident.likelihood.fit import fit
+from freeswing.ident.likelihood.fit_blocks import Dense
 from freeswing.ident.likelihood.unknowns import Gaussian, Unknown, Unknowns
 
 RATE, STD = 0.7, 0.01
@@ -56,14 +57,14 @@ def start(prior: Gaussian | None = None) -> Unknowns:
 
 
 def test_shared_and_own_unknowns_are_found_exactly() -> None:
-    found = fit(decays(0.0), start(), How(tolerance=1e-20))
+    found = fit(decays(0.0), start(), Dense(tolerance=1e-20))
     assert found.converged, found.reason
     np.testing.assert_allclose(found.value("rate"), RATE, rtol=1e-9)
     np.testing.assert_allclose(found.value("amplitude")[:, 0], [1.0, 2.5, 0.4], rtol=1e-9)
 
 
 def test_the_deviation_is_that_of_many_repetitions() -> None:
-    fits = [fit(decays(STD, seed), start()) for seed in range(200)]
+    fits = [fit(decays(STD, seed), start(), Dense()) for seed in range(200)]
     spread = np.std([one.value("rate")[0] for one in fits])
     assert spread == pytest.approx(fits[0].std("rate")[0], rel=0.15), spread
 
@@ -71,7 +72,7 @@ def test_the_deviation_is_that_of_many_repetitions() -> None:
 def test_the_covariance_is_that_of_all_unknowns_together() -> None:
     """Elimination run by run gives what one large matrix gives."""
     runs, blocks = decays(STD), start(Gaussian(np.array([0.5]), np.array([0.01]), "a guess"))
-    found = fit(runs, blocks, How(tolerance=1e-12))
+    found = fit(runs, blocks, Dense(tolerance=1e-12))
     whole = np.zeros((3 * 40 + 1, 4))
     for k, run in enumerate(runs):
         slopes = run.linearised(found.unknowns.of_run(k), None)[1]
@@ -83,15 +84,15 @@ def test_the_covariance_is_that_of_all_unknowns_together() -> None:
 
 
 def test_a_held_block_stays_and_one_nothing_depends_on_loses_rank() -> None:
-    held = fit(decays(STD), start().held("rate"))
+    held = fit(decays(STD), start().held("rate"), Dense())
     assert held.value("rate")[0] == 0.2
     assert held.std("rate")[0] == 0.0
     idle = Unknown("idle", np.zeros(2), np.ones(2))
-    lost = fit(decays(STD), start().joined(idle))
+    lost = fit(decays(STD), start().joined(idle), Dense())
     assert lost.rank == 1, lost.singular_values
     assert np.isinf(lost.std("idle")).all()
     known = start().joined(idle).known("idle", Gaussian(np.ones(2), np.full(2, 3.0), "a guess"))
-    found = fit(decays(STD), known)
+    found = fit(decays(STD), known, Dense())
     np.testing.assert_allclose(found.value("idle"), 1.0, atol=1e-6)
     np.testing.assert_allclose(found.std("idle"), 3.0, rtol=1e-9)
 
@@ -99,7 +100,7 @@ def test_a_held_block_stays_and_one_nothing_depends_on_loses_rank() -> None:
 def test_a_bound_holds() -> None:
     blocks = start()
     low = Unknown("rate", np.array([0.9]), np.array([0.1]), low=np.array([0.8]))
-    found = fit(decays(0.0), blocks.without("rate").joined(low))
+    found = fit(decays(0.0), blocks.without("rate").joined(low), Dense())
     assert found.value("rate")[0] == 0.8
 
 
@@ -112,4 +113,6 @@ def test_blocks_are_asked_for_by_name() -> None:
     with pytest.raises(ValueError, match=r"twice"):
         blocks.joined(blocks.block("rate"))
     with pytest.raises(ValueError, match=r"no run to fit"):
-        fit([], blocks)
+        fit([], blocks, Dense())
+    with pytest.raises(ValueError, match=r"amplitude: values of 3 runs for 2"):
+        fit(decays(0.0)[:2], blocks, Dense())

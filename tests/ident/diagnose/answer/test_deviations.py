@@ -33,7 +33,7 @@ def test_values_that_are_no_points_have_no_directions():
 
 def test_the_larger_of_posterior_and_jackknife_is_told():
     covariance = np.array([[4.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 0.0]])
-    found = SimpleNamespace(std=np.sqrt(np.diag(covariance)), covariance=covariance)
+    found = SimpleNamespace(stds=np.sqrt(np.diag(covariance)), covariance=covariance)
     free = np.array([True, True, False])
     scored = SimpleNamespace(
         fit=SimpleNamespace(free=free), score=SimpleNamespace(jackknife_std=np.array([1.0, 3.0]))

@@ -10,6 +10,10 @@ from freeswing.cdpr.model.known_values import with_known
 from freeswing.ident.diagnose.answer import settled_geometry as module
 from freeswing.ident.diagnose.answer.settled_geometry import cut, settled_places, with_settled
 from freeswing.ident.diagnose.leave_one_out import Evidence
+from freeswing.ident.likelihood.blocks import effect_values, free_of, model_unknowns
+from freeswing.ident.likelihood.fit_swings import Swings
+from freeswing.ident.likelihood.joint_problem import State
+from freeswing.ident.likelihood.payload_runs import Loads
 from tests.oracle.scenes.robots import declared_robot
 
 PLACES = np.arange(3, 6)
@@ -30,7 +34,13 @@ def held(free_geometry):
     free[9 + PLACES] = free_geometry
     rng = np.random.default_rng(0)
     triangles = rng.normal(size=(4, 40, 10 + count))
-    fit = SimpleNamespace(model=model, free=free, inertia=np.ones(9), values=np.ones(count))
+    state = State(np.ones(9), np.ones(count), np.ones((1, 12)), np.ones(2))
+    unknowns = model_unknowns(model, Loads.of([None]), state, free)
+    swings = Swings(model, (), np.ones(2))
+    fit = SimpleNamespace(
+        model=model, free=free, inertia=np.ones(9), values=np.ones(count),
+        unknowns=unknowns, swings=swings,
+    )  # fmt: skip
     names = ("a", "b", "c", "d")
     evidence = Evidence(names, triangles, np.full(4, 40.0), np.zeros((0, 10 + count)))
     return SimpleNamespace(fit=fit, evidence=evidence)
@@ -44,15 +54,13 @@ def test_settled_are_the_values_that_lengths_know():
 
 def test_the_fit_goes_on_with_the_geometry_at_what_lengths_say(monkeypatch):
     one = held(True)
-    one.fit.samples = ()
-    one.fit.state = SimpleNamespace(values=one.fit.values, motions=(1,))
     seen = {}
 
-    def fitted(model, samples, state, free, **options):
-        seen.update(values=state.values, free=free)
+    def fitted(swings, unknowns, how):
+        seen.update(values=effect_values(unknowns, one.fit.model))
+        seen.update(free=free_of(unknowns, one.fit.model))
         return one.fit
 
-    monkeypatch.setattr(module, "replace", lambda state, **new: SimpleNamespace(**new))
     monkeypatch.setattr(module, "fit", fitted)
     monkeypatch.setattr(module, "rescored", lambda *_: "scored")
     monkeypatch.setattr(module, "colour_of", lambda *_: 1.0)
@@ -61,7 +69,8 @@ def test_the_fit_goes_on_with_the_geometry_at_what_lengths_say(monkeypatch):
     assert np.delete(seen["values"], PLACES) == pytest.approx(1.0)
     assert not seen["free"][9 + PLACES].any()
     assert seen["free"][:9].all()
-    assert one.fit.free[9 + PLACES].all()  # the fit that was handed over stays as it is
+    before = free_of(one.fit.unknowns, one.fit.model)
+    assert before[9 + PLACES].all()  # the fit that was handed over stays as it is
 
 
 def test_what_lengths_leave_open_is_told_and_widens_the_rest():

@@ -10,9 +10,9 @@ import pytest
 from freeswing.cdpr.measured.trajectory import Trajectory
 from freeswing.cdpr.model.equations import build_model
 from freeswing.cdpr.robot import POSE_COORDINATES
+from freeswing.ident.inertia_starts import likelihood_starts
 from freeswing.ident.judge.consistency import is_possible
 from freeswing.ident.likelihood.guess_run_start import first_state
-from freeswing.ident.likelihood.inertia_starts import likelihood_starts
 from freeswing.ident.likelihood.raw_samples import prepare
 from freeswing.ident.signals.derivatives import SignalSettings
 from freeswing.ident.signals.prepare import prepare_runs
@@ -21,7 +21,7 @@ from tests.ident.swings import REGULAR, TRUE_INERTIA, paper_model, recorded, swi
 
 def test_bodies_are_told_from_impossible_inertias():
     points = np.random.default_rng(0).normal(size=(20, 3))
-    tensor = sum(p @ p * np.eye(3) - np.outer(p, p) for p in points) / 20
+    tensor = np.mean([p @ p * np.eye(3) - np.outer(p, p) for p in points], axis=0)
     body = np.concatenate([points.mean(axis=0), tensor[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]])
     flat = body.copy()
     flat[3] = 0.5 * abs(flat[4] - flat[5])
