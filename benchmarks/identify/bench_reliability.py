@@ -5,8 +5,9 @@
 makes sessions by another simulator (tests/oracle/recorded/benches.py: undeclared drag, one wire
 2 mm long, a platform 5 % heavier than declared; 3 empty, 3 known-weight and 4 loaded runs),
 identifies each, and compares the object's Izz with what was put in. The known mass lies on both
-sides and in the middle, as the guide has it; `--one-side` leaves it where it is. A session that has
-a result in OUT/benches.json is not run again.
+sides and in the middle, as the guide has it; `--one-side` leaves it where it is. On two wires the
+object lies so that the platform hangs rolled by 7.6 degrees; `--level` puts it where all hangs
+level. A session that has a result in OUT/benches.json is not run again.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import json
 import sys
 import time
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -25,7 +26,7 @@ from freeswing.ident.bench.identify_bench import identify_bench
 from freeswing.session.load_bench import load_bench
 from freeswing.session.load_swings import load_robot
 from freeswing.session.session_file import read_session
-from tests.oracle.recorded.benches import BOTH_SIDES_M, WEIGHT_M, make_bench
+from tests.oracle.recorded.benches import BOTH_SIDES_M, LEVEL_M, WEIGHT_M, make_bench
 
 WANTED_PERCENT = {"poses": 0.5, "chi": 1.0, "track": 2.0}
 CLAIMED = 3.0  # deviations
@@ -33,17 +34,40 @@ FIRST_SEED = 100
 WIRES = (3, 2)
 
 
-def one_bench(folder: Path, seed: int, wires: int, seen: str, one_side: bool) -> dict[str, Any]:
+class Case(NamedTuple):
+    """One session."""
+
+    wires: int
+    seen: str
+    one_side: bool
+    level: bool
+    seed: int
+
+    @classmethod
+    def of(cls, row: dict[str, Any]) -> Case:
+        """That of a result."""
+        return cls(*(row[name] for name in cls._fields))
+
+    @property
+    def name(self) -> str:
+        """What it shares with those of other seeds."""
+        told = f"{self.wires} wires, {self.seen}" + (", level" if self.level else "")
+        return told + (", weights on one side" if self.one_side else "")
+
+
+def one_bench(folder: Path, case: Case) -> dict[str, Any]:
     """One session's errors in per cent and in claimed deviations, with its processor time."""
-    weights = (WEIGHT_M,) if one_side else BOTH_SIDES_M
-    truth = make_bench(folder, seed, wires, seen, weights_m=weights)
+    weights = (WEIGHT_M,) if case.one_side else BOTH_SIDES_M
+    places = (LEVEL_M,) if case.level else (np.zeros(3),)
+    asked = folder, case.seed, case.wires, case.seen
+    truth = make_bench(*asked, weights_m=weights, places_m=places)
     session = read_session(folder)
     robot = load_robot(session)
     start = time.process_time()
     told = identify_bench(load_bench(session, robot, None), robot).document()
     seconds = time.process_time() - start
     bodies = {o["name"]: {p["name"]: p for p in o["parameters"]} for o in told["objects"]}
-    row: dict[str, Any] = {"wires": wires, "seen": seen, "one_side": one_side, "seed": seed}
+    row: dict[str, Any] = case._asdict()
     for name, found, true in (
         ("object", bodies["object"]["Izz_kg_m2"], truth.load_izz),
         ("platform", bodies["platform"]["Izz_P_kg_m2"], truth.platform_izz_p),
@@ -68,14 +92,13 @@ def _error(value: float | None, std: float | None, true: float) -> dict[str, flo
 def rows_of(kept: list[dict[str, Any]]) -> list[Row]:
     """The figures by bench and by what was measured."""
     found = []
-    for key in dict.fromkeys((one["wires"], one["seen"], one["one_side"]) for one in kept):
-        mine = [one for one in kept if (one["wires"], one["seen"], one["one_side"]) == key]
+    for name in dict.fromkeys(Case.of(one).name for one in kept):
+        mine = [one for one in kept if Case.of(one).name == name]
         seen = [one["object"] for one in mine if one["object"]["z"] is not None]
         off = np.array([abs(one["percent"]) for one in seen])
         z = np.array([abs(one["z"]) for one in seen])
-        limit = WANTED_PERCENT[key[1]]
+        limit = WANTED_PERCENT[mine[0]["seen"]]
         good = int(np.sum((off < limit) & (z < CLAIMED)))
-        name = f"{key[0]} wires, {key[1]}" + (", weights on one side" if key[2] else "")
         claimed = np.median([one["std_percent"] for one in seen]) if seen else np.nan
         note = f"of {len(mine)} within {limit:g} % and {CLAIMED:g} deviations"
         found += [
@@ -97,19 +120,20 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--wires", type=int, choices=WIRES, action="append")
     parser.add_argument("--seen", choices=tuple(WANTED_PERCENT), action="append")
     parser.add_argument("--one-side", action="store_true", help="the known mass never moves")
+    parser.add_argument("--level", action="store_true", help="the object laid to hang level")
     parser.add_argument("--json", type=Path)
     options = parser.parse_args(arguments)
     options.out.mkdir(parents=True, exist_ok=True)
     path = options.out / "benches.json"
     kept: list[dict[str, Any]] = json.loads(path.read_text()) if path.exists() else []
-    done = {(one["wires"], one["seen"], one["one_side"], one["seed"]) for one in kept}
+    done = {Case.of(one) for one in kept}
     for seed in range(FIRST_SEED, FIRST_SEED + options.seeds):
         for wires in options.wires or WIRES:
             for seen in options.seen or WANTED_PERCENT:
-                key = (wires, seen, options.one_side, seed)
+                key = Case(wires, seen, options.one_side, options.level, seed)
                 if key in done:
                     continue
-                kept.append(one_bench(options.out / "-".join(map(str, key)), seed, *key[:3]))
+                kept.append(one_bench(options.out / "-".join(map(str, key)), key))
                 path.write_text(json.dumps(kept, indent=1) + "\n")
                 told = kept[-1]["object"]
                 print(*key, {k: v and round(v, 3) for k, v in told.items()}, flush=True)

@@ -29,6 +29,7 @@ from freeswing.ident.bench.told.report_objects import (
     objects_document,
     platform_rows,
 )
+from freeswing.ident.bench.told.rolled import rolled_sentences
 
 LEAST_OVER_NOISE = 5.0  # a channel's spread over the noise between its neighbours
 FROM_POSES_STD_M = 2e-3  # wire lengths from mean poses: as good as the wires' ends are known
@@ -117,12 +118,13 @@ def identify_bench(bench: Bench, robot: Robot) -> BenchResult:
         found = solved(model, bench, assembled(model, bench, fitted))
     except (ValueError, np.linalg.LinAlgError) as error:
         raise DataError(f"the bench's runs cannot be fitted: {error}") from error
+    rolled = rolled_sentences(found, fitted)
     checked = [run for run in bench.runs if run.role == "validate"]
     validation = tuple(held_out(model, bench, found, run) for run in checked)
     classic = tuple(classic_runs(found, robot.platform.mass_kg))
     sway = any({"x", "y"} & set(run.coordinates) for run in fitted)
     leaning = leaning_sentence(classic, sway)
-    notes = [*([leaning] if leaning else []), *_notes(found, bench, robot)]
+    notes = [*([leaning] if leaning else []), *_notes(found, bench, robot), *rolled]
     return BenchResult(found, bench, classic, validation, tuple(notes), envelopes(found))
 
 

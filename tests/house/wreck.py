@@ -350,6 +350,7 @@ HELD = (
     Held("ident/bench/noise.py", ("BAND", "LEAST_SHARE", "SIGNIFICANT"), BENCH),
     Held("ident/bench/told/classic.py", ("LEAST_PERIODS", "LEANING_PERCENT"), BENCH),
     Held("ident/bench/told/report_objects.py", ("RESTS_ON_PRIOR", "TELLS_NOTHING"), BENCH),
+    Held("ident/bench/told/rolled.py", ("ROLLED_RAD",), "tests/ident/bench/test_rolled.py"),
     Held("ident/bench/identify_bench.py", ("LEAST_OVER_NOISE",), BENCH),
     Held("ident/bench/diagnose/removal.py", ("SURE",), BENCH_DIAGNOSE),
     Held("ident/bench/diagnose/diagnose.py", ("LEAST_RUNS",), BENCH_DIAGNOSE),

@@ -15,6 +15,8 @@ from freeswing.ident.bench.swing import COMMON, IZZ
 from freeswing.ident.bench.told.classic import radii
 
 SAMPLES = "noise of the samples, drag and starts"
+BESIDE_IZZ = [4, 5, 7, 8, 9]  # of a body's ten numbers: Ixx Iyy Ixy Ixz Iyz
+ACROSS = "{name}: its moments and products beside Izz"
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,9 +49,11 @@ def sources(solved: Solved) -> dict[str, Array]:
         if head == "platform":
             found["the platform's mass"] = places[:1]
             found["the platform's centre of mass"] = places[1:4]
+            found[ACROSS.format(name="the platform")] = places[BESIDE_IZZ]
         elif head == "load":
             found[f"{name}: its mass"] = places[:1]
             found[f"{name}: its centre of mass"] = places[1:4]
+            found[ACROSS.format(name=name)] = places[BESIDE_IZZ]
         elif head == "wires":
             known = found.get("wire lengths", np.zeros(0, dtype=np.int64))
             found["wire lengths"] = np.concatenate([known, places])

@@ -29,6 +29,8 @@ LOAD_KG, LOAD_KG_M2 = 0.8, np.array([0.0062, 0.0071, 0.0093])
 LOAD_COM_M = np.array([0.004, -0.006, 0.01])
 WEIGHT_KG, WEIGHT_M = 0.4, np.array([0.12, 0.0, -0.02])
 BOTH_SIDES_M = (WEIGHT_M, WEIGHT_M * [-1.0, 1.0, 1.0], WEIGHT_M * [0.0, 1.0, 1.0])  # and middle
+_BESIDE_KG_M = DECLARED_KG * HEAVIER * PLATFORM_COM_M + LOAD_KG * LOAD_COM_M
+LEVEL_M = np.array([0.0, -_BESIDE_KG_M[1] / LOAD_KG, 0.0])  # there two wires hang it level
 RATE_HZ = 50.0
 
 
@@ -77,6 +79,8 @@ def make_bench(
     counts: tuple[int, int, int] = (3, 3, 4),
     hidden: Hidden = USUAL,
     weights_m: Sequence[Array] = (WEIGHT_M,),
+    places_m: Sequence[Array] = (np.zeros(3),),
+    rolled_rad_s: float = 0.0,
 ) -> BenchTruth:
     """Write a bench session.
 
@@ -89,6 +93,8 @@ def make_bench(
         counts: tare, known-weight and loaded runs.
         hidden: what the files do not say.
         weights_m: where the known mass is put, one run after the other.
+        places_m: where the object's frame is put, likewise.
+        rolled_rad_s: by how fast a push rolls the platform beside the twist, at most.
     """
     rng = np.random.default_rng(seed)
     (folder / "runs").mkdir(parents=True, exist_ok=True)
@@ -108,16 +114,21 @@ def make_bench(
     lines += [f"com_m = {told.tolist()}", "com_std_m = 0.001"]
     for k, kind in enumerate(kinds):
         weight_m = weights_m[(k - counts[0]) % len(weights_m)]
-        world = _world(wires, kind, weight_m, hidden)
+        place_m = places_m[(k - counts[0] - counts[1]) % len(places_m)]
+        world = _world(wires, kind, weight_m, hidden, place_m)
         name = f"{kind}-{k + 1:02d}"
-        _record(folder / "runs" / f"{name}.csv", world, rng, seen, duration_s)
+        _record(folder / "runs" / f"{name}.csv", world, rng, seen, duration_s, rolled_rad_s)
         lines += ["", "[[runs]]", f'name = "{name}"', 'role = "identify"']
         lines += [f"cable_lengths_m = {[WIRE_M] * wires}", "cable_lengths_std_m = 0.001"]
         lines += [f'trajectory = "runs/{name}.csv"']
         if kind == "weight":
             lines.append(f"payload = {{ mass_kg = {WEIGHT_KG}, position_m = {weight_m.tolist()} }}")
         if kind == "loaded":
-            lines.append('loads = ["object"]')
+            lines.append(
+                f'loads = [{{ name = "object", t_platform_load_m = {place_m.tolist()} }}]'
+                if place_m.any()
+                else 'loads = ["object"]'
+            )
     (folder / "session.toml").write_text("\n".join([*lines, ""]))
     _write_robot(folder / "robot.toml", wires, ends)
     mass = DECLARED_KG * hidden.heavier
@@ -155,7 +166,9 @@ def _moment(mass: float, com: Array, principal: Array) -> tuple[float, Array, Ar
     return mass, mass * com, np.diag(principal) + mass * spread
 
 
-def _world(wires: int, kind: str, weight_m: Array, hidden: Hidden) -> World:
+def _world(
+    wires: int, kind: str, weight_m: Array, hidden: Hidden, place_m: Array | None = None
+) -> World:
     from freeswing.cdpr.robot import Cable, Robot
 
     ends = _ends(wires)
@@ -167,7 +180,8 @@ def _world(wires: int, kind: str, weight_m: Array, hidden: Hidden) -> World:
     if kind == "weight":
         parts.append(_moment(WEIGHT_KG, weight_m, np.zeros(3)))
     if kind == "loaded":
-        parts.append(_moment(LOAD_KG, LOAD_COM_M, LOAD_KG_M2))
+        shift_m = np.zeros(3) if place_m is None else place_m
+        parts.append(_moment(LOAD_KG, LOAD_COM_M + shift_m, LOAD_KG_M2))
     mass = sum(part[0] for part in parts)
     first = np.sum([part[1] for part in parts], axis=0)
     second = np.sum([part[2] for part in parts], axis=0)
@@ -193,18 +207,33 @@ def bench_swing(
     return _swing(_world(wires, kind, WEIGHT_M, USUAL), rng, span_s, rate_hz)
 
 
-def _swing(world: World, rng: np.random.Generator, span_s: float, rate_hz: float) -> Motion:
+def _swing(
+    world: World,
+    rng: np.random.Generator,
+    span_s: float,
+    rate_hz: float,
+    rolled_rad_s: float = 0.0,
+) -> Motion:
     rest = settle(world, np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
     twist = np.zeros(6)
     # A twist by hand: about 8 degrees of yaw, and a centimetre of sway that nobody wanted.
     twist[5] = rng.choice([-1.0, 1.0]) * rng.uniform(0.5, 0.7)
     twist[:2] = rng.normal(0.0, 0.02, 2)
+    if rolled_rad_s > 0.0:
+        twist[3] = rng.choice([-1.0, 1.0]) * rolled_rad_s
     start = rest.position_m, rest.quaternion, span_s, _allowed(rest, twist)
     return simulate(world, *start, rate_hz)
 
 
-def _record(path: Path, world: World, rng: np.random.Generator, seen: str, span_s: float) -> None:
-    motion = _swing(world, rng, span_s, RATE_HZ)
+def _record(
+    path: Path,
+    world: World,
+    rng: np.random.Generator,
+    seen: str,
+    span_s: float,
+    rolled_rad_s: float = 0.0,
+) -> None:
+    motion = _swing(world, rng, span_s, RATE_HZ, rolled_rad_s)
     angles = tait_bryan(motion.quaternions)
     chi = angles[:, 2]
     times = motion.times_s[:, None]
