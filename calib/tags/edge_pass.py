@@ -157,7 +157,7 @@ def pass_over(
                 total += grey
                 total_squares += grey * grey
     return Pass(
-        sums[:UNKNOWNS, :UNKNOWNS],
+        sums[:UNKNOWNS, :UNKNOWNS].copy(),
         sums[:UNKNOWNS, UNKNOWNS].copy(),
         histogram,
         sums[UNKNOWNS, UNKNOWNS],

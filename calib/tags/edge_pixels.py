@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.calib.tags.corner_kernels import TagImage
+from freeswing.calib.tags.tag_map import inverted
 from freeswing.cdpr.compiled.kernels import kernel
 
 Array = NDArray[np.float64]
@@ -50,7 +51,7 @@ def lattice_pixels(tag: TagImage, h: Array) -> Array:
     rays = tag.rays
     n = tag.cells.shape[0] - 2
     height, width = rays.shape[0], rays.shape[1]
-    back = np.linalg.inv(h)
+    back = inverted(h)
     found = np.empty((n + 1, n + 1, 2))
     u, v = (tag.box[0] + tag.box[2]) / 2.0, (tag.box[1] + tag.box[3]) / 2.0
     for r in range(n + 1):
@@ -166,7 +167,7 @@ def _walked(tag: TagImage, corners: Array, reach_px: float, most: float) -> NDAr
     room = int(2.0 * reach_px * length * 1.5 / step) + 200 + 9 * (n + 2) ** 2
     taken = np.zeros((box[3] - box[1], box[2] - box[0]), dtype=np.uint8)
     walk = Walk(taken, np.empty((room, 2), dtype=np.int32), box)
-    count = 0
+    count = np.int64(0)  # a plain 0 is a type of its own, for which all would be compiled again
     for r in range(n + 1):
         for c in range(n + 1):
             if r < n and cells[r + 1, c] != cells[r + 1, c + 1]:
@@ -219,6 +220,7 @@ def edge_pixels(tag: TagImage, h: Array, blur: float, most: float) -> Array:
         return found[:0]
     chunks = (count + CHUNK - 1) // CHUNK
     for p in range(count, chunks * CHUNK):
-        found[chunks - 1, :, p % CHUNK] = found[0, :, 0]
+        for field in range(FIELDS):
+            found[chunks - 1, field, p % CHUNK] = found[0, field, 0]
         found[chunks - 1, COUNTS, p % CHUNK] = 0.0
     return found[:chunks]

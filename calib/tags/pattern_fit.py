@@ -13,9 +13,11 @@ from freeswing.calib.tags.edge_pass import new_work, pass_over
 from freeswing.calib.tags.edge_pixels import LEAST_CELL, edge_pixels
 from freeswing.calib.tags.tag_map import blur_at_centre, compose
 from freeswing.cdpr.compiled.kernels import kernel
+from freeswing.cdpr.elimination import eliminate
 
 Array = NDArray[np.float64]
 
+_Singular = np.linalg.LinAlgError
 BLACK, CONTRAST, BLUR = 8, 9, 10
 LEAST_BLUR = 0.289  # of the pixel's own square, in px
 MOST_BLUR = 6.0  # px; wider ones take tags of 80 px and more, and are no picture to measure in
@@ -135,8 +137,8 @@ def _solvable(seen: Pass, held: bool) -> tuple[Array, Array]:
         for j in range(i):
             normal[i, j] = normal[j, i]
     if held:
-        normal[BLUR, :] = 0.0
-        normal[:, BLUR] = 0.0
+        for i in range(UNKNOWNS):
+            normal[BLUR, i] = normal[i, BLUR] = 0.0
         normal[BLUR, BLUR] = 1.0
         right[BLUR] = 0.0
     for i in range(UNKNOWNS):
@@ -151,7 +153,9 @@ def _moved(state: Array, change: Array) -> tuple[Array, float]:
     blur = state[2]
     blur_change = min(max(change[BLUR], -0.3 * blur), 0.5 * blur)
     blur_change = min(max(blur + blur_change, LEAST_BLUR), MOST_BLUR) - blur
-    moved = np.array([state[0] + change[BLACK], state[1] + change[CONTRAST], blur + blur_change])
+    moved = np.empty(3)
+    moved[0], moved[1] = state[0] + change[BLACK], state[1] + change[CONTRAST]
+    moved[2] = blur + blur_change
     return moved, blur_change
 
 
@@ -197,18 +201,28 @@ class _Step(NamedTuple):
 
 
 @kernel
-def _step(seen: Pass, h: Array, state: Array, half: float, noise: float, free: bool) -> _Step:
-    """Gauss-Newton's step of a pass, the blur `free` or held."""
-    at_least = state[2] <= LEAST_BLUR and seen.right[BLUR] < 0.0
-    normal, right = _solvable(seen, not free or at_least)
-    change = np.empty(UNKNOWNS)
-    change[:] = np.linalg.solve(normal, right)
+def _is_least(seen: Pass, state: Array) -> bool:
+    """Whether the blur has its least value, and the pass would make it less."""
+    return state[2] <= LEAST_BLUR and seen.right[BLUR] < 0.0
+
+
+@kernel
+def _step(seen: Pass, h: Array, state: Array, half: float, noise: float, held: bool) -> _Step:
+    """Gauss-Newton's step of a pass, the blur `held` or free."""
+    normal, right = _solvable(seen, held)
+    change = right.copy()
+    eliminate(normal.copy(), change.reshape(-1, 1))
     moved, blur_change = _moved(state, change)
     largest = _length(change)
-    if largest > FARTHEST:
-        change[:8] *= FARTHEST / largest
+    shorter = FARTHEST / largest if largest > FARTHEST else 1.0
+    explained = 0.0
+    for i in range(UNKNOWNS):
+        change[i] *= shorter if i < 8 else 1.0
+        explained += change[i] * right[i]
+    if not math.isfinite(explained):
+        raise _Singular("A pass over a tag's pixels gave no step.")
     scale = max(_noise_from(seen.histogram, seen.pixels), 0.5 * noise, LEAST_ERROR * moved[1])
-    after = max(seen.squares - float(change @ right), 0.0)
+    after = max(seen.squares - explained, 0.0)
     return _Step(
         compose(h, change, half),
         moved,
@@ -224,8 +238,13 @@ def _step(seen: Pass, h: Array, state: Array, half: float, noise: float, free: b
 @kernel
 def _given(step: _Step, least: float, pixels: float, last: float) -> PatternFit:
     """The fit of a last step; `least` is the smallest variance of a pixel."""
-    covariance = np.empty((8, 8))
-    covariance[:] = np.linalg.inv(step.normal)[:8, :8] * max(step.variance, least)
+    whole, covariance = np.zeros((UNKNOWNS, UNKNOWNS)), np.empty((8, 8))
+    for i in range(UNKNOWNS):
+        whole[i, i] = 1.0
+    eliminate(step.normal.copy(), whole)
+    for i in range(8):
+        for j in range(8):
+            covariance[i, j] = whole[i, j] * max(step.variance, least)
     noise = math.sqrt(step.variance)
     return PatternFit(step.h, covariance, step.state, noise, step.explained, pixels, last)
 
@@ -262,7 +281,7 @@ def _fit_edges(tag: TagImage, h: Array, state: Array, search: Search, scale: flo
             return _failed(h, state, 0.0, count, last)
         blur = state[2]
         across, down = blur_at_centre(h, tag.ray_step, half, blur)
-        step = _step(seen, h, state, half, search.noise, True)
+        step = _step(seen, h, state, half, search.noise, _is_least(seen, state))
         settled = _settled_at(seen, scale, step.scale, turn == MOST_EDGE_PASSES - 1)
         h, state, scale, noise = step.h, step.state, step.scale, math.sqrt(step.variance)
         blurs = step.size * half / min(across, down)
@@ -281,7 +300,8 @@ def fit_pattern(tag: TagImage, pattern_from_ray: Array, search: Search) -> Patte
     h = pattern_from_ray.copy()
     half = (tag.cells.shape[0] - 2) / 2.0
     blurs, guess = search.blurs, search.guess
-    state = np.array([FIRST_BLACK, FIRST_CONTRAST, blurs[0]])
+    state = np.empty(3)
+    state[0], state[1], state[2] = FIRST_BLACK, FIRST_CONTRAST, blurs[0]
     arrays = new_arrays()
     fine, coarse = _strides(tag.box, search.most_pixels)
     scale, predicted = ANY_RESIDUAL, guess[1] > 0.0
@@ -313,7 +333,8 @@ def fit_pattern(tag: TagImage, pattern_from_ray: Array, search: Search) -> Patte
         seen = accumulate(tag, h, state, stride, scale, arrays)
         if seen.pixels < 4 * UNKNOWNS:
             return _failed(h, state, 0.0, pixels, last)
-        step = _step(seen, h, state, half, search.noise, free)
+        held_now = not free or _is_least(seen, state)
+        step = _step(seen, h, state, half, search.noise, held_now)
         h, state, scale = step.h, step.state, step.scale
         last = max(step.size, 0.5 * step.blur_step if free else 0.0)
         noise, pixels = math.sqrt(step.variance), seen.pixels

@@ -32,9 +32,15 @@ _TOO_CROWDED = 1.2  # blur widths narrower than that: neighbours blend, the bias
 def _box(corners_px: Array, n: int, height: int, width: int) -> NDArray[np.int64]:
     """Left, top, right, bottom (exclusive) of a tag with its rim; empty where there is none."""
     box = np.zeros(4, dtype=np.int64)
-    low_u, high_u = corners_px[:, 0].min(), corners_px[:, 0].max()
-    low_v, high_v = corners_px[:, 1].min(), corners_px[:, 1].max()
-    if not math.isfinite(low_u + high_u + low_v + high_v):
+    low_u = high_u = corners_px[0, 0]
+    low_v = high_v = corners_px[0, 1]
+    total = 0.0
+    for k in range(4):
+        u, v = corners_px[k, 0], corners_px[k, 1]
+        low_u, high_u = min(low_u, u), max(high_u, u)
+        low_v, high_v = min(low_v, v), max(high_v, v)
+        total += u + v
+    if not math.isfinite(total):
         return box
     if high_u < 2 or high_v < 2 or low_u > width - 3:
         return box
@@ -50,8 +56,11 @@ def _box(corners_px: Array, n: int, height: int, width: int) -> NDArray[np.int64
 @kernel
 def _ray_step(rays: Array, corners_px: Array) -> Array:
     """How a pixel to the right and one down change the ray in the tag's middle, (2, 2) columns."""
-    u = min(max(int(corners_px[:, 0].mean()), 1), rays.shape[1] - 2)
-    v = min(max(int(corners_px[:, 1].mean()), 1), rays.shape[0] - 2)
+    middle_u = middle_v = 0.0
+    for k in range(4):
+        middle_u, middle_v = middle_u + corners_px[k, 0], middle_v + corners_px[k, 1]
+    u = min(max(int(middle_u / 4.0), 1), rays.shape[1] - 2)
+    v = min(max(int(middle_v / 4.0), 1), rays.shape[0] - 2)
     step = np.empty((2, 2))
     for k in range(2):
         step[k, 0] = (rays[v, u + 1, k] - rays[v, u - 1, k]) / 2.0
@@ -109,8 +118,10 @@ def fit_guess(
     if crowded > 0.0:
         for i in range(8):
             spread[i, i] += (_CROWDED_PX * crowded * pixel_ray) ** 2
-    found[RAYS] = corners.ravel()
-    found[COVARIANCE] = spread.ravel()
+    for i in range(8):  # `RAYS` and `COVARIANCE`; slices would be compiled with an error's text
+        found[i] = corners[i // 2, i % 2]
+        for j in range(8):
+            found[8 + 8 * i + j] = spread[i, j]
     found[BLACK], found[CONTRAST], found[BLUR] = fitted.state[0], fitted.state[1], blur
     found[NOISE], found[EXPLAINED], found[PIXELS] = fitted.noise, fitted.explained, fitted.pixels
     return found

@@ -8,14 +8,40 @@ import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.cdpr.compiled.kernels import kernel
+from freeswing.cdpr.elimination import eliminate
 
 Array = NDArray[np.float64]
+_Singular = np.linalg.LinAlgError
+
+
+@kernel
+def inverted(h: Array) -> Array:
+    """The inverse of a map (3, 3), by its cofactors.
+
+    Raises LinAlgError where it has none.
+
+    Source:
+        Golub, Van Loan 2013, Matrix Computations, sec. 1.1 (problem P1.1.4: cofactors).
+    """
+    back = np.empty((3, 3))
+    for i in range(3):
+        a, b = (i + 1) % 3, (i + 2) % 3
+        for j in range(3):
+            c, d = (j + 1) % 3, (j + 2) % 3
+            back[j, i] = h[a, c] * h[b, d] - h[a, d] * h[b, c]
+    determinant = h[0, 0] * back[0, 0] + h[0, 1] * back[1, 0] + h[0, 2] * back[2, 0]
+    if not (math.isfinite(determinant) and determinant != 0.0):
+        raise _Singular("A map between a tag and its image has no inverse.")
+    for i in range(3):
+        for j in range(3):
+            back[i, j] /= determinant
+    return back
 
 
 @kernel(inline="always")
 def blur_at_centre(h: Array, ray_step: Array, half: float, blur: float) -> tuple[float, float]:
     """How many cells across and down `blur` pixels are in the middle of the tag, and a margin."""
-    back = np.linalg.inv(h)
+    back = inverted(h)
     w = 1.0 / (back[2, 0] * half + back[2, 1] * half + back[2, 2])
     x = (back[0, 0] * half + back[0, 1] * half + back[0, 2]) * w
     y = (back[1, 0] * half + back[1, 1] * half + back[1, 2]) * w
@@ -56,8 +82,11 @@ def map_of_square(rays: Array, side: float) -> Array:
     found[0, 0], found[0, 1], found[0, 2] = e - f * h, c * h - b, b * f - c * e
     found[1, 0], found[1, 1], found[1, 2] = f * g - d, a - c * g, c * d - a * f
     found[2, 0], found[2, 1], found[2, 2] = d * h - e * g, b * g - a * h, a * e - b * d
-    found /= whole
-    found[:2] *= side
+    for i in range(3):
+        for j in range(3):
+            found[i, j] /= whole
+            if i < 2:
+                found[i, j] *= side
     return found
 
 
@@ -69,14 +98,16 @@ def compose(pattern_from_ray: Array, e: NDArray[np.floating], half: float) -> Ar
         Hartley, Zisserman 2004, Multiple View Geometry in Computer Vision, sec. 2.3: maps
         of the plane composed.
     """
-    change = np.eye(3)
-    change[0, :] += e[0:3] / half
-    change[1, :] += e[3:6] / half
-    change[2, :2] += e[6:8] / half
-    scaled = np.array([[1.0 / half, 0.0, -1.0], [0.0, 1.0 / half, -1.0], [0.0, 0.0, 1.0]])
-    cells = np.array([[half, 0.0, half], [0.0, half, half], [0.0, 0.0, 1.0]])
-    moved = np.empty((3, 3))
-    moved[:] = cells @ np.linalg.solve(change, scaled @ pattern_from_ray)
+    change, moved = np.empty((3, 3)), np.empty((3, 3))
+    for i in range(3):
+        for j in range(3):
+            change[i, j] = (1.0 if i == j else 0.0) + (e[3 * i + j] / half if i + j < 4 else 0.0)
+            origin = pattern_from_ray[2, j]
+            moved[i, j] = pattern_from_ray[i, j] / half - origin if i < 2 else origin
+    eliminate(change, moved)
+    for i in range(2):
+        for j in range(3):
+            moved[i, j] = half * (moved[i, j] + moved[2, j])
     return moved
 
 
@@ -90,7 +121,7 @@ def corners_of_map(
         Hartley, Zisserman 2004, Multiple View Geometry in Computer Vision, sec. 2.3 and
         5.2: covariance through a map.
     """
-    back = np.linalg.inv(pattern_from_ray)
+    back = inverted(pattern_from_ray)
     rays = np.empty((4, 2))
     jacobian = np.zeros((8, 8))
     for k in range(4):
@@ -113,6 +144,19 @@ def corners_of_map(
         dx = rays[k, 0] - rays[(k + 1) % 4, 0]
         dy = rays[k, 1] - rays[(k + 1) % 4, 1]
         shortest = min(shortest, math.sqrt(dx * dx + dy * dy))
-    spread = np.zeros((8, 8))
-    spread[:] = jacobian @ covariance @ jacobian.T
-    return rays, spread, shortest
+    return rays, _carried(jacobian, covariance), shortest
+
+
+@kernel
+def _carried(jacobian: Array, covariance: Array) -> Array:
+    """A covariance (8, 8) through a linear map."""
+    half, spread = np.zeros((8, 8)), np.zeros((8, 8))
+    for i in range(8):
+        for k in range(8):
+            for j in range(8):
+                half[i, j] += jacobian[i, k] * covariance[k, j]
+    for i in range(8):
+        for j in range(8):
+            for k in range(8):
+                spread[i, j] += half[i, k] * jacobian[j, k]
+    return spread

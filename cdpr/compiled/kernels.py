@@ -7,6 +7,8 @@ Here the machine code's name on the disk is a digest of all that goes into it
 (`cdpr.compiled.contents`), of the arguments' types, the processor, and the versions of what
 compiles. So files are never out of date, only unused; any number of environments share them.
 
+Processes that want the same kernel at once take turns: one compiles it, the others read it.
+
 They are looked for among those that come with the program (`docs/decisions/kernels.md`), then in
 the user's cache folder, where new ones are put.
 """
@@ -15,6 +17,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import os
 import pickle
 import sys
 from collections.abc import Callable
@@ -71,6 +74,19 @@ def kernel(function: Callable[..., Any] | None = None, **options: Any) -> Any:
     compiled: Any = numba.njit(nogil=True, **options)(function)
     if not config.DISABLE_JIT:  # pyright: ignore[reportAttributeAccessIssue]
         compiled._cache = Kept(compiled)
+        compiled.compile = _compiled_in_turn(compiled._cache, compiled.compile)
+    return compiled
+
+
+def _compiled_in_turn(kept: Kept, usual: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """A dispatcher's `compile` that ends the turn which `Kept.load_overload` began."""
+
+    def compiled(signature: Any) -> Any:
+        try:
+            return usual(signature)
+        finally:
+            kept.end_turns()
+
     return compiled
 
 
@@ -133,6 +149,44 @@ def _write(path: Path, data: bytes) -> None:
         file.write(data)
 
 
+def _turn(folder: Path, name: str) -> list[tuple[int, int]]:
+    """Waits until no other process compiles what has this name; the place that is held, if any.
+
+    Whoever compiles holds what it is at, and then one by one what that calls: as no two kernels
+    call each other, none waits in a circle.
+    """
+    turnstile = _turnstile(folder)
+    if turnstile is None:
+        return []
+    import fcntl
+
+    place = int(hashlib.sha256(name.encode()).hexdigest()[:12], 16)
+    try:
+        fcntl.lockf(turnstile, fcntl.LOCK_EX, 1, place)
+    except OSError:
+        return []  # some network disks know no locks: it is compiled beside the other one
+    return [(turnstile, place)]
+
+
+def _give_way(turnstile: int, place: int) -> None:
+    import fcntl
+
+    with contextlib.suppress(OSError):
+        fcntl.lockf(turnstile, fcntl.LOCK_UN, 1, place)
+
+
+@cache
+def _turnstile(folder: Path) -> int | None:
+    """A file whose bytes are locked, one for each name; open as long as the process."""
+    if sys.platform == "win32":
+        return None
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        return os.open(folder / "turns", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+    except OSError:
+        return None
+
+
 @dataclass(frozen=True, slots=True)
 class _Name:
     """The name of a kernel's file for two processors: this one, and any that is portable."""
@@ -147,6 +201,7 @@ class Kept(_Cache):
     def __init__(self, compiled: Any) -> None:
         self._compiled = compiled
         self._is_enabled = True
+        self._turns: list[tuple[int, int]] = []
 
     @property
     def cache_path(self) -> str:  # pyright: ignore[reportIncompatibleMethodOverride]
@@ -165,13 +220,16 @@ class Kept(_Cache):
         """Nothing: a file of this content is right, or damaged and not read."""
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """The machine code for a signature, None where there is none."""
+        """The machine code for a signature; None where there is none, and it is to be compiled."""
         target_context.refresh()
         name = self._name(sig, target_context.codegen().magic_tuple())
         if name is None:
             return None
         data = _read(READY / name.portable) if comes_ready() else None
         data = data or _read(user_folder() / name.here)
+        if data is None:
+            self._turns += _turn(user_folder(), name.here)
+            data = _read(user_folder() / name.here)
         if data is None:
             return None
         return CompileResult._rebuild(target_context, *pickle.loads(data))
@@ -183,6 +241,11 @@ class Kept(_Cache):
         name = self._name(sig, data.codegen.magic_tuple())
         if name is not None:
             _write(user_folder() / name.here, dumps(data._reduce()))
+
+    def end_turns(self) -> None:
+        """Let other processes go on that want this kernel."""
+        while self._turns:
+            _give_way(*self._turns.pop())
 
     def _name(self, sig: Any, machine: tuple[str, ...]) -> _Name | None:
         if not self._is_enabled:
