@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from freeswing.calib.camera.lens_kernels import lens_point
+from freeswing.calib.camera.lens_kernels import WITH_SLOPES, lens_point
 from freeswing.calib.rig.reprojection_kernels import turn_and_jacobian
 from freeswing.cdpr.compiled.kernels import kernel
 from freeswing.cdpr.elimination import eliminate
@@ -43,7 +43,7 @@ def _linearise(
                 pose[i, 0] * points[p, 0] + pose[i, 1] * points[p, 1] + pose[i, 2] * points[p, 2]
             )
             place[i] = arm[i] + pose[i, 3]
-        lens_point(is_fisheye, full, place, True, pixel, d_point, d_full)
+        lens_point(is_fisheye, full, place, WITH_SLOPES, pixel, d_point, d_full)
         for axis in range(2):
             d = d_point[axis]
             error = pixels[p, axis] - pixel[axis]

@@ -21,6 +21,8 @@ NEWTON_STEPS = 30
 CONVERGED = 1e-12
 _LEAST_DETERMINANT = 1e-6
 SOLVED = 1e-9
+# For `slopes`: each of a plain True and False is a type, for which all would be compiled again.
+WITH_SLOPES, WITHOUT_SLOPES = np.bool_(True), np.bool_(False)
 _NEIGHBOUR = 0.01  # step to a neighbouring pixel of any lens here: rays farther apart start anew
 
 
@@ -135,7 +137,7 @@ def lens_pixels(is_fisheye: bool, full: Array, points: Array) -> Array:
     pixels = np.empty((len(points), 2))
     d_point, d_full = np.empty((2, 3)), np.empty((2, 12))
     for k in range(len(points)):
-        lens_point(is_fisheye, full, points[k], False, pixels[k], d_point, d_full)
+        lens_point(is_fisheye, full, points[k], WITHOUT_SLOPES, pixels[k], d_point, d_full)
     return pixels
 
 
@@ -146,7 +148,7 @@ def lens_jacobians(is_fisheye: bool, full: Array, points: Array) -> tuple[Array,
     pixels, d_point = np.empty((count, 2)), np.empty((count, 2, 3))
     d_full = np.empty((count, 2, 12))
     for k in range(count):
-        lens_point(is_fisheye, full, points[k], True, pixels[k], d_point[k], d_full[k])
+        lens_point(is_fisheye, full, points[k], WITH_SLOPES, pixels[k], d_point[k], d_full[k])
     return pixels, d_point, d_full
 
 

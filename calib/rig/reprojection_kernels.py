@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from freeswing.calib.camera.lens_kernels import lens_point
+from freeswing.calib.camera.lens_kernels import WITH_SLOPES, WITHOUT_SLOPES, lens_point
 from freeswing.calib.rig.kernel_inputs import Array, Estimate, Ints, Shape, ViewArrays
 from freeswing.cdpr.compiled.kernels import kernel
 
@@ -287,7 +287,7 @@ def local_rows(views: ViewArrays, estimate: Estimate, v: int) -> Array:
     view = view_of(views, estimate, v)
     columns = view.n_lens + POSE + CLOCK + WARP + 6 * (1 + view.motion.shape[0])
     n = 2 * views.pixels.shape[1]
-    return view_rows(view, True, np.zeros((n, columns)), np.zeros(n), new_spare())[0]
+    return view_rows(view, WITH_SLOPES, np.zeros((n, columns)), np.zeros(n), new_spare())[0]
 
 
 @kernel
@@ -296,5 +296,5 @@ def all_residuals(views: ViewArrays, estimate: Estimate) -> Array:
     result = np.full(views.pixels.shape, np.nan)
     rows, spare = np.zeros((1, 1)), new_spare()
     for v in range(len(views.camera)):
-        view_rows(view_of(views, estimate, v), False, rows, result[v].reshape(-1), spare)
+        view_rows(view_of(views, estimate, v), WITHOUT_SLOPES, rows, result[v].reshape(-1), spare)
     return result

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from freeswing.calib.camera.lens_kernels import WITH_SLOPES
 from freeswing.calib.rig.kernel_inputs import Array, Estimate, Ints, ViewArrays
 from freeswing.calib.rig.reprojection_kernels import (
     CLOCK,
@@ -155,7 +156,7 @@ def view_equations(
         wide = own + WARP + width + 1
         if wide != rows.shape[1]:
             rows, spare = np.zeros((2 * n_points, wide)), np.zeros(wide)
-        view_rows(view_of(views, estimate, v), True, rows, residuals, scratch)
+        view_rows(view_of(views, estimate, v), WITH_SLOPES, rows, residuals, scratch)
         for i in range(2 * n_points):
             rows[i, wide - 1] = residuals[i]
         used, cost = _weighted(views, v, rows, spare, float(sigma[c]), knee, cost)

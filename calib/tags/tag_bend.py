@@ -26,7 +26,7 @@ from freeswing.calib.board.boards import CIRCLES, Board
 from freeswing.calib.board.circles import circle_bias
 from freeswing.calib.board.platform_tags import PlatformTags
 from freeswing.calib.camera.camera import Camera
-from freeswing.calib.camera.lens_kernels import lens_point
+from freeswing.calib.camera.lens_kernels import WITH_SLOPES, WITHOUT_SLOPES, lens_point
 from freeswing.calib.camera.lens_models import FISHEYE, Array, full_parameters
 from freeswing.calib.rig.reprojection import Scene
 from freeswing.calib.rig.views import Views
@@ -153,13 +153,13 @@ def _exposed(
 ) -> None:
     """Pixel of a board point whose row is exposed while the board drifts (shift, turn) a row."""
     place = arm + origin
-    lens_point(is_fisheye, full, place, True, pixel, d_point, d_full)
+    lens_point(is_fisheye, full, place, WITH_SLOPES, pixel, d_point, d_full)
     for _ in range(2 if np.any(drift != 0.0) else 0):
         rows = pixel[1] - middle_row
         place[0] = arm[0] + origin[0] + rows * (drift[0] + drift[4] * arm[2] - drift[5] * arm[1])
         place[1] = arm[1] + origin[1] + rows * (drift[1] + drift[5] * arm[0] - drift[3] * arm[2])
         place[2] = arm[2] + origin[2] + rows * (drift[2] + drift[3] * arm[1] - drift[4] * arm[0])
-        lens_point(is_fisheye, full, place, True, pixel, d_point, d_full)
+        lens_point(is_fisheye, full, place, WITH_SLOPES, pixel, d_point, d_full)
 
 
 @kernel
@@ -192,7 +192,7 @@ def _biases(
         four, placed = np.dot(corners, turn), np.dot(middles, turn)
         arms = np.dot(directions, turn)
         middle = 0.5 * (four[0] + four[2]) + origin
-        lens_point(is_fisheye, full, middle, False, at, d_point, d_full)
+        lens_point(is_fisheye, full, middle, WITHOUT_SLOPES, at, d_point, d_full)
         row_at = at[1]
         for k in range(4):
             _exposed(is_fisheye, full, four[k], origin, drift, row_at, seen[k], d_point, d_full)

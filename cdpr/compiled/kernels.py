@@ -98,7 +98,12 @@ def user_folder() -> Path:
 
 def comes_ready() -> bool:
     """Whether this processor can run what came with the program, and nobody asked for other."""
-    return not config.CACHE_DIR and READY.is_dir() and _is_portable_here()  # pyright: ignore[reportAttributeAccessIssue]
+    return not config.CACHE_DIR and READY.is_dir() and is_portable_here()  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def made_for(path: Path) -> bool:
+    """Whether a kernel's file was made by the same versions and settings as are here."""
+    return path.name.split("-")[-2:-1] == [_around()]
 
 
 def is_kept(compiled: Any) -> bool:
@@ -120,7 +125,13 @@ def surroundings() -> bytes:
 
 
 @cache
-def _is_portable_here() -> bool:
+def _around() -> str:
+    return hashlib.sha256(surroundings()).hexdigest()[:8]
+
+
+@cache
+def is_portable_here() -> bool:
+    """Whether this processor has all that `PORTABLE` code uses."""
     features = llvm.get_host_cpu_features()
     return all(features.get(name, False) for name in _PORTABLE_NEEDS.split())
 
@@ -129,7 +140,7 @@ def _stem(compiled: Any, digest: bytes) -> str:
     function = compiled.py_func
     module = function.__module__.rpartition(".")[2]
     name = function.__qualname__.replace("<", "").replace(">", "")
-    return f"{module}.{name}-{digest.hex()[:16]}-"
+    return f"{module}.{name}-{digest.hex()[:16]}-{_around()}-"
 
 
 def _read(path: Path) -> bytes | None:

@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -25,6 +26,9 @@ from freeswing.cdpr.system.lifeline import tie_to
 from freeswing.demo.rig import RATE_HZ, demo_target, film, swing_shots, true_cameras
 from freeswing.demo.truth import demo_robot, demo_swings
 from freeswing.vision.fuse.pose_kernels import solve_block
+
+if TYPE_CHECKING:
+    from freeswing.console import Console
 
 SWING = "swing-01"
 LASTS_S = 0.8  # 24 frames: more than a motion's polynomial needs, filmed and tracked in a second
@@ -72,6 +76,26 @@ def rehearse(folder: Path, parent: int | None = None) -> bool:
         except DataError:
             return False
     return True
+
+
+def compile_ahead(folder: Path, console: Console) -> None:
+    """Has everything compiled that filming, calibrating and tracking call, by one short session.
+
+    Args:
+        folder: empty.
+        console: told of each step.
+    """
+    from freeswing.console import Console as Quiet
+    from freeswing.demo.filmed import write_filmed_session
+    from freeswing.session.session_file import read_session
+    from freeswing.session.stages import CALIBRATE, TRACK
+
+    console.say("compiling what filming calls")
+    session = read_session(write_filmed_session(folder, filmed=(SWING,)))
+    with Quiet(quiet=True) as silent:
+        for stage in (CALIBRATE, TRACK):
+            console.say(f"compiling what {stage.name} calls")
+            stage.take(session, silent)
 
 
 def write_rehearsal(folder: Path) -> Path:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib
 import os
 import platform
-import tempfile
 from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -14,6 +13,7 @@ from typing import Literal
 from freeswing import __version__
 from freeswing.console import has_desktop
 from freeswing.doctor.finding import Finding
+from freeswing.doctor.kept_kernels import kernel_findings
 
 # Distribution and module of what every command rests on; without one of them something fails.
 NEEDED = {
@@ -55,7 +55,7 @@ def machine_findings() -> Iterator[Finding]:
     yield from _codecs()
     yield _cores()
     yield _memory()
-    yield _kernels()
+    yield from kernel_findings()
     told = "there is one" if has_desktop() else "none: open pages yourself"
     yield Finding("note", "desktop", told)
 
@@ -127,21 +127,3 @@ def _memory() -> Finding:
         text = f"{size:.1f} GB, {COMFORTABLE_GB:g} are comfortable"
         return Finding("warning", "memory", text, "give --workers 1, or shorter films")
     return Finding("note", "memory", f"{size:.1f} GB")
-
-
-def _kernels() -> Finding:
-    """Which compiled kernels are kept, and whether new ones can be."""
-    from freeswing.cdpr.compiled.kernels import SUFFIX, user_folder
-
-    folder = user_folder()
-    kept = [file.stat().st_size for file in folder.glob(f"*{SUFFIX}")]
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            pass
-    except OSError:
-        text = f"{folder} cannot be written to: kernels are compiled again in every process"
-        return Finding("warning", "kernels", text, "set NUMBA_CACHE_DIR to a folder of your own")
-    first = "" if kept else "; the first track or demo compiles them, about a minute"
-    text = f"{len(kept)} compiled ones kept in {folder}, {1e-6 * sum(kept):.0f} MB{first}"
-    return Finding("note", "kernels", text)

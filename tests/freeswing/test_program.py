@@ -19,6 +19,7 @@ from numba.core import config
 from freeswing.cdpr.compiled.kernels import SUFFIX
 from freeswing.console import _write, has_colours
 from freeswing.doctor import machine
+from freeswing.doctor.kept_kernels import _kept
 from freeswing.main import COMMANDS, main
 from tests.places import ROOT
 
@@ -58,11 +59,11 @@ def test_kernels_that_cannot_be_kept_are_said(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path))
-    assert machine._kernels().text.startswith("0 compiled ones")
+    assert _kept(False).text.startswith("0 compiled ones")
     (tmp_path / "kernels" / f"one{SUFFIX}").write_bytes(b"")
-    assert machine._kernels().text.startswith("1 compiled ones")
+    assert _kept(False).text.startswith("1 compiled ones")
     monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path / "kernels" / f"one{SUFFIX}"))
-    assert machine._kernels().level == "warning"
+    assert _kept(False).level == "warning"
 
 
 def test_a_cluster_that_is_not_there_is_said(capsys: pytest.CaptureFixture[str]) -> None:

@@ -125,6 +125,7 @@ def refined_pose(
         np.full(n, 4, dtype=np.int64),
     )
     pose = MovingPose(rotation, position, np.zeros(12))
-    found = solve_instant(seen, whitening, 0, pose, 6, limit, passes)
+    first, free = np.int64(0), np.int64(6)  # plain ones would be types of their own
+    found = solve_instant(seen, whitening, first, pose, free, limit, passes)
     known = found.condition != 0.0 and bool(np.isfinite(found.position).all())
     return known, found.rotation, found.position

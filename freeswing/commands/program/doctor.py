@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from pathlib import Path
 
 from freeswing.console import Console
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """A cluster to call on."""
+    """A cluster to call on, and whether to compile."""
     parser.add_argument(
         "--cluster", metavar="ADDRESS", help="see also whether a Dask cluster can be used from here"
+    )
+    parser.add_argument(
+        "--compile",
+        action="store_true",
+        help="compile ahead what calibrating and tracking need, by a short session of its own",
     )
 
 
@@ -19,6 +25,8 @@ def run(options: Namespace, console: Console) -> None:
     from freeswing.cdpr.files.documents import DataError
     from freeswing.doctor.machine import cluster_finding, machine_findings
 
+    if options.compile:
+        _compile(console)
     findings = list(machine_findings())
     if options.cluster:
         findings.append(cluster_finding(options.cluster))
@@ -30,3 +38,13 @@ def run(options: Namespace, console: Console) -> None:
     errors = [one.subject for one in findings if one.level == "error"]
     if errors:
         raise DataError(f"not usable here: {', '.join(errors)}")
+
+
+def _compile(console: Console) -> None:
+    """Film, calibrate and track: whatever that calls is compiled, or read."""
+    from tempfile import TemporaryDirectory
+
+    from freeswing.demo.rehearsal import compile_ahead
+
+    with TemporaryDirectory() as folder:
+        compile_ahead(Path(folder), console)
