@@ -41,14 +41,15 @@ from freeswing.cdpr.compiled.contents import Unreadable, digest_of, signature_di
 from freeswing.cdpr.system.drafts import draft_of
 
 READY = Path(__file__).with_name("ready")
-"""Kernels that came with the program, compiled for `PORTABLE`."""
+"""Kernels that came with the program, compiled for `LEVELS`."""
 SUFFIX = ".kernel"
 _CHECKED = hashlib.sha256().digest_size
-PORTABLE = "x86-64-v3"
-# What this level of the x86-64 psABI demands beyond the first one.
-_PORTABLE_NEEDS = """
-    avx avx2 bmi bmi2 cx16 f16c fma lzcnt movbe popcnt sahf sse3 sse4.1 sse4.2 ssse3 xsave
-"""
+# Levels of the x86-64 psABI, the best first, and what each demands beyond those after it.
+LEVELS = {
+    "x86-64-v4": "avx512bw avx512cd avx512dq avx512f avx512vl",
+    "x86-64-v3": "avx avx2 bmi bmi2 cx16 f16c fma lzcnt movbe popcnt sahf sse3 sse4.1 sse4.2 ssse3"
+    " xsave",
+}
 # What else of numba's settings changes the machine code.
 _SETTINGS = (
     "BOUNDSCHECK",
@@ -98,7 +99,7 @@ def user_folder() -> Path:
 
 def comes_ready() -> bool:
     """Whether this processor can run what came with the program, and nobody asked for other."""
-    return not config.CACHE_DIR and READY.is_dir() and is_portable_here()  # pyright: ignore[reportAttributeAccessIssue]
+    return not config.CACHE_DIR and READY.is_dir() and bool(levels_here())  # pyright: ignore[reportAttributeAccessIssue]
 
 
 def made_for(path: Path) -> bool:
@@ -130,10 +131,15 @@ def _around() -> str:
 
 
 @cache
-def is_portable_here() -> bool:
-    """Whether this processor has all that `PORTABLE` code uses."""
+def levels_here() -> tuple[str, ...]:
+    """Those of `LEVELS` whose code this processor can run, the best first."""
     features = llvm.get_host_cpu_features()
-    return all(features.get(name, False) for name in _PORTABLE_NEEDS.split())
+    has = {
+        level: all(features.get(name, False) for name in needs.split())
+        for level, needs in LEVELS.items()
+    }
+    names = tuple(LEVELS)
+    return tuple(name for k, name in enumerate(names) if all(has[one] for one in names[k:]))
 
 
 def _stem(compiled: Any, digest: bytes) -> str:
@@ -200,10 +206,10 @@ def _turnstile(folder: Path) -> int | None:
 
 @dataclass(frozen=True, slots=True)
 class _Name:
-    """The name of a kernel's file for two processors: this one, and any that is portable."""
+    """The name of a kernel's file for this processor, and for levels that it can run."""
 
     here: str
-    portable: str
+    levels: list[str]
 
 
 class Kept(_Cache):
@@ -236,8 +242,9 @@ class Kept(_Cache):
         name = self._name(sig, target_context.codegen().magic_tuple())
         if name is None:
             return None
-        data = _read(READY / name.portable) if comes_ready() else None
-        data = data or _read(user_folder() / name.here)
+        places = [READY / level for level in name.levels] if comes_ready() else []
+        places.append(user_folder() / name.here)
+        data = next(filter(None, map(_read, places)), None)
         if data is None:
             self._turns += _turn(user_folder(), name.here)
             data = _read(user_folder() / name.here)
@@ -267,8 +274,9 @@ class Kept(_Cache):
         except Unreadable:
             return None
         stem = _stem(self._compiled, whole)
-        here, portable = (
+        machines = (machine, *((machine[0], level, "") for level in levels_here()))
+        here, *levels = (
             hashlib.sha256(repr((whole, types, one, surroundings())).encode()).hexdigest()[:32]
-            for one in (machine, (machine[0], PORTABLE, ""))
+            for one in machines
         )
-        return _Name(f"{stem}{here}{SUFFIX}", f"{stem}{portable}{SUFFIX}")
+        return _Name(f"{stem}{here}{SUFFIX}", [f"{stem}{level}{SUFFIX}" for level in levels])

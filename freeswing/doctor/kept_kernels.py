@@ -17,8 +17,8 @@ def kernel_findings() -> Iterator[Finding]:
     text, remedy = f"{len(ready)} came with the program ({_megabytes(ready)})", ""
     if not ready:
         text = "none came with the program"
-    elif not kernels.is_portable_here():
-        text += f", not used: they need a processor of level {kernels.PORTABLE}"
+    elif not kernels.levels_here():
+        text += f", not used: they need a processor of level {list(kernels.LEVELS)[-1]}"
     elif not fitting:
         text += ", not used: they are for other versions of Python, numba, llvmlite or numpy"
         remedy = "install with the release's requirements.lock"

@@ -180,12 +180,12 @@ def test_two_processes_write_at_once(kept: Path, tmp_path: Path) -> None:
     assert hits(third) == 1
 
 
-@pytest.mark.skipif(not kernels.is_portable_here(), reason="another processor")
+@pytest.mark.skipif(not kernels.levels_here(), reason="another processor")
 def test_what_comes_ready_is_read_and_not_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     imported(tmp_path / "a")
-    made = {"NUMBA_CPU_NAME": kernels.PORTABLE, "NUMBA_CPU_FEATURES": ""}
+    made = {"NUMBA_CPU_NAME": kernels.levels_here()[-1], "NUMBA_CPU_FEATURES": ""}
     assert started(tmp_path / "a", NUMBA_CACHE_DIR=str(tmp_path), **made).communicate()[0]
     ready = tmp_path / "kernels"
     names = files(ready)
@@ -201,7 +201,7 @@ def test_what_comes_ready_is_read_and_not_written(
     changed = imported(tmp_path / "a", CALLED.replace("GAIN = 2.0", "GAIN = 4.0"))
     assert changed.answer(3.0) == 12.0
     assert hits(changed) == 0
-    monkeypatch.setattr(kernels, "is_portable_here", lambda: False)
+    monkeypatch.setattr(kernels, "levels_here", lambda: ())
     older = imported(tmp_path / "a")
     assert older.answer(3.0) == 6.0
     assert hits(older) == 0
