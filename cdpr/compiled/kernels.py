@@ -9,7 +9,7 @@ compiles. So files are never out of date, only unused; any number of environment
 
 Processes that want the same kernel at once take turns: one compiles it, the others read it.
 
-They are looked for among those that come with the program (`docs/decisions/kernels.md`), then in
+They are looked for among those that come with the program (`docs/decisions/installing.md`), then in
 the user's cache folder, where new ones are put.
 """
 
