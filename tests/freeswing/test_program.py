@@ -16,10 +16,11 @@ from pathlib import Path
 import pytest
 from numba.core import config
 
+from freeswing.cdpr.compiled import kernels
 from freeswing.cdpr.compiled.kernels import SUFFIX
 from freeswing.console import _write, has_colours
 from freeswing.doctor import machine
-from freeswing.doctor.kept_kernels import _kept
+from freeswing.doctor.kept_kernels import _kept, kernel_findings
 from freeswing.main import COMMANDS, main
 from tests.places import ROOT
 
@@ -64,6 +65,26 @@ def test_kernels_that_cannot_be_kept_are_said(
     assert _kept(False).text.startswith("1 compiled ones")
     monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path / "kernels" / f"one{SUFFIX}"))
     assert _kept(False).level == "warning"
+
+
+def test_kernels_that_came_ready_are_said_with_why_they_are_not_used(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    def told() -> str:
+        return next(kernel_findings()).sentence()
+
+    monkeypatch.setattr(kernels, "READY", tmp_path)
+    monkeypatch.setattr(config, "CACHE_DIR", "")
+    monkeypatch.setattr(kernels, "levels_here", lambda: ("x86-64-v3",))
+    assert "none came" in told()
+    (tmp_path / f"one-0-elsewhere-1{SUFFIX}").write_bytes(b"")
+    assert "other versions" in told()
+    (tmp_path / f"two-0-{kernels._around()}-1{SUFFIX}").write_bytes(b"")
+    assert told() == "kernels that are ready: 2 came with the program (0.0 MB)"
+    monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path))
+    assert "NUMBA_CACHE_DIR" in told()
+    monkeypatch.setattr(kernels, "levels_here", lambda: ())
+    assert "x86-64-v3" in told()
 
 
 def test_a_cluster_that_is_not_there_is_said(capsys: pytest.CaptureFixture[str]) -> None:
