@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from freeswing.cdpr.robot import Array
 
@@ -64,7 +64,7 @@ def widened(covariance: Array, std: Array, runs: int) -> Array:
     if runs < LEAST_RUNS or not np.isfinite(own).all():
         return covariance
     ratio = np.where(own > 0.0, std / np.where(own > 0.0, own, 1.0), 0.0)
-    limit = float(chi2.isf(CHANCE, runs - 1)) / (runs - 1)
+    limit = float(chdtri(runs - 1, CHANCE)) / (runs - 1)
     factors = np.where(ratio**2 > limit, ratio, 1.0)
     return covariance * np.outer(factors, factors)
 

@@ -14,8 +14,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.signal import savgol_filter
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from freeswing.cdpr.model.batch import evaluate, only, with_jacobian
 from freeswing.cdpr.model.equations import Model
@@ -37,6 +36,7 @@ from freeswing.ident.diagnose.lengths.length_rows import (
     frame_root,
     measured_rates,
 )
+from freeswing.ident.diagnose.lengths.local_polynomials import local_derivatives
 from freeswing.ident.likelihood.run_residuals import Samples
 
 # Instants of a run at which slopes are taken, and parts of it whose means tell the noise of all.
@@ -189,8 +189,8 @@ def heard(
     witness = Witness(
         own.values[where],
         np.sqrt(np.diag(covariance)),
-        float(chi2.sf(left, sum(len(one.right) for one in found))),
-        float(chi2.sf(apart @ np.linalg.solve(both, apart), len(where))),
+        float(chdtrc(sum(len(one.right) for one in found), left)),
+        float(chdtrc(len(where), apart @ np.linalg.solve(both, apart))),
     )
     if not witness.agrees:
         return Heard(normal, blocks, witness)
@@ -278,5 +278,5 @@ def _accelerations(times_s: Array, values: Array) -> Array:
     grid = np.arange(times_s[0], times_s[-1] + 0.5 * step, step)
     even = np.array([np.interp(grid, times_s, column) for column in values.T])
     width = min(2 * round(RATES_OVER_S / step) + 1, len(grid) - 1 + len(grid) % 2)
-    found = savgol_filter(even, max(width, 7), 4, deriv=2, delta=step, axis=1)
-    return np.array([np.interp(times_s, grid, row) for row in np.asarray(found)]).T
+    found = local_derivatives(even, max(width, 7), 4, 2, step)
+    return np.array([np.interp(times_s, grid, row) for row in found]).T

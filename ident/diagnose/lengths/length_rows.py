@@ -10,12 +10,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import savgol_filter
 
 from freeswing.cdpr.model.batch import evaluate, with_jacobian
 from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.robot import Array, Robot
 from freeswing.cdpr.rotation import angle_rate_matrix, matrix_from_angles
+from freeswing.ident.diagnose.lengths.local_polynomials import local_derivatives
 from freeswing.ident.likelihood.run_residuals import Samples
 
 # Slow errors follow the swing (up to some 2 Hz): means over a tenth of a second lose none of them.
@@ -72,8 +72,7 @@ def measured_rates(times_s: Array, values: Array) -> Array:
     grid = np.arange(times_s[0], times_s[-1] + 0.5 * step, step)
     even = np.array([np.interp(grid, times_s, column) for column in values.T])
     width = min(2 * round(0.5 * RATES_OVER_S / step) + 1, len(grid) - 1 + len(grid) % 2)
-    rates = savgol_filter(even, max(width, 5), 3, deriv=1, delta=step, axis=1)
-    rates = np.asarray(rates, dtype=np.float64)
+    rates = local_derivatives(even, max(width, 5), 3, 1, step)
     return np.array([np.interp(times_s, grid, row) for row in rates]).T
 
 
