@@ -21,7 +21,11 @@ from freeswing.ident.bench.told.classic import (
     held_sentences,
     leaning_sentence,
 )
-from freeswing.ident.bench.told.contradicted import group_sentence, wires_sentence
+from freeswing.ident.bench.told.contradicted import (
+    exchange_sentence,
+    group_sentence,
+    wires_sentence,
+)
 from freeswing.ident.bench.told.envelope import Envelope, envelopes, law_chances
 from freeswing.ident.bench.told.held_out import HeldOut, held_out
 from freeswing.ident.bench.told.report_objects import (
@@ -30,6 +34,7 @@ from freeswing.ident.bench.told.report_objects import (
     platform_rows,
 )
 from freeswing.ident.bench.told.rolled import rolled_sentences
+from freeswing.ident.bench.told.scatter import scatter_sentence
 
 LEAST_OVER_NOISE = 5.0  # a channel's spread over the noise between its neighbours
 FROM_POSES_STD_M = 2e-3  # wire lengths from mean poses: as good as the wires' ends are known
@@ -205,7 +210,9 @@ def _part(signal: Signal, inside: Array) -> Signal:
 
 
 def _notes(found: Solved, bench: Bench, robot: Robot) -> list[str]:
-    notes = [one for one in (group_sentence(found), wires_sentence(found)) if one]
+    fitted = [run for run in bench.runs if run.role == "identify"]
+    contradicted = (group_sentence(found), wires_sentence(found), exchange_sentence(fitted))
+    notes = [one for one in contradicted if one]
     notes += held_sentences(found)
     if bench.loads and found.mass is None and bench.mass_std_kg is None:
         notes.append(
@@ -214,11 +221,8 @@ def _notes(found: Solved, bench: Bench, robot: Robot) -> list[str]:
             "the middle, or mass_std_kg, says how well"
         )
     notes += _gain_notes(found, bench)
-    if found.scatter_std > 0.0:
-        notes.append(
-            f"runs scatter by {found.scatter_std:.2g} kg m2 in Izz beyond their noise (rehanging, "
-            "twisting, placing): every deviation counts it"
-        )
+    scattered = scatter_sentence(found)
+    notes += [scattered] if scattered else []
     if not found.solution.converged:
         notes.append(f"the fit has not converged ({found.solution.reason}): do not rely on it")
     return notes

@@ -656,13 +656,18 @@ HELD = (
     Held("calib/verdict/plumb_line_file.py", ("CLICK_STD_PX",), CALIB),
     Held("calib/verdict/survey_check.py", ("MIRRORED", "LEAST_TRIANGULATED"), CALIB),
     Held("calib/verdict/truth_checks.py", ("LEAST_HALF",), CALIB),
-    Held("vision/planar/dots.py", ("REACH", "LEAST_REACH", "LONGEST_GAP", "LEAST_SHARE"), PLANAR),
+    Held(
+        "vision/planar/dots.py",
+        ("REACH", "LEAST_REACH", "LONGEST_GAP", "LEAST_SHARE", "MIRRORED"),
+        PLANAR,
+    ),
     Held(
         "vision/planar/examine.py",
         ("ALONG", "LEAST_ARM", "LEAST_SAMPLES", "STEP_SHARE", "STEP_STDS", "LEAST_STEP", "EDGE"),
         PLANAR,
     ),
     Held("vision/planar/fit_plane.py", ("FOCAL_STD", "BEND_STD", "LEAN_STD"), PLANAR),
+    Held("vision/planar/fit_plane.py", ("PRINT_STD_M", "DOT_STD_M"), PLANAR),
     Held("vision/planar/track_planar.py", ("LEAST_FRAMES",), PLANAR),
 )  # fmt: skip
 

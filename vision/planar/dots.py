@@ -14,6 +14,7 @@ Ints = NDArray[np.int64]
 REACH = 3.0  # times the usual step between frames: a dot leaves its prediction by less
 LEAST_REACH = 0.01  # rays, about 10 px: a dot that stood still starts to move
 LONGEST_GAP = 15  # frames a dot may be hidden, by a wire or a hand
+MIRRORED = 0.1  # of what dots seen from above would leave: what is mirrored leaves a hundredth
 LEAST_SHARE = 0.6  # of the frames: a dot hidden for longer is no dot of the platform
 
 
@@ -107,16 +108,41 @@ def named(dots: Ints, spots: Spots, points_m: Array, side: float) -> Ints:
     Source:
         Umeyama 1991, Least-squares estimation of transformation parameters, eqs. 40 to 43.
     """
+    return dots[_ordered(dots, spots, points_m, side)[1]]
+
+
+def side_of_dots(dots: Ints, spots: Spots, points_m: Array) -> float:
+    """-1 where dots at known places are seen from below, as a mirror has them; else 1.
+
+    Two dots, and others that are their own mirror image, do not show it: they count as seen from
+    above.
+
+    Args:
+        dots: as `followed` gives them, as many as there are points.
+        spots: their places.
+        points_m: on the platform, (k, 2).
+
+    Source:
+        Umeyama 1991, Least-squares estimation of transformation parameters, eqs. 40 to 43.
+    """
+    if len(dots) <= 2:
+        return 1.0
+    above, below = (_ordered(dots, spots, points_m, side)[0] for side in (1.0, -1.0))
+    return -1.0 if below < MIRRORED * above else 1.0
+
+
+def _ordered(dots: Ints, spots: Spots, points_m: Array, side: float) -> tuple[float, list[int]]:
+    """Share of the dots' spread that their best order leaves, and that order."""
     middles = np.array([spots.rays[dot[dot >= 0]].mean(axis=0) for dot in dots])
     there = (middles - middles.mean(axis=0)) * [1.0, -side]
     here = points_m - points_m.mean(axis=0)
     z_there, z_here = there @ [1.0, 1.0j], here @ [1.0, 1.0j]
-    best: tuple[float, list[int]] | None = None
+    best: tuple[float, float, list[int]] = (np.inf, np.inf, list(range(len(dots))))
     for order in permutations(range(len(dots))):
         carried = np.vdot(z_here, z_there[list(order)]) / np.vdot(z_here, z_here)
         left = float(np.sum(np.abs(z_there[list(order)] - carried * z_here) ** 2))
         share = left / float(np.sum(np.abs(z_there) ** 2))
         score = share + 1e-3 * abs(float(np.angle(carried))) / np.pi
-        if best is None or score < best[0]:
-            best = (score, list(order))
-    return dots if best is None else dots[best[1]]
+        if score < best[0]:
+            best = (score, share, list(order))
+    return best[1:]

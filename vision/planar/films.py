@@ -14,7 +14,7 @@ from freeswing.cdpr.files.documents import DataError, InputError
 from freeswing.vision.fuse.run_views import CameraViews
 from freeswing.vision.look.single_pose import whitening
 from freeswing.vision.look.watched_target import Watch
-from freeswing.vision.planar.dots import Spots, followed, moving, named
+from freeswing.vision.planar.dots import Spots, followed, moving, named, side_of_dots
 from freeswing.vision.planar.examine import unseen_text
 from freeswing.vision.planar.plane import Items
 
@@ -50,10 +50,18 @@ class Film:
         return seen & (times_s >= start) & (times_s <= end)
 
 
-def side_of(watch: Watch) -> float:
-    """1 where the prints face up and the camera looks down, -1 where they face down."""
+def side_of(watch: Watch, film: Film) -> float:
+    """1 where the camera looks down on the platform, -1 where it looks up.
+
+    By which way tags face, or by whether known dots are seen as a mirror has them.
+
+    Raises:
+        InputError: for tags that lie askew.
+        DataError: for dots that cannot be followed.
+    """
     if not watch.tags:
-        return 1.0
+        spots, points = spots_of(film), watch.marker_positions_m[:, :2]
+        return side_of_dots(dots_of(film, spots, watch, len(points)), spots, points)
     corners = watch.tag_corners_m
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 0] - corners[:, 3])
     facing = normals[:, 2] / np.linalg.norm(normals, axis=1)
@@ -117,15 +125,15 @@ def dots_of(film: Film, spots: Spots, watch: Watch, wanted: int) -> NDArray[np.i
     return moving(dots, spots, wanted)
 
 
-def dot_items(film: Film, watch: Watch) -> Items:
-    """Dots of every frame that shows two or more.
+def dot_items(film: Film, watch: Watch, side: float) -> Items:
+    """Dots of every frame that shows two or more, seen from above (side 1) or below (-1).
 
     Source:
         Triggs et al. 2000, Bundle adjustment: a modern synthesis, sec. 3.1: weights.
     """
     spots = spots_of(film)
     points = watch.marker_positions_m
-    dots = named(dots_of(film, spots, watch, len(points)), spots, points[:, :2], 1.0)
+    dots = named(dots_of(film, spots, watch, len(points)), spots, points[:, :2], side)
     focal = float(film.views.camera.focal_px.mean())
     floor = (CORNER_FLOOR_PX / focal) ** 2 * np.eye(2)
     frames, places, rays, white = [], [], [], []

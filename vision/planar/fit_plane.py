@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from freeswing.vision.planar.plane import (
     LENS,
     PLANE,
+    STEP,
     Items,
     Plane,
     moved,
@@ -35,6 +36,8 @@ FOCAL_STD = 0.35  # of log focal length: from a wide phone to a zoomed one
 BEND_STD = 0.1  # of the distortion: phones straighten their films, action cameras do not
 LEAN_STD = 0.3  # rad: held above by hand or by a stand, not quite straight
 RISE_STD = 0.1  # m/rad^2: radius^2 / (2 length) of wires half a metre apart on a metre
+PRINT_STD_M = 1e-4  # of a printed corner: printers stretch a sheet by 0.1 %, and paper curls
+DOT_STD_M = 5e-4  # of a dot's middle: by a ruler, and by its light
 LEAST_FREEDOM = 0.5  # of the measurements: two dots leave one in four
 
 
@@ -128,7 +131,9 @@ def fit_planes(
     covariance = np.zeros_like(normal)
     covariance[np.ix_(free, free)] = np.linalg.inv(normal[np.ix_(free, free)])
     growths = [_growth(run) for run in chosen]
+    inverse = covariance.copy()
     covariance *= float(np.mean(growths)) ** 2
+    covariance += _by_places(chosen, inverse)
     found = []
     for k, items in enumerate(runs):
         places = _places(k)
@@ -152,6 +157,49 @@ def _begun(items: Items, side: float) -> _Run:
     poses = start_poses(plane, items, int(items.frames.max()) + 1)
     plane = Plane(plane.numbers, side, float(np.median(poses[:, 2])))
     return _Run(items, plane, poses)
+
+
+def _by_places(runs: Sequence[_Run], inverse: Array) -> Array:
+    """What the shared numbers' covariance owes to where the points really are.
+
+    A corner that was printed, or a dot that was measured, beside its stated place is so in every
+    frame: no number of frames averages it.
+
+    Args:
+        runs: as fitted.
+        inverse: of the normal matrix; zero where a number is held.
+    """
+    every = np.concatenate([run.items.points_m.reshape(-1, 3) for run in runs])
+    points = np.unique(np.round(every, 9), axis=0)
+    found = np.zeros_like(inverse)
+    for point in points:
+        for axis in range(3):
+            pull, std = np.zeros(len(inverse)), 0.0
+            for k, run in enumerate(runs):
+                mine = (np.round(run.items.points_m, 9) == point).all(axis=2)
+                if mine.any():
+                    dot = mine.all(axis=1).any()
+                    std = DOT_STD_M if dot else PRINT_STD_M
+                    pull[_places(k)] += _pull(run, mine[:, :, None] * np.eye(3)[axis])
+            answer = inverse @ pull
+            found += std**2 * np.outer(answer, answer)
+    return found
+
+
+def _pull(run: _Run, shift: Array) -> Array:
+    """Gradient on the run's shared numbers of points that lie aside, frames following, (6,).
+
+    Args:
+        run: the run.
+        shift: of its points, (m, 4, 3).
+    """
+    items = run.items
+    aside = items._replace(points_m=items.points_m + STEP * shift)
+    here, shared, own = slopes(run.plane, items, run.poses)
+    miss = (off(run.plane, aside, run.poses) - here) / STEP
+    inner, mixed, gradient = _by_frame(items, miss, shared, own, len(run.poses))
+    solved = np.linalg.solve(inner, gradient[:, :, None])[:, :, 0]
+    return np.einsum("mik,mi->k", shared, miss) - np.einsum("nfk,nf->k", mixed, solved)
 
 
 def _places(run: int) -> NDArray[np.int64]:

@@ -227,8 +227,8 @@ def _in_plane(
     lens_known: bool,
 ) -> PlanarTracked:
     """x, y, chi of every run."""
-    side = side_of(watch)
-    seen = [tag_items(film, watch) if watch.tags else dot_items(film, watch) for film in films]
+    side = side_of(watch, films[0])
+    seen = [tag_items(one, watch) if watch.tags else dot_items(one, watch, side) for one in films]
     for film, items in zip(films, seen, strict=True):
         _check_seen(film, items, watch)
     counts = [len(film.views.numbers) for film in films]

@@ -21,6 +21,8 @@ from freeswing.report.words import ESTIMATES, parameter_row, plain
 from freeswing.results.common import Parameter
 from freeswing.results.diagnosis import Diagnosis
 
+NOTHING_MISSING = "The model explains the held-out runs; no effect that they would show is missing."
+
 
 class Answer:
     """The body to take away, and the verdict on the model in a sentence or two."""
@@ -118,7 +120,9 @@ def verdict(diagnosis: Diagnosis | None) -> list[str]:
     untold = _untold(diagnosis)
     if untold:
         return [*sentences, untold]
-    return sentences or ["The model explains the held-out runs; no effect is missing."]
+    return sentences or [
+        "The model explains the held-out runs; no effect that they would show is missing."
+    ]
 
 
 def _untold(diagnosis: Diagnosis) -> str:

@@ -30,6 +30,7 @@ ALL_WIRES = "all wires"
 # What no run of any bench tells from a cause: the same equations in other words.
 SAME = {
     "attachment_offset": ("marker_offset",),
+    "torsion_spring": ("platform_mass",),
     LENGTHS: ("attachment_offset", "anchor_offset", "platform_frame"),
 }
 

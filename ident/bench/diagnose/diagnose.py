@@ -14,6 +14,7 @@ from freeswing.ident.bench.diagnose.channels_only import ByChannels, by_channels
 from freeswing.ident.bench.diagnose.errors import Errors, errors_of
 from freeswing.ident.bench.diagnose.removal import Removed, removals
 from freeswing.ident.bench.diagnose.search import Ground, Round, searched
+from freeswing.ident.bench.diagnose.shown import Shown, shown
 from freeswing.ident.bench.diagnose.weigh import Fit
 from freeswing.ident.bench.held_uncertain import considered
 from freeswing.ident.bench.identify_bench import BenchResult, identify_bench
@@ -22,6 +23,7 @@ from freeswing.ident.bench.modal import ModalSwing
 from freeswing.ident.bench.runs import Bench
 from freeswing.ident.bench.solve import FINE, Solved
 from freeswing.ident.bench.swing import COMMON
+from freeswing.ident.bench.told.scatter import is_systematic
 from freeswing.ident.likelihood.fit import fit
 
 Progress = Callable[[str, float], None]
@@ -60,6 +62,7 @@ class BenchDiagnosis:
         solved: the last fit, with what deviations have to count.
         declared: the first one's, likewise.
         shares: of the platform's mass that hangs in each run, (r,).
+        shown: how well the runs would tell each cause that was not found.
     """
 
     identified: BenchResult
@@ -69,6 +72,7 @@ class BenchDiagnosis:
     solved: Solved
     declared: Solved
     shares: Array
+    shown: tuple[Shown, ...] = ()
 
     @property
     def accepted(self) -> tuple[Cause, ...]:
@@ -133,9 +137,13 @@ def _diagnosed(
     ]
     shares = np.array(masses) / start.solution.value("platform")[0]
     ground = Ground(start.swings, shares, identified.solved.fastest_hz)
+    causes = causes_of(robot, only)
     last, rounds = searched(
-        ground, start, causes_of(robot, only), lambda label, part: told(label, 0.3 + 0.5 * part)
+        ground, start, causes, lambda label, part: told(label, 0.3 + 0.5 * part)
     )
+    if not last.causes and is_systematic(identified.solved):  # not found: counted as chance
+        last = _start(identified.solved, scattered=True)
+    seen = shown(ground, last, [cause for cause in causes if cause not in last.causes])
     told("what is taken for granted", 0.8)
     removed = removals(ground, last, identified.bench, only)
     told("before and after", 0.9)
@@ -143,13 +151,20 @@ def _diagnosed(
     solved = _counted(identified.solved, ladder[-1].fit)
     declared = _counted(identified.solved, ladder[0].fit)
     told("diagnosis", 1.0)
-    return BenchDiagnosis(identified, tuple(rounds), removed, ladder, solved, declared, shares)
+    return BenchDiagnosis(
+        identified, tuple(rounds), removed, ladder, solved, declared, shares, seen
+    )
 
 
-def _start(solved: Solved) -> Fit:
-    """The fit with drag and each wire's own length, all wires together as long as told."""
+def _start(solved: Solved, scattered: bool = False) -> Fit:
+    """The fit with drag and each wire's own length, all wires together as long as told.
+
+    Scatter between runs that goes with what they carry is left out, unless it is asked for.
+    """
     unknowns = solved.solution.unknowns
     zero = unknowns.moved({COMMON: np.zeros(1)}).held(COMMON)
+    if is_systematic(solved) and not scattered:  # or causes would be taken for chance
+        zero = zero.without("scatter")
     return Fit(solved.swings, fit(solved.swings, zero, FINE))
 
 

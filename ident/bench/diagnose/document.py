@@ -24,14 +24,18 @@ from freeswing.ident.bench.diagnose.entries import (
     told_entry,
 )
 from freeswing.ident.bench.diagnose.search import Word
+from freeswing.ident.bench.diagnose.shown import Shown
 from freeswing.ident.bench.diagnose.unexplained import remaining
 from freeswing.ident.bench.solve import Solved
 from freeswing.ident.bench.swing import COMMON
 from freeswing.ident.bench.told.contradicted import group_sentence, wires_sentence
 from freeswing.ident.bench.told.report_objects import objects_document, platform_rows
+from freeswing.ident.bench.told.scatter import is_systematic, scatter_sentence
+from freeswing.ident.diagnose.decision import RIVAL
 from freeswing.ident.diagnose.experiments import separating_experiment
 
 NOT_ON_BENCHES = "it is not looked for on benches: their wires would not show it, or not alone"
+UNSHOWN = "these runs would not show it if it were there"
 LEVEL = (
     "hold a plumb line beside the hooks, or a level on their frame; a constant force tilts a "
     "heavier load less, and a tilt does not"
@@ -57,11 +61,12 @@ def bench_document(found: BenchDiagnosis | ByChannels | CannotTell) -> dict[str,
     entries += [granted_entry(one) for one in found.removed if one.accepted]
     entries += [mass_found(last)] if mass else []
     notes = [mass] if mass else []
-    notes += [_basis(found)]
+    candidates = _candidates(found, bool(mass))
+    notes += [*_unshown(candidates), _basis(found)]
     return {
         "format": FORMAT,
         "before": before,
-        "candidates": _candidates(found, bool(mass)),
+        "candidates": candidates,
         "accepted": entries,
         "after": after,
         "share_closed": _closed(before, after),
@@ -71,7 +76,7 @@ def bench_document(found: BenchDiagnosis | ByChannels | CannotTell) -> dict[str,
         "ladder": [
             {"effects": list(step.effects), **step.errors.document()} for step in found.ladder
         ],
-        "unexplained": remaining(found.ladder[-1].fit),
+        "unexplained": _unexplained(found),
         "objects_before": objects_document(first, bench, runs),
         "objects_after": objects_document(last, bench, runs),
         "notes": notes,
@@ -90,6 +95,24 @@ def _cannot_tell(found: CannotTell) -> dict[str, Any]:
         "unexplained": NOTHING_LEFT,
         "notes": [f"cannot tell: {found.reason}", *contradicted],
     }
+
+
+def _unexplained(found: BenchDiagnosis) -> dict[str, Any]:
+    """What remains in a coordinate, or between runs that carry different things."""
+    left, solved = remaining(found.ladder[-1].fit), found.solved
+    if left["present"] or found.accepted or not is_systematic(solved):
+        return left
+    evidence: dict[str, Any] = {"scatter_kg_m2": solved.scatter_std}
+    signature = scatter_sentence(solved)
+    words = [word for one in found.rounds for word in one.words if (word.chance or 0.0) > RIVAL]
+    if words:
+        likeliest = max(words, key=lambda word: word.chance or 0.0)
+        evidence["likeliest"] = {likeliest.cause.effect: likeliest.chance}
+        signature += (
+            f". The likeliest of what was tried is {likeliest.cause.effect} (probability "
+            f"{likeliest.chance:.2g}), which too few runs bear out"
+        )
+    return {"present": True, "signature": signature, "evidence": evidence}
 
 
 def _basis(found: BenchDiagnosis) -> str:
@@ -113,13 +136,35 @@ def _candidates(found: BenchDiagnosis, mass: bool) -> list[dict[str, Any]]:
         before = told.get(one.effect)
         if before is None or before["verdict"] == "rejected":
             told[one.effect] = removed_entry(one)
-    rows = list(told.values())
+    rows = [_with_sight(row, found.shown) for row in told.values()]
     rows += [
         told_entry(n, "not_identifiable", NOT_ON_BENCHES) for n in catalogue() if n not in told
     ]
     if mass:
         rows.append(mass_candidate(found.solved))
     return rows
+
+
+def _with_sight(row: dict[str, Any], shown: Sequence[Shown]) -> dict[str, Any]:
+    """A rejected effect with how well it would be told; not identifiable where it would not be."""
+    mine = [one for one in shown if one.cause.effect == row["effect"]]
+    if row["verdict"] != "rejected" or not mine:
+        return row
+    worst = max(mine, key=lambda one: float(one.std[one.worst] / one.usual[one.worst]))
+    if worst.told.all():
+        return {**row, "reason": f"{row['reason']}; {worst.words}"}
+    return told_entry(row["effect"], "not_identifiable", f"{UNSHOWN}: {worst.words}")
+
+
+def _unshown(rows: Sequence[dict[str, Any]]) -> list[str]:
+    """A note on what was looked for and would not show."""
+    mine = [row for row in rows if row["reason"].startswith(UNSHOWN)]
+    if not mine:
+        return []
+    each = [f"{row['effect']} ({row['reason'].removeprefix(UNSHOWN)[2:]})" for row in mine]
+    return [
+        f"cannot tell whether these are there, which the runs would not show: {'; '.join(each)}"
+    ]
 
 
 def _others(cause: Cause, others: Sequence[Cause]) -> tuple[str, ...]:

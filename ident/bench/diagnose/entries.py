@@ -44,7 +44,7 @@ def group_entry(others: Sequence[str], experiment: str) -> dict[str, Any]:
 def removed_entry(one: Removed) -> dict[str, Any]:
     """What every fit has, among what was looked for."""
     wires = one.effect == LENGTHS and one.accepted
-    verdict = "accepted" if one.accepted else "rejected"
+    verdict = "accepted" if one.accepted else "rejected" if one.told else "not_identifiable"
     entry = told_entry(
         one.effect,
         "confounded" if wires else verdict,

@@ -18,6 +18,7 @@ from freeswing.ident.bench.diagnose.search import Ground
 from freeswing.ident.bench.diagnose.weigh import Fit, needed
 from freeswing.ident.bench.runs import Bench
 from freeswing.ident.bench.solve import FINE
+from freeswing.ident.bench.told.report_objects import RESTS_ON_PRIOR
 from freeswing.ident.diagnose.decision import ACCEPTED, LEAST_GAIN, MOST_WORSE, runs_worse
 from freeswing.ident.likelihood.fit import fit
 from freeswing.ident.likelihood.unknowns import Unknowns
@@ -42,6 +43,7 @@ class Removed:
         gain: share of the left-out runs' excess that it takes away.
         delta_bic: BIC with it less BIC without.
         reason: a sentence.
+        told: whether runs tell it at all, beyond what is stated.
     """
 
     effect: str
@@ -56,6 +58,7 @@ class Removed:
     gain: float = 0.0
     delta_bic: float = 0.0
     reason: str = ""
+    told: bool = True
 
     def without(self, unknowns: Unknowns) -> Unknowns:
         """The unknowns with it held at nothing."""
@@ -129,7 +132,9 @@ def _judged(ground: Ground, last: Fit, bench: Bench, one: Removed) -> Removed:
     allowed = 0.0 if each_run else _stated(bench)
     largest = max(abs(value) for value in one.values)
     reason, there = f"removes {100 * one.gain:.1f} % of the left-out runs' excess", False
-    if chance <= ACCEPTED:
+    if not one.told:
+        reason = "these runs tell no more of it than cable_lengths_std_m does"
+    elif chance <= ACCEPTED:
         reason = f"not sure: with probability {chance:.2g} it is there rather than nothing"
     elif gains.sum() <= 0.0 or worse > MOST_WORSE * len(gains):
         reason = f"{worse} of {len(gains)} left-out runs are predicted worse with it"
@@ -166,4 +171,9 @@ def _wires(last: Fit, one: Removed) -> Removed:
     part = ""
     if off.sum() == 1:
         part = last.swings[0].model.robot.cables[int(np.argmax(off))].name
-    return replace(one, values=tuple(values.tolist()), stds=tuple(stds.tolist()), part=part)
+    priors = [last.solution.unknowns.block(name).prior for name in one.blocks]
+    stated = np.sqrt(np.mean([known.std**2 for known in priors if known is not None], axis=0))
+    told = bool(np.any(stds**2 < RESTS_ON_PRIOR * stated**2))
+    return replace(
+        one, values=tuple(values.tolist()), stds=tuple(stds.tolist()), part=part, told=told
+    )

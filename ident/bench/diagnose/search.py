@@ -25,6 +25,7 @@ from freeswing.ident.diagnose.decision import (
 )
 from freeswing.ident.likelihood.fit import fit
 from freeswing.ident.likelihood.fit_blocks import linear_problem
+from freeswing.ident.likelihood.unknowns import Unknowns
 
 MOST_CAUSES = 4  # more than that one bench never tells apart
 
@@ -105,6 +106,23 @@ def promised(ground: Ground, before: Fit, causes: Sequence[Cause]) -> dict[str, 
     Source:
         Bjoerck 1996, Numerical Methods for Least Squares Problems, sec. 6.3.
     """
+    rows, mine, added, _ = joint_rows(ground, before, causes)
+    alone = _cost(rows, mine)
+    return {name: alone - _cost(rows, np.r_[mine, own]) for name, own in added.items()}
+
+
+def joint_rows(
+    ground: Ground, before: Fit, causes: Sequence[Cause]
+) -> tuple[Array, Array, dict[str, Array], Unknowns]:
+    """The linear problem of a fit with all of some causes added.
+
+    Returns:
+        Rows (m, p + 1) over unknowns and residual in units of their scales, the places of what the
+        fit has already (q,), those of each cause's numbers by its block, and the unknowns.
+
+    Source:
+        Bjoerck 1996, Numerical Methods for Least Squares Problems, sec. 6.3.
+    """
     every = (*before.causes, *causes)
     swings = tuple(
         replace(mine, columns=seen.columns)
@@ -119,8 +137,7 @@ def promised(ground: Ground, before: Fit, causes: Sequence[Cause]) -> dict[str, 
     places = np.cumsum(estimated) - 1
     added = {cause.block: places[unknowns.place(cause.block)] for cause in causes}
     mine = np.setdiff1d(np.arange(rows.shape[1] - 1), np.concatenate(list(added.values())))
-    alone = _cost(rows, mine)
-    return {name: alone - _cost(rows, np.r_[mine, own]) for name, own in added.items()}
+    return rows, mine, added, unknowns
 
 
 def _cost(rows: Array, columns: Array) -> float:
@@ -195,6 +212,11 @@ def _judged(
     shares = chances([before, *weighed.values()], counts)[1:]
     chance = dict(zip(weighed, shares.tolist(), strict=True))
     complaints = {name: _complaint(before, one, counts) for name, one in weighed.items()}
+    likeliest = max(chance, key=lambda name: chance[name])
+    for name in weighed:
+        # What left-out runs bear out is not it where another is so much more probable.
+        if not complaints[name] and complaints[likeliest] and chance[name] <= RIVAL:
+            complaints[name] = f"{by_block[likeliest].effect} is far more probable"
     passed = [name for name in weighed if not complaints[name]]
     group: list[str] = []
     if passed:

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from freeswing.cdpr.robot import POSE_COORDINATES
+from freeswing.ident.bench.assemble import UNSTATED_LENGTH_STD_M
 from freeswing.ident.bench.mass_verdict import CONTRADICTED
+from freeswing.ident.bench.runs import BenchRun
 from freeswing.ident.bench.solve import Solved
 from freeswing.ident.bench.swing import COMMON, IZZ
 from freeswing.ident.bench.told.classic import radii
@@ -115,6 +119,29 @@ def _excluded(reasons: tuple[Reason, ...]) -> str:
     if not cannot:
         return ""
     return f"It is not {' or '.join(one.says for one in cannot)}: {cannot[0].excluded}. "
+
+
+def exchange_sentence(runs: Sequence[BenchRun]) -> str:
+    """Which runs would not show that wires of different stated lengths are in each other's place.
+
+    Poses show each wire's length, and wires that differ by more than is stated tilt the platform:
+    neither yaw nor x and y see that.
+    """
+    blind = [
+        run
+        for run in runs
+        if run.lengths_m is not None
+        and run.coordinates != POSE_COORDINATES
+        and np.ptp(run.lengths_m) > (run.lengths_std_m or UNSTATED_LENGTH_STD_M)
+    ]
+    if not blind or len(blind) < len(runs):
+        return ""
+    most = max(float(np.ptp(run.lengths_m)) for run in blind if run.lengths_m is not None)
+    return (
+        f"cable_lengths_m differ by up to {1e3 * most:.2g} mm, and no run shows which wire has "
+        "which length: that two stand in each other's place would not be noticed. Record one run "
+        "with full poses, or see with a level to which side the platform leans"
+    )
 
 
 def wires_sentence(solved: Solved) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from freeswing.cdpr.effects import catalogue, effect_named
 from freeswing.cdpr.files.problems import DataError
 from freeswing.cdpr.model.equations import build_model
 from freeswing.ident.bench.assemble import EFFECTS, assembled
-from freeswing.ident.bench.diagnose import diagnose
+from freeswing.ident.bench.diagnose import diagnose, search
 from freeswing.ident.bench.diagnose.causes import (
     ALL_WIRES,
     causes_of,
@@ -21,12 +21,22 @@ from freeswing.ident.bench.diagnose.causes import (
     mass_power,
     wanting,
 )
-from freeswing.ident.bench.diagnose.document import bench_document, experiment_of
+from freeswing.ident.bench.diagnose.document import (
+    _unshown,
+    _with_sight,
+    bench_document,
+    experiment_of,
+)
+from freeswing.ident.bench.diagnose.entries import removed_entry
 from freeswing.ident.bench.diagnose.removal import Removed, _wires
+from freeswing.ident.bench.diagnose.search import Ground
+from freeswing.ident.bench.diagnose.shown import shown
 from freeswing.ident.bench.diagnose.unexplained import remaining
+from freeswing.ident.bench.diagnose.weigh import Fit
 from freeswing.ident.bench.modal import ModalSwing
 from freeswing.ident.bench.swing import COMMON, BenchSwing, Column
 from freeswing.ident.likelihood.fit_blocks import linear_problem
+from freeswing.ident.likelihood.unknowns import Gaussian, Unknown, Unknowns
 from tests.ident.bench.test_swing_slopes import small_bench, trifilar
 
 
@@ -109,12 +119,30 @@ def test_a_left_out_run_follows_as_well_as_its_own_unknowns_allow() -> None:
 def test_the_wire_that_is_the_one(size_mm: float, part: str) -> None:
     """Known to 0.1 mm: three deviations make it the one."""
     values = 1e-3 * np.array([size_mm, 0.1, -0.1])
-    solution = SimpleNamespace(value=lambda _: values, std=lambda _: np.full(3, 1e-4))
+    prior = Gaussian(np.zeros(3), np.full(3, 1e-3), "stated")
+    unknowns = Unknowns((Unknown("wires.1", values, np.ones(3), prior),))
+    solution = SimpleNamespace(
+        value=lambda _: values, std=lambda _: np.full(3, 1e-4), unknowns=unknowns
+    )
     swing = SimpleNamespace(model=SimpleNamespace(robot=trifilar()))
     last: Any = SimpleNamespace(solution=solution, swings=[swing])
     told = _wires(last, Removed("cable_length_bias", ("wires.1",), (np.ones(3, bool),)))
     assert told.part == part
     assert told.values == pytest.approx(values)
+
+
+@pytest.mark.parametrize(("share", "told"), [(0.46, True), (0.54, False)])
+def test_wires_of_which_runs_tell_no_more_than_what_is_stated(share: float, told: bool) -> None:
+    """The share of the stated variance that is left."""
+    prior = Gaussian(np.zeros(3), np.full(3, 1e-3), "stated")
+    unknowns = Unknowns((Unknown("wires.1", np.zeros(3), np.ones(3), prior),))
+    std = np.full(3, 1e-3 * np.sqrt(share))
+    solution = SimpleNamespace(value=lambda _: np.zeros(3), std=lambda _: std, unknowns=unknowns)
+    swing = SimpleNamespace(model=SimpleNamespace(robot=trifilar()))
+    last: Any = SimpleNamespace(solution=solution, swings=[swing])
+    found = _wires(last, Removed("cable_length_bias", ("wires.1",), (np.ones(3, bool),)))
+    assert found.told == told
+    assert removed_entry(found)["verdict"] == ("rejected" if told else "not_identifiable")
 
 
 @pytest.mark.parametrize(("power", "present"), [(8.0, False), (12.0, True)])
@@ -185,3 +213,77 @@ def test_a_run_keeps_its_drag_beside_what_all_share() -> None:
     np.testing.assert_allclose(found[-2:], values[spring.block] / 1.5, rtol=1e-12)
     plain = replace(swings[0], acting=())
     np.testing.assert_array_equal(plain.effects(values), values["effects"])
+
+
+def test_what_runs_would_not_show_is_not_rejected() -> None:
+    """A tilt about y shows in x, one about x does not; in yaw alone neither would."""
+    bench, robot = small_bench(), trifilar()
+    chi = replace(bench.runs[2], signals=bench.runs[2].signals[1:], name="chi")
+    seen = {}
+    for name, run in (("plane", bench.runs[2]), ("chi", chi)):
+        runs = tuple(replace(run, name=f"{name}{k}") for k in range(3))
+        start = assembled(build_model(robot, EFFECTS), replace(bench, runs=runs, loads=()), runs)
+        solution: Any = SimpleNamespace(unknowns=start.unknowns)
+        fit = Fit(start.swings, solution)
+        (tilt,) = causes_of(robot, ["gravity_tilt"])
+        (seen[name],) = shown(Ground(start.swings, np.ones(3), 1.0), fit, [tilt])
+    assert seen["plane"].told.tolist() == [False, True], seen["plane"].words  # x alone is seen
+    assert not seen["chi"].told.any(), seen["chi"].words
+    assert "a usual one of" in seen["chi"].words
+    row = {"effect": "gravity_tilt", "verdict": "rejected", "reason": "removes 0 %"}
+    known = replace(seen["plane"], std=np.array([0.009, 0.009]))
+    assert _with_sight(row, [known]) == {**row, "reason": f"removes 0 %; {known.words}"}
+    assert _with_sight(row, [seen["plane"]])["verdict"] == "not_identifiable"
+    unseen = _with_sight(row, [seen["chi"]])
+    assert unseen["verdict"] == "not_identifiable", unseen
+    assert "gravity_tilt (tilt_" in _unshown([row, unseen])[0], _unshown([unseen])
+    assert _unshown([row]) == []
+    assert _with_sight({**row, "verdict": "confounded"}, [seen["chi"]])["verdict"] == "confounded"
+
+
+def test_a_hold_of_yaw_that_nothing_shows_moves_the_inertia_with_it() -> None:
+    """Equal runs of yaw alone: a spring is as good as a heavier platform, share by share."""
+    bench, robot = small_bench(), trifilar()
+    run = replace(bench.runs[2], signals=bench.runs[2].signals[1:])
+    runs = tuple(replace(run, name=f"chi {k}") for k in range(3))
+    start = assembled(build_model(robot, EFFECTS), replace(bench, runs=runs, loads=()), runs)
+    fit = Fit(start.swings, cast(Any, SimpleNamespace(unknowns=start.unknowns)))
+    (spring,) = causes_of(robot, ["torsion_spring"])
+    (seen,) = shown(Ground(start.swings, np.ones(3), 1.0), fit, [spring])
+    assert not seen.told[0], seen.words
+    stiffness = 9.80665 * 0.25**2 / 1.2  # g R r / L, over the mass
+    share = 0.02 / stiffness  # of it, a usual spring: inertia grows by as much to keep the time
+    assert abs(seen.moves[0]) == pytest.approx(share, rel=0.1), (seen.moves, share)
+
+
+@pytest.mark.parametrize(("chance", "accepted"), [(0.04, False), (0.06, True)])
+def test_the_less_probable_is_not_taken_for_the_one_that_failed(
+    monkeypatch, chance: float, accepted: bool
+) -> None:
+    """A spring is far more probable, but left-out runs do not bear it out; a heavy wire does."""
+    causes = [one for one in causes_of(trifilar(), ["torsion_spring", "cable_mass"])]
+    spring, heavy = sorted(causes, key=lambda one: one.effect, reverse=True)
+    likely = {spring.block: 1.0 - chance, heavy.block: chance}
+
+    def fit(block: str) -> Any:
+        return SimpleNamespace(
+            block=block, squares=np.ones(3), solution=SimpleNamespace(cost=1.0),
+            score=SimpleNamespace(held_out=np.full(3, 2.0 if block == spring.block else 1.0)),
+        )  # fmt: skip
+
+    before = fit("")
+    weighed = {one.block: fit(one.block) for one in (spring, heavy)}
+    monkeypatch.setattr(
+        search, "chances", lambda fits, _: np.array([0.0, *(likely[one.block] for one in fits[1:])])
+    )
+    monkeypatch.setattr(
+        search, "_complaint", lambda _, one, __: "failed" * (one.block == spring.block)
+    )
+    words = {
+        one.block: search.Word(one, "rejected", 0.0, None, 0.0, (), "") for one in (spring, heavy)
+    }
+    told = search._judged(before, weighed, words)
+    assert (told.winner is not None) == accepted
+    verdicts = {word.cause.effect: (word.verdict, word.reason) for word in told.words}
+    assert verdicts["torsion_spring"] == ("rejected", "failed")
+    assert ("far more probable" in verdicts["cable_mass"][1]) != accepted, verdicts

@@ -87,3 +87,48 @@ def test_wires_that_stretch(tmp_path: Path) -> None:
     assert stretch == pytest.approx(MASS_KG / 2500.0, rel=0.15), found
     assert after <= before + 1e-4, (before, after)
     assert after < 0.005, after
+
+
+@pytest.mark.slow
+def test_an_eccentric_clamp(tmp_path: Path) -> None:
+    """The first wire's lower end 5 mm beside its place: named, to a tenth of a millimetre."""
+    hidden = Hidden(0.0, 1.0, 0.0, 0.0, eccentric_m=(0.003, -0.004, 0.0))
+    told, before, after = diagnosed(tmp_path, hidden)
+    (one,) = told["accepted"]
+    assert (one["effect"], one["part"]) == ("attachment_offset", "1"), one
+    values = [row["value"] for row in one["parameters"]]
+    assert values == pytest.approx([0.003, -0.004], abs=1e-4), one
+    assert after < 0.005, (before, after)
+
+
+@pytest.mark.slow
+def test_a_clamp_that_holds_yaw_is_no_chance(tmp_path: Path) -> None:
+    """20 mN m a radian, one run with the known mass: too few to name it, enough to warn."""
+    make_bench(
+        tmp_path, 3, duration_s=6.0, counts=(2, 1, 2), hidden=Hidden(0, 1, 0, 0, hold_n_m=0.02)
+    )
+    out = tmp_path / "out"
+    assert main(["diagnose", str(tmp_path), "--results", str(out), "--quiet"]) == 0
+    told = result(out, "diagnosis")
+    assert told["accepted"] == [], told["accepted"]
+    assert told["unexplained"]["present"], told["unexplained"]
+    assert "goes with what they carry" in told["unexplained"]["signature"]
+    assert told["unexplained"]["evidence"]["likeliest"]["torsion_spring"] > 0.9
+
+
+@pytest.mark.slow
+def test_yaw_alone_says_what_it_would_not_show(tmp_path: Path) -> None:
+    """The same clamp, seen by yaw alone: nothing is named, and the inertia is as unsure as that."""
+    truth = make_bench(
+        tmp_path, 3, 3, "chi", 6.0, (2, 1, 2), Hidden(0.0, 1.0, 0.0, 0.0, hold_n_m=0.02)
+    )
+    out = tmp_path / "out"
+    assert main(["diagnose", str(tmp_path), "--results", str(out), "--quiet"]) == 0
+    told = result(out, "diagnosis")
+    assert told["accepted"] == [], told["accepted"]
+    rows = {row["effect"]: row for row in told["candidates"]}
+    for name in ("torsion_spring", "attachment_offset", "cable_elasticity"):
+        assert rows[name]["verdict"] == "not_identifiable", rows[name]
+    assert any("cannot tell whether these are there" in note for note in told["notes"])
+    body = {row["name"]: row for row in told["objects_after"][1]["parameters"]}["Izz_kg_m2"]
+    assert abs(body["value"] - truth.load_izz) < 3.0 * body["std"], body

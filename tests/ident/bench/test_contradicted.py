@@ -10,8 +10,10 @@ import pytest
 
 from freeswing.ident.bench.diagnose.channels_only import ByChannels, channels_document
 from freeswing.ident.bench.mass_verdict import MassVerdict
+from freeswing.ident.bench.runs import BenchRun, Signal
 from freeswing.ident.bench.solve import WiresVerdict
 from freeswing.ident.bench.told.contradicted import (
+    exchange_sentence,
     group_sentence,
     payload_reasons,
     surely_contradicted,
@@ -131,3 +133,23 @@ def test_nothing_looked_for_is_not_nothing_missing() -> None:
         Diagnosis.from_json({"format": "freeswing-diagnosis/1", "candidates": [told]})
     )
     assert said == "These data cannot tell whether an effect is missing."
+
+
+def run_of(names: tuple[str, ...], lengths_mm: list[float], std_mm: float | None = 2.0) -> BenchRun:
+    times = np.arange(3.0)
+    signals = tuple(Signal(name, times) for name in names)
+    std_m = None if std_mm is None else 1e-3 * std_mm
+    return BenchRun("a", "identify", times, signals, 1e-3 * np.array(lengths_mm), std_m)
+
+
+@pytest.mark.parametrize(("longest_mm", "std_mm", "told"), [
+    (1201.9, 2.0, False), (1202.1, 2.0, True), (1200.9, None, False), (1201.1, None, True),
+])  # fmt: skip
+def test_wires_that_nobody_could_tell_apart(longest_mm, std_mm, told) -> None:
+    """Lengths that differ by more than they are known to, and nothing that sees a tilt."""
+    for names in (("chi",), ("x", "y", "chi")):
+        run = run_of(names, [1200.0, longest_mm, 1200.5], std_mm)
+        assert bool(exchange_sentence([run])) == told, names
+    poses = run_of(("x", "y", "z", "phi", "theta", "chi"), [1200.0, longest_mm, 1200.5], std_mm)
+    assert exchange_sentence([poses]) == ""
+    assert exchange_sentence([poses, run_of(("chi",), [1200.0, longest_mm, 1200.5])]) == ""

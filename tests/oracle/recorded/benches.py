@@ -45,6 +45,8 @@ class Hidden:
         quadratic: drag against moving, N s2/m2.
         tilt_rad: of the base frame about its x and y, (2,).
         stiffness_ea_n: of the wires, whose told lengths are unstretched; 0: rigid.
+        eccentric_m: the first wire's lower end over what is told, platform frame, (3,).
+        hold_n_m: a clamp or wires that hold yaw, N m a radian.
     """
 
     longer_m: float = LONGER_M
@@ -53,6 +55,8 @@ class Hidden:
     quadratic: float = QUADRATIC
     tilt_rad: tuple[float, float] = (0.0, 0.0)
     stiffness_ea_n: float = 0.0
+    eccentric_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    hold_n_m: float = 0.0
 
 
 USUAL = Hidden()
@@ -88,7 +92,7 @@ def make_bench(
         folder: made when not there.
         seed: of noise and releases.
         wires: 2 or 3.
-        seen: `poses`, `chi`, or `track`: one curved pixel track of a laser dot.
+        seen: `poses`, `plane` (x, y, chi), `chi`, or `track`: one curved track of a laser dot.
         duration_s: of each run.
         counts: tare, known-weight and loaded runs.
         hidden: what the files do not say.
@@ -189,13 +193,17 @@ def _world(
     lengths = np.full(wires, WIRE_M)
     lengths[0] += hidden.longer_m
     world = plain_world(robot, Body(mass, first / mass, entries), lengths)
+    clamped = world.attach.copy()
+    clamped[0] += hidden.eccentric_m
     ahead, aside = hidden.tilt_rad
     down = np.array([-np.sin(aside), np.sin(ahead), -np.cos(np.hypot(ahead, aside))])
     return world._replace(
+        attach=clamped,
         drag_angular=hidden.drag_n_m_s,
         drag_quadratic=hidden.quadratic,
         gravity=GRAVITY * down,
         stiffness_ea=hidden.stiffness_ea_n,
+        torsion=hidden.hold_n_m,
         relaxation=1e-3,
     )
 
@@ -243,6 +251,11 @@ def _record(
         columns = np.hstack([times, place, turned])
         header = ("x_m", "y_m", "z_m", "phi_rad", "theta_rad", "chi_rad")
         write_samples(path, header, columns)
+    elif seen == "plane":
+        turned = chi + rng.normal(0.0, 5e-4, len(chi))
+        place = motion.positions_m[:, :2] + rng.normal(0.0, 1e-4, (len(chi), 2))
+        columns = np.hstack([times, place, turned[:, None]])
+        write_samples(path, ("x_m", "y_m", "chi_rad"), columns)
     elif seen == "chi":
         noisy = chi + rng.normal(0.0, 5e-4, len(chi))
         write_samples(path, ("chi_rad",), np.hstack([times, noisy[:, None]]))

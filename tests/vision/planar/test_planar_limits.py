@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 
 from freeswing.cdpr.files.documents import DataError
-from freeswing.vision.planar import examine, fit_plane, track_planar
-from freeswing.vision.planar.dots import Spots, followed
+from freeswing.vision.planar import dots as dots_module
+from freeswing.vision.planar import examine, fit_plane, plane, track_planar
+from freeswing.vision.planar.dots import Spots, followed, side_of_dots
 
 
 def stub(**attributes: Any) -> Any:
@@ -50,6 +51,37 @@ def test_a_dot_comes_back_within_fifteen_frames(hidden, found) -> None:
 def test_a_dot_is_seen_in_six_frames_of_ten(seen, found) -> None:
     frames = np.unique(np.linspace(0, 99, seen).astype(int))
     assert dots(frames, np.zeros(seen), 100) == found
+
+
+TRIPLE_M = np.array([[-0.15, 0.02], [0.16, -0.03], [0.02, 0.13]])
+
+
+def seen_dots(points: np.ndarray) -> tuple[np.ndarray, Spots]:
+    """Points as spots of twenty frames."""
+    count = len(points)
+    rays = np.tile(points, (20, 1))
+    spots = Spots(np.repeat(np.arange(20), count), rays, np.zeros((len(rays), 2, 2)))
+    return followed(spots, 20), spots
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_known_dots_show_from_which_side_they_are_seen(side: float) -> None:
+    """In an image y goes down; from below the platform is seen as in a mirror."""
+    found, spots = seen_dots(0.8 * TRIPLE_M * [1.0, -side])
+    assert side_of_dots(found, spots, TRIPLE_M) == side
+    pair = TRIPLE_M[:2]
+    found, spots = seen_dots(pair * [1.0, -side])
+    assert side_of_dots(found, spots, pair) == 1.0, "two dots are their own mirror image"
+
+
+@pytest.mark.parametrize(("share", "side"), [(0.095, -1.0), (0.105, 1.0)])
+def test_dots_that_are_nearly_their_own_mirror_image(monkeypatch, share, side) -> None:
+    """The mirror leaves so much of what is left from above."""
+    monkeypatch.setattr(dots_module, "_ordered", lambda *those: (
+        (1.0 if those[3] > 0.0 else share), []
+    ))  # fmt: skip
+    found, spots = seen_dots(TRIPLE_M)
+    assert side_of_dots(found, spots, TRIPLE_M) == side
 
 
 def size_said(arm_m: float, times: float, cosine: float) -> bool:
@@ -155,3 +187,36 @@ def test_how_far_phones_and_stands_are_from_straight(monkeypatch) -> None:
     with pytest.raises(Reached):
         fit_plane.fit_planes([stub()], [1], 1.0, False)
     assert told[0][:4] == pytest.approx([0.35, 0.1, 0.3, 0.3], rel=0.05)
+
+
+@pytest.mark.parametrize(("dot", "std_mm"), [(False, 0.1), (True, 0.5)])
+def test_how_well_places_are_known(monkeypatch, dot, std_mm) -> None:
+    """Printed corners to a tenth of a millimetre, the middles of dots to half of one."""
+    places = np.zeros((1, 4, 3)) if dot else np.arange(12.0).reshape(1, 4, 3)
+    monkeypatch.setattr(fit_plane, "_pull", lambda run, shift: np.eye(6)[0] * shift.any())
+    run = stub(items=stub(points_m=places))
+    found = fit_plane._by_places([run], np.eye(6))
+    ways = 3 if dot else 12  # each point along each axis
+    assert np.sqrt(found[0, 0] / ways) == pytest.approx(1e-3 * std_mm, rel=0.05)
+
+
+def test_points_that_lie_aside_pull_as_much_as_they_miss() -> None:
+    """Against the right side of a fit to points that really lie there, by two micrometres."""
+    poses = np.column_stack([*0.01 * np.random.default_rng(0).normal(size=(2, 30)), np.zeros(30)])
+    poses[:, 2] = 0.15 * np.sin(np.arange(30.0))
+    square = np.array([[0.1, 0.1, 0.0], [-0.1, 0.1, 0.0], [-0.1, -0.1, 0.0], [0.1, -0.1, 0.0]])
+    items = plane.Items(
+        np.arange(30), np.tile(square, (30, 1, 1)), np.zeros((30, 4, 2)),
+        np.tile(1e4 * np.eye(8), (30, 1, 1)),
+    )  # fmt: skip
+    true = plane.Plane(np.array([0.0, 0.0, 0.15, -0.1, 0.2, 0.02]), 1.0, 0.0)
+    shift = np.zeros((30, 4, 3))
+    shift[:, 1, 0] = 2e-6
+    really = items._replace(points_m=items.points_m + shift)
+    runs = [items._replace(rays=plane.seen(true, one, poses)) for one in (items, really)]
+    prior = np.array([0.35, 0.1, 0.3, 0.3, np.inf, 0.1])
+    run = fit_plane._Run(runs[0], true, poses)
+    other = fit_plane._Run(runs[1], true, poses)
+    pulls = (fit_plane._normal([other], prior)[1] - fit_plane._normal([run], prior)[1]) / 2e-6
+    expected = fit_plane._pull(run, shift / 2e-6)
+    np.testing.assert_allclose(expected, pulls, atol=1e-3 * np.abs(pulls).max())

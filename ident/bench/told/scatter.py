@@ -1,0 +1,75 @@
+"""Whether what runs differ by in Izz is chance, or goes with what each of them carries."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.special import fdtr
+
+from freeswing.cdpr.robot import Array
+from freeswing.ident.bench.solve import Solved
+from freeswing.ident.bench.swing import BenchSwing
+from freeswing.ident.diagnose.decision import ACCEPTED
+
+
+def is_systematic(solved: Solved) -> bool:
+    """Whether scatter between runs goes with what they carry, more surely than chance has it.
+
+    Rehanging and twisting scatter runs of one kind as much as kinds. What the model lacks (a hold
+    of yaw, a radius, a mass) is the same in all runs of a kind.
+    """
+    if not solved.scatter_std > 0.0 or "scatter" not in solved.solution.unknowns:
+        return False
+    return by_kind(solved.solution.value("scatter"), kinds(solved.swings)) > ACCEPTED
+
+
+def kinds(swings: Sequence[BenchSwing]) -> list[int]:
+    """Runs that carry the same, by number, (r,)."""
+    names: dict[tuple[object, ...], int] = {}
+    carried = [
+        (
+            *np.round(swing.known, 9).tolist(),
+            *((one.block, *np.round(one.turn, 9).ravel().tolist()) for one in swing.riding),
+        )
+        for swing in swings
+    ]
+    return [names.setdefault(one, len(names)) for one in carried]
+
+
+def by_kind(values: Array, kinds: Sequence[int]) -> float:
+    """Probability that chance spreads the kinds' means less than they are; 0: it cannot be told.
+
+    Args:
+        values: of the runs, (r,).
+        kinds: which of them are alike, (r,).
+
+    Source:
+        Fisher 1925, Statistical Methods for Research Workers, ch. 7: analysis of variance.
+    """
+    which = np.asarray(kinds)
+    groups = [values[which == kind] for kind in np.unique(which)]
+    between, within = len(groups) - 1, len(values) - len(groups)
+    if between < 1 or within < 1:
+        return 0.0
+    mean = float(values.mean())
+    spread = sum(len(one) * (float(one.mean()) - mean) ** 2 for one in groups) / between
+    left = sum(float(np.sum((one - one.mean()) ** 2)) for one in groups) / within
+    if not left > 0.0:
+        return float(spread > 0.0)
+    return float(fdtr(between, within, spread / left))
+
+
+def scatter_sentence(solved: Solved) -> str:
+    """What runs scatter by, and whether it is chance; empty where they do not."""
+    if not solved.scatter_std > 0.0:
+        return ""
+    size = f"{solved.scatter_std:.2g} kg m2 in Izz beyond their noise"
+    if not is_systematic(solved):
+        return f"runs scatter by {size} (rehanging, twisting, placing): every deviation counts it"
+    return (
+        f"runs differ by {size}, and this goes with what they carry, which no chance does: the "
+        "model lacks something (a clamp or wires that hold yaw, a radius, a mass or its place). "
+        "Deviations count it as if it were chance, which is too little: DO NOT RELY on Izz. Record "
+        "three runs or more with the known mass at different places, then freeswing diagnose"
+    )
