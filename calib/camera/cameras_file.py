@@ -19,7 +19,8 @@ from freeswing.cdpr.rotation import matrix_from_quaternion, quaternion_from_matr
 
 _UNIT_TOLERANCE = 1e-3  # a quaternion written with three decimals
 # Focal length over the longer side: a fisheye of 220 degrees has 0.25, a lens of one degree 57.
-SHORTEST_FOCAL, LONGEST_FOCAL = 0.1, 100.0
+SHORTEST_FOCAL = 0.1  # of the larger side of the image: a fisheye has three times as much
+LONGEST_FOCAL = 100.0  # a telescope; what is longer is in millimetres or of another camera
 HALFWAY = 0.5  # of the way from the middle to the corners every usable calibration reaches
 LEAST_SEEN = 0.3  # of a pinhole's angle there: the worst pincushion of a lens leaves 0.8
 

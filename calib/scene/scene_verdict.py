@@ -30,7 +30,8 @@ from freeswing.calib.verdict.truth_checks import rigidly_fitted, volume_std_m
 from freeswing.cdpr.rotation import log_rotation
 
 # Fourteen unknowns of a camera: 40 points of two numbers determine them with some to spare.
-LEAST_POINTS, GOOD_POINTS = 40, 200
+LEAST_POINTS = 40  # three numbers each, for the fourteen of a camera with its lens, ten times over
+GOOD_POINTS = 200
 _GRID = 4
 _VOLUME_POINTS = 200
 

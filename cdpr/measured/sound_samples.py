@@ -35,7 +35,8 @@ HALF_WITHIN = 0.2
 # A step from one sample to the next, beyond that of its neighbours, this many usual ones large and
 # this large: no platform jumps so, and a cable that goes taut makes less.
 STEP_DEVIATIONS = 40.0
-LEAST_STEP_M, LEAST_STEP_RAD = 0.003, 0.015
+LEAST_STEP_M = 0.003
+LEAST_STEP_RAD = 0.015
 # ... and back again by as much: what is slung to and fro comes back by chance alone.
 BACK_WITHIN = 0.3
 # Samples between two such steps are a wrong match for a moment; a camera that was pushed stays so.

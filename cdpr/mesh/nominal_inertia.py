@@ -23,7 +23,8 @@ MOST_MESH_BYTES = 256 * 2**20
 LARGEST_PLATFORM_M = 100.0  # cameras over stadiums hang from less: it is mm or in read as m
 # A body's length over the span of its cables' attachments: a unit that the user stated is doubted
 # beyond 30 (mm for m is 1000, in for m 39), none stated already beyond 8; platforms have 1 to 3.
-DOUBTED_STATED, DOUBTED_UNSTATED = 30.0, 8.0
+DOUBTED_STATED = 30.0
+DOUBTED_UNSTATED = 8.0
 
 
 def platform_from_mesh(

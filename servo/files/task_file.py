@@ -16,7 +16,8 @@ from freeswing.servo.synthesis.state_space import Array
 
 # The paper's camera (its section 2.2) and encoder; what it leaves open is said in the sample.
 USUAL_CAMERA = Camera(0.005, 0.0107)
-POSITION_STD_M, ANGLE_STD_RAD = 0.0017, 0.005
+POSITION_STD_M = 0.0017
+ANGLE_STD_RAD = 0.005
 ENCODER_STEP_RAD = 2.0 * np.pi / 4096
 # The last step is held as long as the steps before it, or so long where there is none.
 LAST_HOLD_S = 2.0

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from types import SimpleNamespace
 
 import casadi as ca
@@ -14,7 +15,7 @@ from freeswing.cdpr.driven.model import build_driven
 from freeswing.cdpr.effects.forces.tether import EFFECT, place
 from freeswing.cdpr.files.problems import InputError
 from freeswing.cdpr.files.robot_file import read_robot
-from freeswing.cdpr.mesh.nominal_inertia import _check_body
+from freeswing.cdpr.mesh.nominal_inertia import _check_body, _check_size
 from freeswing.cdpr.mesh.separate_bodies import _touches
 from freeswing.cdpr.model.domain import domain_problems
 from freeswing.cdpr.simulation import nearby
@@ -125,3 +126,14 @@ def test_a_motion_is_near_while_changes_shrink_to_seven_tenths(monkeypatch, rati
     around = object.__new__(nearby.Surroundings)
     settled = around._settled(aimed, np.zeros(12), np.zeros((1, 4, 6)), 0.1 / nearby.SETTLED)
     assert (settled is not None) == near
+
+
+@pytest.mark.parametrize(
+    ("times", "stated", "doubted"),
+    [(28.0, True, False), (32.0, True, True), (7.5, False, False), (8.5, False, True)],
+)
+def test_a_mesh_that_is_of_another_size_than_its_cables(times, stated, doubted):
+    """Larger or smaller; a unit that was stated is doubted later."""
+    for size_m in (times, 1.0 / times):
+        with pytest.raises(InputError, match="say the unit") if doubted else nullcontext():
+            _check_size("a.stl", size_m, "m", stated, 1.0)

@@ -1,8 +1,8 @@
 """Every number that the product gives a name: held by tests, or listed with why it decides nothing.
 
 `named_numbers` finds them all: names in capitals at the top of a module whose value is a number or
-arithmetic of numbers. Those of `tests/house/wreck.py` are held from both sides; the others stand in
-`undeciding.toml`, in groups that share one reason.
+arithmetic of numbers, several in one line too. Those of `tests/house/wreck.py` are held from both
+sides; the others stand in `undeciding.toml`, in groups that share one reason.
 """
 
 from __future__ import annotations
@@ -47,8 +47,15 @@ def numbers_of(text: str) -> list[str]:
             targets, value = [node.target], node.value
         else:
             continue
-        names = [one.id for one in targets if isinstance(one, ast.Name)]
-        found += [name for name in names if CAPITALS.fullmatch(name) and is_number(value)]
+        given = [(one, value) for one in targets]
+        for one in targets:
+            if isinstance(one, ast.Tuple) and isinstance(value, ast.Tuple):
+                given += zip(one.elts, value.elts, strict=True)
+        found += [
+            one.id
+            for one, part in given
+            if isinstance(one, ast.Name) and CAPITALS.fullmatch(one.id) and is_number(part)
+        ]
     return found
 
 

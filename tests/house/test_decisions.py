@@ -79,5 +79,6 @@ def test_numbers_that_decide_nothing_say_why() -> None:
 def test_numbers_with_a_name_are_found() -> None:
     text = (
         "A = 3\n_B_2: float = 1e-3 * 2\nC = D = -0.5\nE = True\nF = 'x'\ng = 1\nH = A\nI = (1, 2)\n"
+        "J, _K = 1, 'x'\nL, M = f()\n"
     )
-    assert numbers_of(text) == ["A", "_B_2", "C", "D"]
+    assert numbers_of(text) == ["A", "_B_2", "C", "D", "J"]

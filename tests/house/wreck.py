@@ -433,6 +433,20 @@ HELD = (
     Held("vision/look/detect.py", ("_LEAST_PERIMETER_RATE",), LOOK),
     Held("vision/look/markers.py", ("_EDGE_LEVEL", "_CENTRE_FLOOR_PX"), LOOK),
     Held("vision/untagged/refine.py", ("_REST_STD_PX",), UNTAGGED),
+    Held("calib/camera/cameras_file.py", ("SHORTEST_FOCAL", "LONGEST_FOCAL"), BOARD),
+    Held(
+        "calib/scene/scene_verdict.py",
+        ("LEAST_POINTS", "GOOD_POINTS"),
+        "tests/calib/scene/test_scene_decisions.py::test_few_points_warn_and_very_few_refuse",
+    ),
+    Held("cdpr/measured/sound_samples.py", ("LEAST_STEP_M", "LEAST_STEP_RAD"), MEASURED),
+    Held("cdpr/mesh/nominal_inertia.py", ("DOUBTED_STATED", "DOUBTED_UNSTATED"), CDPR),
+    Held(
+        "ident/diagnose/lengths/length_rows.py", ("DRIFT_M", "DRIFT_RAD", "RUN_OUT_M"), PLACES
+    ),
+    Held("ident/diagnose/lengths/equilibria.py", ("COM_M", "FORCE_M_S2"), PLACES),
+    Held("vision/rig/pairs.py", ("_PLAUSIBLE", "_PLAUSIBLE_M"), START),
+    Held("servo/files/task_file.py", ("POSITION_STD_M", "ANGLE_STD_RAD"), SERVO),
     Held("vision/fuse/fuse_cameras.py", ("LEAST_FLOOR_PX", "_REJECT"), FUSE),
     Held("vision/fuse/calibration_share.py", ("_LEFT_OUT",), FUSE),
     Held("vision/fuse/growth.py", ("USUAL_PX",), "tests/vision/fuse/test_growth.py"),

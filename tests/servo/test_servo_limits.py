@@ -1,4 +1,6 @@
 """What control decides, on both sides of every limit, on made numbers."""
+# Stubs stand for what is not looked at.
+# pyright: reportArgumentType=false
 
 from types import SimpleNamespace
 
@@ -8,7 +10,7 @@ import pytest
 from freeswing.cdpr.files.problems import InputError
 from freeswing.servo.design import hinf, tuning
 from freeswing.servo.files.identified_file import identified
-from freeswing.servo.files.task_file import Task, read_task
+from freeswing.servo.files.task_file import Task, Watch, read_task
 from freeswing.servo.loop import closed_loop
 from freeswing.servo.loop.closed_loop import Run
 from freeswing.servo.loop.judge import judge
@@ -154,3 +156,8 @@ def test_a_task_of_one_step_holds_it_for_two_seconds(tmp_path):
     path = tmp_path / "task.toml"
     path.write_text(task_text("", 0.0))
     assert read_task(path).end_s == 2.0
+
+
+def test_the_papers_camera_sees_to_1_7_millimetres_and_5_milliradians():
+    assert Watch().position_std_m == pytest.approx(0.0017)
+    assert Watch().angle_std_rad == pytest.approx(0.005)

@@ -29,8 +29,9 @@ _NEARLY_BEST = 0.25
 """Lags whose speeds correlate worse than the best by more are not looked at by poses."""
 _MOST_CANDIDATES = 100
 _MOST_REFINED = 12
-_PLAUSIBLE, _PLAUSIBLE_M = 3.0, 0.02
-"""Cameras that were knocked by less than this leave the choice of the lag to their calibration."""
+# Cameras that were knocked by less than this leave the choice of the lag to their calibration.
+_PLAUSIBLE = 3.0
+_PLAUSIBLE_M = 0.02
 _HALVINGS = 7
 _LEVER_M = 0.2
 """A turn counts as it moves a point so far from the platform's origin."""
@@ -101,7 +102,7 @@ def pair_of(first: OwnTrack, second: OwnTrack, T_known: Array) -> Pair | None:
     if not found:
         return None
     best_free, best_known = min(f.miss_m for f in found), min(f.known_m for f in found)
-    by_known = best_known < _PLAUSIBLE * best_free + _PLAUSIBLE_M
+    by_known = _is_plausible(best_known, best_free)
 
     def size(fit: Fitted) -> float:
         return fit.known_m if by_known else fit.miss_m
@@ -141,6 +142,11 @@ def _calm(rates: Array) -> Array:
     """The median of three neighbours: a single camera's depth jumps now and then."""
     padded = np.concatenate([rates[:1], rates, rates[-1:]])
     return np.median(np.stack([padded[:-2], padded[1:-1], padded[2:]]), axis=0)
+
+
+def _is_plausible(known_m: float, free_m: float) -> bool:
+    """Whether cameras stand as calibrated, by how far they miss so and freed of it."""
+    return known_m < _PLAUSIBLE * free_m + _PLAUSIBLE_M
 
 
 def _correlations(

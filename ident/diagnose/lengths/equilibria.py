@@ -30,20 +30,21 @@ from freeswing.ident.diagnose.lengths.joint_lengths import (
     total,
 )
 from freeswing.ident.diagnose.lengths.length_rows import (
-    DRIFT_M,
-    DRIFT_RAD,
     RATES_OVER_S,
     frame_root,
     measured_rates,
+    usual_drift,
 )
 from freeswing.ident.diagnose.lengths.local_polynomials import local_derivatives
 from freeswing.ident.likelihood.run_residuals import Samples
 
 # Instants of a run at which slopes are taken, and parts of it whose means tell the noise of all.
-SLOPES_AT, PARTS = 40, 5
+SLOPES_AT = 40
+PARTS = 5
 # What stands beside the geometry: the centre of mass is anywhere, a constant specific force is as
 # large as a base that is off by two hundredths of a radian makes it.
-COM_M, FORCE_M_S2 = 0.05, 0.2
+COM_M = 0.05
+FORCE_M_S2 = 0.2
 BESIDE = 6  # three coordinates each
 # Less probable than this by chance: two witnesses that contradict each other, or equilibria that no
 # geometry explains. A torsion spring that moved a point by 4 mm left 0.08, a tether nothing.
@@ -136,8 +137,7 @@ def equilibrium(model: Model, inertia: Array, samples: Samples, values: Array) -
     force = -_free_map(model, inertia, zetas[few], values, zetas.mean(axis=0), by_force=True)
     shared = np.concatenate([by_values - by_pose @ shown, by_com, force], axis=2).mean(axis=0)
     right = missing.mean(axis=0) - by_values.mean(axis=0) @ values
-    drift = np.diag([DRIFT_M**2] * 3 + [DRIFT_RAD**2] * 3)
-    noise = in_platform @ drift @ in_platform.T / PARTS + _of_mean(missing)
+    noise = in_platform @ usual_drift() @ in_platform.T / PARTS + _of_mean(missing)
     whitener = np.linalg.inv(np.linalg.cholesky(noise))
     frame = in_platform @ frame_root(model.robot, samples)
     return Equilibrium(whitener @ frame, whitener @ shared, whitener @ right)
@@ -221,7 +221,7 @@ def with_equilibria(
         wider = np.concatenate([one.shared, np.zeros((b, n, BESIDE))], axis=2)
         weight = float(lengths_too)
         rows.append(replace(one, shared=wider, beside=together, weight=weight))
-    size = np.repeat([COM_M, FORCE_M_S2], 3)
+    size = sizes_beside()
     wider_blocks = replace(
         blocks,
         tolerance=np.append(blocks.tolerance, size),
@@ -280,3 +280,8 @@ def _accelerations(times_s: Array, values: Array) -> Array:
     width = min(2 * round(RATES_OVER_S / step) + 1, len(grid) - 1 + len(grid) % 2)
     found = local_derivatives(even, max(width, 7), 4, 2, step)
     return np.array([np.interp(times_s, grid, row) for row in found]).T
+
+
+def sizes_beside() -> Array:
+    """What the centre of mass and a constant specific force may be, each coordinate, (6,)."""
+    return np.repeat([COM_M, FORCE_M_S2], 3)

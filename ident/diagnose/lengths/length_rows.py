@@ -26,7 +26,9 @@ RATES_OVER_S = 0.15
 # least so much: below it the small print of every error decides what is wrong. On real recordings
 # the residual of a general enough model is a tenth of it, and pulleys had to be a quarter
 # turn off to reach it.
-DRIFT_M, DRIFT_RAD, RUN_OUT_M = 1e-4, 5e-4, 3e-4
+DRIFT_M = 1e-4
+DRIFT_RAD = 5e-4
+RUN_OUT_M = 3e-4
 LEAST_SIZE = 1.0
 # Poses that say nothing of slow errors are believed, but never below 20 micrometres.
 LEAST_SIZE_UNSTATED = 0.2
@@ -112,7 +114,7 @@ def length_rows(
     right = lengths - np.einsum("tck,k->tc", by_values, values)
     blocks = _blocks(times)
     noise = by_twist @ np.linalg.inv(samples.whitener) * noise_scales[samples.groups]
-    drift = np.diag([DRIFT_M**2] * 3 + [DRIFT_RAD**2] * 3)
+    drift = usual_drift()
     own = [np.broadcast_to(np.eye(n), (len(times), n, n))]
     least = LEAST_SIZE_UNSTATED
     if samples.slow is not None:
@@ -127,9 +129,33 @@ def length_rows(
         _means(shared, blocks),
         _means(right - right.mean(axis=0), blocks),
         _means(noise @ np.swapaxes(noise, 1, 2), blocks) / counts,
-        mean_in_platform @ drift @ np.swapaxes(mean_in_platform, 1, 2) + RUN_OUT_M**2 * np.eye(n),
+        slow_covariance(mean_in_platform, drift),
         least,
     )
+
+
+def usual_drift() -> Array:
+    """Covariance of slow errors of a pose, platform frame, m and rad, (6, 6).
+
+    Source:
+        JCGM 100:2008, sec. 4.3: values that are believed, as no statistics tell them.
+    """
+    return np.diag([DRIFT_M**2] * 3 + [DRIFT_RAD**2] * 3)
+
+
+def slow_covariance(in_platform: Array, drift: Array) -> Array:
+    """Covariance of lengths (..., n, n) by slow errors of poses and by the pulleys' run-out.
+
+    Args:
+        in_platform: slopes of lengths by a small motion of the platform, its frame, (..., n, 6).
+        drift: of the pose, (6, 6).
+
+    Source:
+        JCGM 100:2008, Guide to the Expression of Uncertainty in Measurement, eq. (13):
+        propagation.
+    """
+    n = in_platform.shape[-2]
+    return in_platform @ drift @ np.swapaxes(in_platform, -1, -2) + RUN_OUT_M**2 * np.eye(n)
 
 
 def frame_root(robot: Robot, samples: Samples) -> Array:

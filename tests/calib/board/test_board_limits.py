@@ -127,3 +127,15 @@ def test_a_camera_is_turned_by_a_unit_quaternion(tmp_path, off, refused) -> None
     (tmp_path / "a.toml").write_text(text.replace("base = [1.0,", f"base = [{1.0 + off!r},"))
     with pytest.raises(InputError, match="q_camera_base") if refused else nullcontext():
         read_cameras(tmp_path / "a.toml")
+
+
+@pytest.mark.parametrize(
+    ("share", "questioned"), [(0.095, True), (0.105, False), (95.0, False), (105.0, True)]
+)
+def test_focal_lengths_that_no_lens_has(share, questioned) -> None:
+    """Over the larger side of the image."""
+    said: list[str] = []
+    entry = SimpleNamespace(add=lambda key, text: said.append(text))
+    params = np.array([800.0 * share, 399.5, 299.5])
+    _question_lens(entry, "SIMPLE_PINHOLE", np.array([800.0, 600.0]), params)
+    assert any("focal lengths" in text for text in said) == questioned, said

@@ -23,8 +23,6 @@ from freeswing.calib.scene.lab_map import LabMap
 from freeswing.calib.scene.marks import Click, clicked, read_clicks
 from freeswing.calib.scene.scene_rig import chosen_points, rig_of_map, rig_part
 from freeswing.calib.scene.scene_verdict import (
-    GOOD_POINTS,
-    LEAST_POINTS,
     SceneChecks,
     growth_of,
     halves_of,
@@ -195,7 +193,7 @@ def test_points_seen_most_often_are_chosen() -> None:
 
 
 @pytest.mark.parametrize(
-    ("points", "refuses"), [(LEAST_POINTS - 1, True), (LEAST_POINTS, False), (GOOD_POINTS, None)]
+    ("points", "refuses"), [(39, True), (40, False), (199, False), (200, None)]
 )
 def test_few_points_warn_and_very_few_refuse(made, points, refuses) -> None:
     _, _, _, _, rig = made

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from freeswing.cdpr.files.documents import InputError
 from freeswing.cdpr.measured.frame_change import frame_from_points
 from freeswing.cdpr.measured.rigid_fit import is_planar_or_better
+from freeswing.cdpr.measured.sound_samples import _steps
 from freeswing.cdpr.measured.target import read_target
 
 TAG = """[[tags]]
@@ -88,3 +89,14 @@ def test_points_by_tape_fit_to_two_centimetres(off_m, wrong) -> None:
         push *= off_m / left(push)[1]
     with pytest.raises(InputError, match="check its numbers") if wrong else nullcontext():
         frame_from_points(left(push)[0], base)
+
+
+@pytest.mark.parametrize(
+    ("name", "size", "wild"),
+    [("x", 0.0028, False), ("x", 0.0032, True), ("phi", 0.014, False), ("phi", 0.016, True)],
+)
+def test_steps_that_no_platform_makes(name, size, wild) -> None:
+    """However quiet the samples are."""
+    values = 1e-6 * np.resize([1.0, -1.0, 0.5], (60, 1))
+    values[30:] += size
+    assert _steps(values, (name,)).any() == wild

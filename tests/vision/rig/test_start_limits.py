@@ -14,7 +14,7 @@ import pytest
 from freeswing.cdpr.files.documents import DataError
 from freeswing.vision.rig import alignment, correct_rig, rig_effects, stamp_jitter, untied
 from freeswing.vision.rig.alignment import Missed, _chosen, deviations_apart
-from freeswing.vision.rig.pairs import _correlations
+from freeswing.vision.rig.pairs import _correlations, _is_plausible
 from tests.vision.scenes import camera
 
 VIEW = camera()
@@ -169,3 +169,11 @@ def test_jitter_needs_twenty_frames(monkeypatch, frames, shown) -> None:
 def test_what_lenses_leave_is_no_jitter(monkeypatch, noise_px, shown) -> None:
     """Corners of a platform so slow that 0.03 px are a millisecond."""
     assert bool(jitter(monkeypatch, 20001, 0.0, noise_px, 30.0)) == shown
+
+
+@pytest.mark.parametrize(
+    ("known_m", "free_m", "plausible"),
+    [(0.019, 0.0, True), (0.021, 0.0, False), (2.9, 1.0, True), (3.1, 1.0, False)],
+)
+def test_cameras_that_stand_as_calibrated_tell_their_lag(known_m, free_m, plausible) -> None:
+    assert _is_plausible(known_m, free_m) == plausible

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from freeswing.cdpr.robot import POSE_COORDINATES
-from freeswing.ident.diagnose.lengths import length_rows
+from freeswing.ident.diagnose.lengths import equilibria, length_rows
 from freeswing.ident.diagnose.lengths.inclusion import groups, mixed, set_probabilities
 from freeswing.ident.diagnose.lengths.joint_lengths import Blocks, Normal
 from freeswing.ident.likelihood.raw_samples import prepare
@@ -64,3 +64,15 @@ def test_slow_errors_are_never_smaller(monkeypatch, stated, least_m) -> None:
     pattern = {"made": np.zeros((len(samples.times_s), model.robot.n_cables, 1))}
     rows = length_rows.length_rows(model, np.ones(9), samples, np.ones(2), nothing, pattern)
     assert rows.least_size * length_rows.DRIFT_M == pytest.approx(least_m, rel=0.05)
+
+
+def test_slow_errors_of_poses_and_pulleys() -> None:
+    """A tenth of a millimetre, half a milliradian; of a length three tenths of a millimetre."""
+    along, about = np.eye(6)[[0, 3]]
+    found = length_rows.slow_covariance(np.stack([along, about]), length_rows.usual_drift())
+    np.testing.assert_allclose(found, np.diag([1e-8 + 9e-8, 25e-8 + 9e-8]), rtol=1e-9)
+
+
+def test_what_stands_beside_the_geometry_may_be_anywhere_in_a_platform() -> None:
+    """Five centimetres, and a base a fiftieth of a radian off its level."""
+    np.testing.assert_allclose(equilibria.sizes_beside(), [0.05] * 3 + [0.2] * 3, rtol=0.1)
