@@ -23,6 +23,7 @@ MODAL_S = 6.0  # so long do swings of a few degrees stay small oscillations
 MOST_SAMPLES = 400
 SIZES = np.exp(np.arange(-4.0, 3.0, 0.12))  # of the guessed tensor: a pen to a plank
 RIDGE = 1e-4  # of a column's variance: equal modes share what they cannot tell apart
+LEANS_RAD = 0.1  # of a guessed rest pose against the true: so much of one angle is another's
 TYPICAL_YAW_RAD = 0.06  # three and a half degrees: a twist by hand
 LITTLE = 0.1  # of a gain: not zero, for from zero times zero no step leads away
 SWAY_M = 0.02  # what a further channel is there to see
@@ -191,7 +192,18 @@ def glimpse(model: Model, view: Sight, inertia: Array) -> Glimpse:
 
 
 def _variance(view: Sight, column: int) -> float:
-    return float(np.var(view.values[view.known[:, column], column])) + 1e-300
+    """By which a column counts: its own; a coordinate's, no less than what modes are off by.
+
+    A platform that hangs level where its guess leans yaws without the pitch that the guess has
+    with it: a pitch that is noise alone would hold yaw at zero.
+    """
+    own = float(np.var(view.values[view.known[:, column], column])) + 1e-300
+    if not view.direct[column]:
+        return own
+    angle = np.asarray(view.seen[:, 3:].any(axis=1))
+    alike = np.flatnonzero(view.direct & (angle == angle[column]))
+    largest = max(float(np.var(view.values[view.known[:, k], k])) for k in alike)
+    return own + LEANS_RAD**2 * largest
 
 
 def _waves_fitted(view: Sight, waves: Array, seen: Array, group: list[int]) -> tuple[Array, Array]:

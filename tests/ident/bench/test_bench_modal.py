@@ -8,14 +8,16 @@ import numpy as np
 import pytest
 
 from freeswing.cdpr.model.equations import build_model
+from freeswing.cdpr.rotation import matrix_from_angles
 from freeswing.ident.bench.assemble import EFFECTS, Assembled, assembled
 from freeswing.ident.bench.channels import Channel
 from freeswing.ident.bench.held_uncertain import believed, considered, gauge, unseen
 from freeswing.ident.bench.modal import ModalSwing
-from freeswing.ident.bench.runs import Bench, BenchRun, KnownBody, Signal
+from freeswing.ident.bench.runs import Bench, BenchRun, KnownBody, Load, Placed, Signal
 from freeswing.ident.bench.swing import BenchSwing
 from freeswing.ident.likelihood.fit import fit
 from freeswing.ident.likelihood.fit_blocks import Dense
+from freeswing.ident.likelihood.unknowns import Unknown, Unknowns
 from tests.ident.bench.test_swing_slopes import slopes_are_those_of_differences, trifilar
 
 LARGE = 1.5e-4  # 0.1 % of the amplitude: what the fourth power of it does
@@ -95,6 +97,24 @@ def test_what_no_run_tells_is_held() -> None:
     x = replace(bench.runs[0], signals=(Signal("x", np.zeros(90)), Signal("chi", np.zeros(90))))
     assert not unseen(bench, (*bench.runs, x), start.unknowns)
     assert not any(mask.any() for mask in gauge(bench, (*bench.runs, x), start.unknowns).values())
+
+
+@pytest.mark.parametrize(
+    ("turn", "held"),
+    [
+        (np.eye(3), [1, 2, 3, 4, 5, 7, 8, 9]),  # Izz alone is turned
+        (np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]), [1, 2, 3, 4, 6, 7, 8, 9]),
+        (matrix_from_angles(np.array([0.3, 0.0, 0.0])), [1, 2, 3, 4, 7, 8]),
+    ],
+)
+def test_of_an_object_yaw_shows_what_it_turns(turn, held) -> None:
+    """Upright Izz, on its side Iyy, leaning about x both and Iyz: each entry that v' I v has."""
+    yaw = BenchRun("a", "identify", np.arange(9.0), (Signal("chi", np.zeros(9)),), np.ones(3))
+    runs = [replace(yaw, loads=(Placed("cube", turn, np.zeros(3)),))]
+    blocks = [Unknown(name, np.ones(10), np.ones(10)) for name in ("platform", "load.cube")]
+    bench = Bench(tuple(runs), loads=(Load("cube", 1.0),))
+    found = unseen(bench, runs, Unknowns(tuple(blocks)))
+    assert np.flatnonzero(found["load.cube"]).tolist() == held
 
 
 def test_a_fit_counts_what_it_holds() -> None:

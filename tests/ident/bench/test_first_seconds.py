@@ -10,6 +10,7 @@ from freeswing.cdpr.model.statics import modes
 from freeswing.ident.bench.assemble import EFFECTS
 from freeswing.ident.bench.first_guesses import glimpse, sight
 from freeswing.ident.bench.swing import Column
+from tests.ident.bench.test_rolled import WIRE_M, hanging
 from tests.ident.bench.test_swing_slopes import trifilar
 
 INERTIA = np.array([0.0, 0.0, -0.05, 0.02, 0.02, 0.035, 0.0, 0.0, 0.0])
@@ -42,3 +43,21 @@ def test_yaw_is_followed_however_little_the_platform_sways(sway_m: float) -> Non
 def test_a_wave_that_no_column_sees_stays_small() -> None:
     found = yaw_and(None)
     assert np.abs(found.moved[:, :2]).max() < 0.02, np.abs(found.moved).max(axis=0)
+
+
+def test_yaw_is_followed_where_the_guess_leans_and_the_platform_does_not() -> None:
+    """Guessed to roll by 40 mrad, yaw brings 4 mrad of pitch along; measured are 0.5 of noise."""
+    model, lengths = hanging().model, np.full(2, WIRE_M)
+    inertia = INERTIA + np.eye(9)[1] * 0.002
+    rng = np.random.default_rng(0)
+
+    def seen(hertz: float):
+        chi = 0.1 * np.cos(2.0 * np.pi * hertz * TIMES_S)
+        values = rng.normal(0.0, 3e-3, 300), rng.normal(0.0, 5e-4, 300), chi
+        columns = [Column("", one, np.full(300, 5e-4), 3 + k) for k, one in enumerate(values)]
+        return sight(model, "a", lengths, inertia, TIMES_S, columns, {})
+
+    found = modes(model, seen(1.0).rest, inertia)
+    yaw = int(np.argmax(np.abs(found.shapes[5]) / np.abs(found.shapes[:5]).max(axis=0)))
+    told = glimpse(model, seen(found.frequencies_hz[yaw]), inertia)
+    assert abs(told.zeta[5]) == pytest.approx(0.1, abs=0.02)
