@@ -25,22 +25,29 @@ Wreck = tuple[str, str, float]
 
 
 def noticed_in_place(tests: str, wrecks: Sequence[Wreck]) -> list[bool]:
-    """Which of them turn the tests red, each in a process of its own that has imported them."""
+    """Which of them turn the tests red, each in a process of its own that has imported them.
+
+    Raises:
+        RuntimeError: where the tests are red without any wreck.
+    """
     here, there = Pipe(duplex=False)
 
     def work() -> int:
         pytest_main(["--collect-only", "-q", *tests.split()])
         gc.freeze()
-        there.send([_noticed(wreck, tests) for wreck in wrecks])
+        red = _red(tests, None)
+        there.send(None if red else [_red(tests, wreck) for wreck in wrecks])
         return 0
 
     child = in_child(work)
     there.close()
     try:
-        found: list[bool] = here.recv()
+        found: list[bool] | None = here.recv()
     except EOFError:
         found = [False] * len(wrecks)
     os.waitpid(child, 0)
+    if found is None:
+        raise RuntimeError(f"{tests}: red as it is, so it holds nothing")
     return found
 
 
@@ -67,9 +74,10 @@ def pytest_main(arguments: Sequence[str]) -> int:
     return int(pytest.main([*lean, *arguments]))
 
 
-def _noticed(wreck: Wreck, tests: str) -> bool:
+def _red(tests: str, wreck: Wreck | None) -> bool:
     def work() -> int:
-        _wreck(*wreck)
+        if wreck is not None:
+            _wreck(*wreck)
         return pytest_main(["-x", "-q", *tests.split()])
 
     return os.waitstatus_to_exitcode(os.waitpid(in_child(work), 0)[1]) == 1
