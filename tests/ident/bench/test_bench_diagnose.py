@@ -145,7 +145,7 @@ def test_wires_of_which_runs_tell_no_more_than_what_is_stated(share: float, told
     assert removed_entry(found)["verdict"] == ("rejected" if told else "not_identifiable")
 
 
-@pytest.mark.parametrize(("power", "present"), [(8.0, False), (12.0, True)])
+@pytest.mark.parametrize(("power", "present"), [(9.0, False), (11.2, True)])
 def test_what_remains_stands_out_of_white_noise(power: float, present: bool) -> None:
     """A residual of so many times the noise's power over the lower quarter of the band."""
     count = 4096
