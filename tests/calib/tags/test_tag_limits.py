@@ -80,7 +80,7 @@ def a_pass(outlying: float = 0.0, scale: float = 1.0) -> Pass:
 
 def test_print_is_as_even_as_a_fiftieth_of_its_contrast() -> None:
     """Residuals below it are no outliers, however clean the picture is."""
-    step = _step(a_pass(), np.eye(3), np.array([40.0, 160.0, 1.0]), 4.0, 0.1, free=True)
+    step = _step(a_pass(), np.eye(3), np.array([40.0, 160.0, 1.0]), 4.0, 0.1, held=False)
     assert step.scale == pytest.approx(3.2, rel=0.1)
 
 
