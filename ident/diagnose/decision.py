@@ -48,6 +48,9 @@ CONTRADICTED = 0.15
 INERTIA_RANGE = 10.0
 # Effects whose best mixture explains less than this of the excess are the nearest, not the cause.
 LEAST_SHARE_EXPLAINED = 0.75
+# What is not the cause shows in the residuals, or in runs left out although each run by itself is
+# followed well. Nor is a model that leaves so much asked how far all poses err together.
+LARGEST_EXCESS_LEFT = 0.5
 
 
 @dataclass(frozen=True, slots=True)

@@ -28,6 +28,7 @@ from freeswing.ident.diagnose.answer.next_swing import NextSwing, next_swing
 from freeswing.ident.diagnose.answer.settled_geometry import cut, settled_places, with_settled
 from freeswing.ident.diagnose.decision import (
     ACCEPTED,
+    LARGEST_EXCESS_LEFT,
     LEAST_SHARE_EXPLAINED,
     Candidate,
     excess_of,
@@ -63,9 +64,6 @@ KEPT_FROM_DYNAMICS = (
     "something that follows the motion is still missing: the geometry is what cable lengths say, "
     "not what the forces found would make of it; what lengths leave open widens all else"
 )
-# What is not the cause shows in the residuals, or in runs left out although each run by itself is
-# followed well.
-LARGEST_EXCESS_LEFT = 0.5
 
 
 @dataclass(frozen=True, slots=True)

@@ -156,22 +156,22 @@ def polished(found: LikelihoodFit, noise_scales: Array) -> Refit:
     colour = colour_of(found, noise_scales)
     samples, scales = tempered(found, noise_scales), noise_scales * np.sqrt(colour)
     exact = fit(replace(found.swings, samples=samples, scales=scales), found.unknowns, ONWARD)
-    return freed(rescored(exact, noise_scales, colour), noise_scales, colour)
+    return rescored(exact, noise_scales, colour)
 
 
-def freed(one: Refit, noise_scales: Array, colour: float) -> Refit:
+def freed(one: Refit, noise_scales: Array) -> Refit:
     """A fit again, the errors that the poses of all runs share taken out as far as it asks.
 
     Args:
         one: the fit, scored: these errors are among the unknowns of its evidence.
         noise_scales: of metres and radians, (2,).
-        colour: of the residual.
     """
     found, common = one.fit, one.evidence.common
     step = one.score.change[len(one.score.change) - common :]
     if np.abs(step).max(initial=0.0) < CONVERGED:
         return one
-    samples, scales = freed_samples(found, step), noise_scales * np.sqrt(colour)
+    samples = freed_samples(found, step)
+    scales = noise_scales * np.sqrt(colour_of(found, noise_scales))
     exact = fit(replace(found.swings, samples=samples, scales=scales), found.unknowns, ONWARD)
     return rescored(exact, noise_scales, colour_of(exact, noise_scales))
 

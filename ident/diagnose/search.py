@@ -20,6 +20,7 @@ from freeswing.cdpr.effects import effect_named
 from freeswing.cdpr.robot import Array, Robot
 from freeswing.cdpr.system.lifeline import tie_to
 from freeswing.ident.diagnose.decision import (
+    LARGEST_EXCESS_LEFT,
     LEAST_EXCESS_LATER,
     Decision,
     by_lengths,
@@ -96,9 +97,8 @@ class Search:
     def run(self, base: LikelihoodFit) -> Refit:
         """Add effects to a base fit until none passes; the last fit."""
         self._tell("base dynamics", 0.0)
-        colour = colour_of(base, self.noise_scales)
-        current = freed(rescored(base, self.noise_scales, colour), self.noise_scales, colour)
-        current = self._geometry(current)
+        current = rescored(base, self.noise_scales, colour_of(base, self.noise_scales))
+        current = self._freed(self._geometry(current))
         with self.pool_of() as self.pool:
             for index in range(MOST_ROUNDS):
                 if index and (excess_of(current) < LEAST_EXCESS_LATER or too_small(current.fit)):
@@ -131,6 +131,15 @@ class Search:
             current = after
         return current
 
+    def _freed(self, current: Refit) -> Refit:
+        """The fit without what all poses have wrong together, where nothing else is missing.
+
+        A model that misses more would have these errors make up for it.
+        """
+        if excess_of(current) > LARGEST_EXCESS_LEFT:
+            return current
+        return freed(current, self.noise_scales)
+
     def _tell(self, label: str, fraction: float) -> None:
         if self.progress:
             self.progress(label, fraction)
@@ -156,7 +165,7 @@ class Search:
         if decision.winner is None:
             return Round(current, decision)
         # Ranking stopped early: the winner goes on to convergence.
-        found, removed = polished(decision.winner.fit, self.noise_scales), []
+        found, removed = self._freed(polished(decision.winner.fit, self.noise_scales)), []
         while name := superfluous(found, decision.group):
             self._tell(f"round {index + 1}: without {name}", (index + 0.9) * share)
             fewer = without(found.fit, name, self.noise_scales)

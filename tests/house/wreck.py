@@ -280,7 +280,11 @@ HELD = (
         ("SIZES_A_DECADE", "SMALLEST_SIZE"),
         "tests/ident/diagnose/test_own_values.py",
     ),
-    Held("ident/diagnose/diagnose.py", ("LARGEST_EXCESS_LEFT",), DECISION),
+    Held(
+        "ident/diagnose/decision.py",
+        ("LARGEST_EXCESS_LEFT",),
+        "tests/ident/diagnose/test_search.py",
+    ),
     Held("ident/diagnose/decision.py", ("INERTIA_RANGE",), RESIDUALS),
     Held("ident/diagnose/removal.py", ("LARGEST_RISE",), RESIDUALS),
     Held(

@@ -37,7 +37,7 @@ def searched(known: bool) -> tuple[Refit, Refit]:
     unknowns = first_unknowns(model, TRUE_INERTIA, states, [None] * len(samples))
     found = fit(Swings(model, tuple(samples), SCALES), unknowns, ONWARD)
     colour = colour_of(found, SCALES)
-    current = freed(rescored(found, SCALES, colour), SCALES, colour)
+    current = freed(rescored(found, SCALES, colour), SCALES)
     return current, refit(current.fit, "anchor_offset", np.zeros(12), SCALES, colour)
 
 

@@ -28,10 +28,22 @@ def test_effects_are_added_one_after_another(monkeypatch, there, found) -> None:
     monkeypatch.setattr(Search, "_geometry", lambda self, current: current)
     monkeypatch.setattr(module, "colour_of", lambda *_: 1.0)
     monkeypatch.setattr(module, "rescored", lambda base, *_: anything(fit=None, left=base.left))
-    monkeypatch.setattr(module, "freed", lambda one, *_: one)
+    monkeypatch.setattr(Search, "_freed", lambda self, current: current)
     monkeypatch.setattr(module, "excess_of", lambda current: 100.0)
     monkeypatch.setattr(module, "too_small", lambda _: False)
     search = Search(np.ones(2), (), workers=1)
     last: Any = search.run(anything(left=there))
     assert sum(one.decision.winner is not None for one in search.rounds) == found
     assert last.left == there - found
+
+
+@pytest.mark.parametrize(("excess", "is_freed"), [(0.47, True), (0.53, False)])
+def test_errors_of_all_poses_are_not_asked_of_a_model_that_misses_more(
+    monkeypatch, excess, is_freed
+) -> None:
+    """On a day that lacked five effects the frame of all runs was said to be off six deviations."""
+    current: Any = SimpleNamespace()
+    monkeypatch.setattr(module, "excess_of", lambda _: excess)
+    monkeypatch.setattr(module, "freed", lambda *_: "freed")
+    found = Search(np.ones(2), (), workers=1)._freed(current)
+    assert (found == "freed") == is_freed
