@@ -394,7 +394,6 @@ HELD = (
         LOOK,
     ),
     Held("calib/tags/edge_pixels.py", ("LEAST_CELL",), EDGES),
-    Held("calib/tags/pattern_fit.py", ("EDGE_SETTLED",), EDGES),
     Held("calib/tags/pattern_fit.py", ("MOST_BLUR",), f"{TAGS}::test_blur_up_to_six_pixels"),
     Held(
         "calib/tags/pattern_fit.py",
@@ -403,7 +402,7 @@ HELD = (
     ),
     Held(
         "calib/tags/pattern_fit.py",
-        ("OUTLYING", "COVERED_SETTLED", "COVERED_SCALE"),
+        ("EDGE_SETTLED", "OUTLYING", "COVERED_SETTLED", "COVERED_SCALE"),
         f"{TAGS}::test_a_tag_that_is_covered_in_part_has_to_settle",
     ),
     Held(

@@ -12,7 +12,7 @@ import pytest
 from freeswing.calib.tags import base_tags
 from freeswing.calib.tags.corner_kernels import UNKNOWNS, Pass
 from freeswing.calib.tags.corners import TagFit, fit_tag, rimmed_cells
-from freeswing.calib.tags.pattern_fit import EDGE_SETTLED, _settled_at, _step
+from freeswing.calib.tags.pattern_fit import _settled_at, _step
 from tests.calib.tags.test_edge_pixels import GRID, drawn, square
 
 CELLS = rimmed_cells("tag36h11", 5)
@@ -87,11 +87,11 @@ def test_print_is_as_even_as_a_fiftieth_of_its_contrast() -> None:
 @pytest.mark.parametrize(
     ("outlying", "before", "at_last", "settled"),
     [
-        (1.8, 9.0, False, EDGE_SETTLED),
+        (1.8, 9.0, False, 0.12),
         (2.2, 9.0, False, 0.0),
         (2.2, 1.25, False, 0.02),
         (2.2, 1.35, False, 0.0),
-        (2.2, 1.25, True, EDGE_SETTLED),
+        (2.2, 1.25, True, 0.12),
     ],
 )
 def test_a_tag_that_is_covered_in_part_has_to_settle(outlying, before, at_last, settled) -> None:
