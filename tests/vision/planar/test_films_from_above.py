@@ -12,11 +12,15 @@ from freeswing.cdpr.files.trajectory_csv import read_csv
 from freeswing.main import main
 from freeswing.session.session_file import read_session
 from freeswing.vision.planar.two_dots import COLUMNS
+from freeswing.vision.render.patterns import Sphere
 from tests.oracle.recorded.benches import PLATFORM_COM_M, PLATFORM_KG_M2
 from tests.vision.planar.benches_from_above import (
     bench_motion,
     bright_dots,
     film,
+    known_dots,
+    phone,
+    phone_below,
     plate_tag,
     true_coordinates,
     write_bench,
@@ -54,6 +58,31 @@ def test_one_phone_above_a_trifilar_bench_gives_its_inertia(tmp_path: Path, caps
     rows = {row["name"]: row for row in told["objects"][0]["parameters"]}
     izz = PLATFORM_KG_M2[2] + MASS_KG * float(np.sum(PLATFORM_COM_M[:2] ** 2))
     found_izz = rows["Izz_P_kg_m2"]
+    assert abs(found_izz["value"] / izz - 1.0) < 0.01, found_izz
+    assert abs(found_izz["value"] - izz) < 3.0 * found_izz["std"], found_izz
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("camera", [phone, phone_below])
+def test_dots_at_known_places_from_above_and_from_below(tmp_path: Path, capsys, camera) -> None:
+    """Three dots, nothing calibrated, nobody says from which side they are seen."""
+    dots = known_dots()
+    write_bench(tmp_path, tuple(RUNS), (), MASS_KG, dots)
+    spheres = [Sphere(one.position_m, 0.016) for one in dots]
+    motions = {run: bench_motion(seed, 8.0) for run, seed in RUNS.items()}
+    for run, motion in motions.items():
+        film(tmp_path / "runs" / run, motion, 7.9, spheres=spheres, camera=camera)
+    assert track(tmp_path) == 0, capsys.readouterr().err
+    for run, motion in motions.items():
+        found = read_csv(tmp_path / "results" / "tracks" / f"{run}.csv")
+        true = true_coordinates(motion, found.times_s)
+        off = found.values - found.values.mean(axis=0) - true
+        assert off[:, 2].std() < 8e-4, off[:, 2].std()
+        assert off[:, :2].std(axis=0).max() < 1.5e-4, off[:, :2].std(axis=0)
+    assert main(["identify", str(tmp_path)]) == 0, capsys.readouterr().err
+    told = json.loads((tmp_path / "results" / "identification.json").read_text())
+    found_izz = {row["name"]: row for row in told["objects"][0]["parameters"]}["Izz_P_kg_m2"]
+    izz = PLATFORM_KG_M2[2] + MASS_KG * float(np.sum(PLATFORM_COM_M[:2] ** 2))
     assert abs(found_izz["value"] / izz - 1.0) < 0.01, found_izz
     assert abs(found_izz["value"] - izz) < 3.0 * found_izz["std"], found_izz
 
