@@ -145,12 +145,17 @@ def log_rotation(R: ArrayLike) -> Array:
         Murray, Li, Sastry 1994, A Mathematical Introduction to Robotic Manipulation, prop. 2.9.
     """
     q = quaternion_from_matrix(R)
-    w, sine = q[..., :1], np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
+    return _rotvec(q[..., :1], q[..., 1:])
+
+
+def _rotvec(w: Array, vector: Array) -> Array:
+    """Rotation vector of unit quaternions, w (..., 1) >= 0 and the rest (..., 3)."""
+    sine = np.sqrt(np.sum(vector * vector, axis=-1, keepdims=True))
     small = sine < SMALL_ANGLE_RAD
-    # angle / sin(angle / 2) = 2 (1 + s^2/6 + 3 s^4/40 + ...) with s = sin(angle / 2), w >= 0.
+    # angle / sin(angle / 2) = 2 (1 + s^2/6 + 3 s^4/40 + ...) with s = sin(angle / 2).
     series = 2.0 + sine**2 / 3.0 + 3.0 * sine**4 / 20.0
     safe = np.where(small, 1.0, sine)
-    return q[..., 1:] * np.where(small, series, 2.0 * np.arctan2(safe, w) / safe)
+    return vector * np.where(small, series, 2.0 * np.arctan2(safe, w) / safe)
 
 
 def pose_differences(zetas: ArrayLike, from_zetas: ArrayLike) -> Array:
@@ -163,9 +168,30 @@ def pose_differences(zetas: ArrayLike, from_zetas: ArrayLike) -> Array:
         Sola, Deray, Atchuthan 2018, A micro Lie theory for state estimation in robotics, eq. (28).
     """
     zetas, from_zetas = (np.asarray(one, dtype=np.float64) for one in (zetas, from_zetas))
-    R, R_from = matrix_from_angles(zetas[..., 3:]), matrix_from_angles(from_zetas[..., 3:])
-    turn = log_rotation(R @ np.swapaxes(R_from, -1, -2))
-    return np.concatenate([zetas[..., :3] - from_zetas[..., :3], turn], axis=-1)
+    (w, x, y, z), (a, b, c, d) = _quaternion(zetas[..., 3:]), _quaternion(from_zetas[..., 3:])
+    # The product with the other's conjugate.
+    turn = np.stack(
+        [
+            x * a - w * b + z * c - y * d,
+            y * a - w * c + x * d - z * b,
+            z * a - w * d + y * b - x * c,
+        ],
+        axis=-1,
+    )
+    cosine = (w * a + x * b + y * c + z * d)[..., None]
+    turned = _rotvec(np.abs(cosine), np.where(cosine < 0.0, -turn, turn))
+    return np.concatenate([zetas[..., :3] - from_zetas[..., :3], turned], axis=-1)
+
+
+def _quaternion(angles: Array) -> tuple[Array, Array, Array, Array]:
+    """Unit quaternion w, x, y, z of angles phi, theta, chi (..., 3)."""
+    (cp, ct, cc), (sp, st, sc) = (np.moveaxis(f(0.5 * angles), -1, 0) for f in (np.cos, np.sin))
+    return (
+        cp * ct * cc - sp * st * sc,
+        sp * ct * cc + cp * st * sc,
+        cp * st * cc - sp * ct * sc,
+        cp * ct * sc + sp * st * cc,
+    )
 
 
 def log_slope(rotvec: ArrayLike) -> Array:
@@ -212,7 +238,11 @@ def invert(T: ArrayLike) -> Array:
 
 def _matrix(rows: list[list[Array]]) -> Array:
     """Stack scalar fields (...) into matrices (..., len(rows), len(rows[0]))."""
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    filled = np.empty((*rows[0][0].shape, len(rows), len(rows[0])))
+    for i, row in enumerate(rows):
+        for j, entry in enumerate(row):
+            filled[..., i, j] = entry
+    return filled
 
 
 def nearest_rotation(matrices: Array) -> Array:

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import lru_cache, partial, wraps
 from itertools import accumulate
 from math import prod
-from typing import Any
+from threading import RLock
+from typing import Any, ParamSpec, TypeVar
 
 import casadi as ca
 import numpy as np
@@ -21,6 +22,28 @@ from freeswing.cdpr.robot import Array
 
 LARGEST_CHUNK = 1024
 CACHE_LINE = 8  # numbers
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+# A function's buffer is one for all threads, and what is built belongs to all of them.
+_CASADI = RLock()
+
+
+def _built_once(most: int) -> Callable[[Callable[P, T]], Callable[P, T]]:
+    """Keeps up to `most` results; of several threads that ask for one, the first makes it."""
+
+    def decorated(build: Callable[P, T]) -> Callable[P, T]:
+        kept = lru_cache(maxsize=most)(build)
+
+        @wraps(build)
+        def found(*arguments: P.args, **named: P.kwargs) -> T:
+            with _CASADI:
+                return kept(*arguments, **named)
+
+        return found
+
+    return decorated
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +96,7 @@ def _on_a_line(count: int) -> Array:
     return more[first : first + count]
 
 
-@lru_cache(maxsize=256)
+@_built_once(256)
 def tape_of(function: Any) -> Tape | None:
     """A function's tape; None where it does something that tapes do not know.
 
@@ -132,13 +155,16 @@ def evaluate(function: Any, *arguments: Any) -> tuple[Array, ...]:
             )
         heads.append(array.shape[: array.ndim - len(tail)])
     batch = np.broadcast_shapes(*heads)
-    flat = [
-        np.ascontiguousarray(np.broadcast_to(array, batch + tail)).reshape(prod(batch), *tail)
-        for array, tail in zip(arrays, tails, strict=True)
-    ]
     sizes = [function.size_out(i) for i in range(function.n_out())]
     tape = tape_of(function) if prod(batch) > 1 else None
-    results = _interpreted(function, flat, sizes) if tape is None else _taped(tape, flat, sizes)
+    if tape is None:
+        flat = [
+            np.ascontiguousarray(np.broadcast_to(array, batch + tail)).reshape(prod(batch), *tail)
+            for array, tail in zip(arrays, tails, strict=True)
+        ]
+        results = _interpreted(function, flat, sizes)
+    else:
+        results = _taped(tape, batch, arrays, tails, sizes)
     return tuple(
         _shaped(result, name, batch)
         for result, name in zip(results, function.name_out(), strict=True)
@@ -148,12 +174,24 @@ def evaluate(function: Any, *arguments: Any) -> tuple[Array, ...]:
 Sizes = list[tuple[int, int]]
 
 
-def _taped(tape: Tape, flat: list[Array], sizes: Sizes) -> list[Array]:
+def _taped(
+    tape: Tape,
+    batch: tuple[int, ...],
+    arrays: list[Array],
+    tails: list[tuple[int, ...]],
+    sizes: Sizes,
+) -> list[Array]:
     """Results of a tape, (n, cols, rows) each."""
-    total = len(flat[0])
-    together = tape.run(np.concatenate([array.reshape(total, -1) for array in flat], axis=1))
+    points, first = np.empty((*batch, tape.inputs)), 0
+    for array, tail in zip(arrays, tails, strict=True):
+        if tail:
+            points[..., first : first + tail[0]] = array
+        else:
+            points[..., first] = array
+        first += tail[0] if tail else 1
+    together = tape.run(points.reshape(prod(batch), tape.inputs))
     return [
-        np.ascontiguousarray(part).reshape(total, cols, rows)
+        part.reshape(len(part), cols, rows)
         for part, (rows, cols) in zip(_parts(together, sizes), sizes, strict=True)
     ]
 
@@ -165,26 +203,26 @@ def _interpreted(function: Any, flat: list[Array], sizes: Sizes) -> list[Array]:
     done = 0
     while done < total:
         count = min(LARGEST_CHUNK, 1 << ((total - done).bit_length() - 1))
-        buffer, run = _buffer(function, count)
         kept = [np.ascontiguousarray(array[done : done + count]) for array in flat]
-        for i, array in enumerate(kept):
-            if array.size:
-                buffer.set_arg(i, array.reshape(-1).data)
-        for i, result in enumerate(results):
-            if result.size:
-                buffer.set_res(i, result[done : done + count].reshape(-1).data)
-        run()
+        with _CASADI:
+            buffer, run = _buffer(function, count)
+            for i, array in enumerate(kept):
+                if array.size:
+                    buffer.set_arg(i, array.reshape(-1).data)
+            for i, result in enumerate(results):
+                if result.size:
+                    buffer.set_res(i, result[done : done + count].reshape(-1).data)
+            run()
         done += count
     return results
 
 
 def _shaped(result: Array, name: str, batch: tuple[int, ...]) -> Array:
     _, cols, rows = result.shape
-    if name.startswith("scalar"):
-        return result.reshape(batch)
     if name.startswith("matrix"):
         return np.ascontiguousarray(result.transpose(0, 2, 1)).reshape(*batch, rows, cols)
-    return result.reshape(*batch, rows)
+    whole = np.ascontiguousarray(result)
+    return whole.reshape(batch) if name.startswith("scalar") else whole.reshape(*batch, rows)
 
 
 @lru_cache(maxsize=256)
@@ -235,7 +273,7 @@ def _parts(together: Array, sizes: Sizes) -> list[Array]:
     ]
 
 
-@lru_cache(maxsize=64)
+@_built_once(64)
 def with_jacobian(function: Any, inputs: tuple[int, ...], output: int = 0) -> Any:
     """One output of a function and its Jacobian by the concatenated `inputs`.
 
@@ -254,7 +292,7 @@ def with_jacobian(function: Any, inputs: tuple[int, ...], output: int = 0) -> An
     return ca.Function(name, symbols, results, function.name_in(), names)
 
 
-@lru_cache(maxsize=64)
+@_built_once(64)
 def moved_columns(function: Any, inputs: tuple[int, ...]) -> tuple[Any, tuple[int, ...]]:
     """The first output's Jacobian by concatenated `inputs`, as far as it depends on them.
 
@@ -275,7 +313,7 @@ def moved_columns(function: Any, inputs: tuple[int, ...]) -> tuple[Any, tuple[in
     return made, tuple(columns)
 
 
-@lru_cache(maxsize=16)
+@_built_once(16)
 def jacobians_about(function: Any, still: tuple[float, ...]) -> tuple[Any, Any]:
     """Jacobians of a function where its last values stand still: by all before them, and by them.
 
@@ -311,7 +349,7 @@ def jacobians_about(function: Any, still: tuple[float, ...]) -> tuple[Any, Any]:
     return one, other
 
 
-@lru_cache(maxsize=256)
+@_built_once(256)
 def only(function: Any, *outputs: int) -> Any:
     """The function with some of its outputs alone: what the others need is not computed."""
     names = [function.name_out()[output] for output in outputs]

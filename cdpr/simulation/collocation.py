@@ -7,7 +7,8 @@ velocity and position are its exact integrals. The end point is of order 2 m.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
+from itertools import pairwise
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -70,14 +71,39 @@ def interpolation(m: int, fractions: Array) -> tuple[Array, Array, Array]:
     """Maps from node accelerations to acceleration, velocity and position at fractions (n,).
 
     Returns:
-        Three (n, m) arrays: values, first and second integrals, of the unit segment.
+        Three (n, m) arrays that belong to all callers: values, first and second integrals, of the
+        unit segment.
 
     Source:
         Hairer, Norsett, Wanner 1993, Solving Ordinary Differential Equations I, sec. II.7.
     """
+    return _interpolation(m, np.asarray(fractions, dtype=np.float64).tobytes())
+
+
+@lru_cache(maxsize=64)
+def _interpolation(m: int, fractions: bytes) -> tuple[Array, Array, Array]:
+    """A fit asks for the same instants of its segments in each of its steps."""
     spectrum = table(m).spectrum
-    basis = legendre.legvander(2 * fractions - 1, m + 1)
+    basis = legendre.legvander(2 * np.frombuffer(fractions) - 1, m + 1)
     values, once, twice = (
         basis[:, : m + k] @ (_integral_coefficients(m, k) @ spectrum) for k in range(3)
     )
+    for part in (values, once, twice):
+        part.flags.writeable = False
     return values, once, twice
+
+
+def of_segments(weights: Array, parts: Array, index: np.ndarray) -> Array:
+    """Each row of weights (n, q) times the parts (s, q, c) of its segment, (n, c).
+
+    Args:
+        weights: such as those of `interpolation`.
+        parts: what they weigh.
+        index: the segment of each row, (n,); quickest where neighbours share one.
+    """
+    found = np.empty((len(index), parts.shape[-1]))
+    edges = [0, *(np.flatnonzero(np.diff(index)) + 1).tolist(), len(index)]
+    for first, last in pairwise(edges):
+        if last > first:
+            np.matmul(weights[first:last], parts[index[first]], out=found[first:last])
+    return found

@@ -11,7 +11,7 @@ from freeswing.cdpr.model.batch import Bound, evaluate, only
 from freeswing.cdpr.model.domain import check_domain, domain_problems
 from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.robot import Array, finite
-from freeswing.cdpr.simulation.collocation import Table, interpolation, table
+from freeswing.cdpr.simulation.collocation import Table, interpolation, of_segments, table
 
 NODES = 12
 LONGEST_SEGMENT_S = 0.4
@@ -63,14 +63,23 @@ class Motion:
             ValueError: when a time lies outside the motion.
         """
         index, fractions = self.locate(times_s)
-        step = self.steps_s[index, None]
+        step, before = self.steps_s[index, None], self.rates[index]
         maps = interpolation(self.accelerations.shape[1], fractions)
-        values, once, twice = (
-            np.einsum("nm,nmc->nc", part, self.accelerations[index]) for part in maps
-        )
-        rates = self.rates[index] + step * once
-        zetas = self.zetas[index] + step * fractions[:, None] * self.rates[index] + step**2 * twice
-        return zetas, rates, values
+        values, once, twice = (of_segments(part, self.accelerations, index) for part in maps)
+        zetas = self.zetas[index] + step * fractions[:, None] * before + step**2 * twice
+        return zetas, before + step * once, values
+
+    def poses_at(self, times_s: Array) -> Array:
+        """Pose coordinates alone at times (n,), (n, 6).
+
+        Raises:
+            ValueError: when a time lies outside the motion.
+        """
+        index, fractions = self.locate(times_s)
+        step = self.steps_s[index, None]
+        twice = interpolation(self.accelerations.shape[1], fractions)[2]
+        drifted = self.zetas[index] + step * fractions[:, None] * self.rates[index]
+        return drifted + step**2 * of_segments(twice, self.accelerations, index)
 
     def locate(self, times_s: Array) -> tuple[Array, Array]:
         """Segment index and fraction within it of each time.

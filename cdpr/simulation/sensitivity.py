@@ -7,13 +7,12 @@ its transition, and the chain of transitions the whole motion.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
 from freeswing.cdpr.model.batch import evaluate, jacobians_about, with_jacobian
 from freeswing.cdpr.robot import Array
-from freeswing.cdpr.simulation.collocation import interpolation, table
+from freeswing.cdpr.simulation.collocation import interpolation, of_segments, table
 from freeswing.cdpr.simulation.free_swing import Motion
 
 
@@ -45,7 +44,7 @@ class Linearised:
         step = motion.steps_s[:, None, None]
         nodes, speeds = self.accelerations.reshape(s, m, -1), self.states[:, 6:].reshape(s, 1, -1)
         parts = np.concatenate([speeds, step * nodes], axis=1)
-        rates = _combined(np.column_stack([np.ones(len(index)), once]), parts, index)
+        rates = of_segments(np.column_stack([np.ones(len(index)), once]), parts, index)
         return self.poses_at(times_s), rates.reshape(len(index), 6, -1)
 
     def poses_at(self, times_s: Array) -> Array:
@@ -57,17 +56,7 @@ class Linearised:
         states = self.states.reshape(s, 2, -1) * np.concatenate([np.ones_like(step), step], axis=1)
         parts = np.concatenate([states, step**2 * self.accelerations.reshape(s, m, -1)], axis=1)
         weights = np.column_stack([np.ones(len(index)), fractions, twice])
-        return _combined(weights, parts, index).reshape(len(index), 6, -1)
-
-
-def _combined(weights: Array, parts: Array, index: np.ndarray) -> Array:
-    """Each row of weights (n, q) times the parts (s, q, c) of its segment, (n, c)."""
-    found = np.empty((len(index), parts.shape[-1]))
-    edges = [0, *(np.flatnonzero(np.diff(index)) + 1).tolist(), len(index)]
-    for first, last in pairwise(edges):
-        if last > first:
-            np.matmul(weights[first:last], parts[index[first]], out=found[first:last])
-    return found
+        return of_segments(weights, parts, index).reshape(len(index), 6, -1)
 
 
 def linearise(motion: Motion, still: int = 0) -> Linearised:
@@ -123,8 +112,8 @@ def _segment_changes(motion: Motion, slopes: Array) -> tuple[Array, Array]:
     drifting = by_rates + by_zeta * step * t.nodes[:, None, None]
     right = np.concatenate([by_zeta, drifting, by_rest], axis=-1)
     step = step[..., None]
-    matrix = -(step**2) * (t.twice[:, None, :, None] * by_zeta[:, :, :, None, :])
-    matrix -= step * (t.once[:, None, :, None] * by_rates[:, :, :, None, :])
+    matrix = t.twice[:, None, :, None] * (-(step**2) * by_zeta[:, :, :, None, :])
+    matrix -= t.once[:, None, :, None] * (step * by_rates[:, :, :, None, :])
     matrix = matrix.reshape(s, 6 * m, 6 * m)
     matrix[:, np.arange(6 * m), np.arange(6 * m)] += 1.0
     return matrix, np.linalg.solve(matrix, right.reshape(s, 6 * m, -1)).reshape(s, m, 6, -1)

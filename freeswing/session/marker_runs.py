@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import partial
 
 from freeswing.cdpr.files.problems import DataError, InputError
 from freeswing.cdpr.files.trajectory_files import holds_markers, read_recording
@@ -19,7 +20,10 @@ from freeswing.cdpr.measured.frame_change import moved_recording
 from freeswing.cdpr.measured.pose_errors import PoseErrors
 from freeswing.cdpr.measured.target import Target
 from freeswing.cdpr.measured.trajectory import Trajectory
-from freeswing.session.session_file import Session
+from freeswing.cdpr.system.threads import side_by_side
+from freeswing.session.session_file import Run, Session
+
+Failure = InputError | DataError
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +41,7 @@ class MarkerRuns:
     target: Target | None = None
     layout: SessionLayout | None = None
     runs: dict[str, RunMarkers] = field(default_factory=dict)
-    failures: dict[str, InputError | DataError] = field(default_factory=dict)
+    failures: dict[str, Failure] = field(default_factory=dict)
     layout_failure: DataError | None = None
 
     def trajectory(self, name: str) -> Trajectory | None:
@@ -63,19 +67,10 @@ def read_marker_runs(session: Session, target: Target | None) -> MarkerRuns:
     """
     if target is None or not target.markers:
         return MarkerRuns()
-    examined: dict[str, Examined] = {}
-    failures: dict[str, InputError | DataError] = {}
-    for run in session.runs:
-        try:
-            if run.trajectory is None or not holds_markers(run.trajectory):
-                continue
-            recording = read_recording(run.trajectory)
-            if session.T_base_recorded is not None:
-                recording = moved_recording(recording, session.T_base_recorded)
-            if fixes_poses(recording, target):
-                examined[run.name] = examine(recording, target, run.window_s)
-        except (InputError, DataError) as failure:
-            failures[run.name] = failure
+    read = side_by_side(partial(_read, session, target), session.runs)
+    named = {run.name: one for run, one in zip(session.runs, read, strict=True)}
+    examined = {name: one for name, one in named.items() if isinstance(one, Examined)}
+    failures = {name: one for name, one in named.items() if isinstance(one, Failure)}
     if not examined:
         return MarkerRuns(failures=failures)
     fitted = [run.name for run in session.runs if run.role == "identify" and run.name in examined]
@@ -83,10 +78,33 @@ def read_marker_runs(session: Session, target: Target | None) -> MarkerRuns:
         layout = common_layout(target, [examined[name] for name in fitted or examined])
     except DataError as failure:
         return MarkerRuns(target, None, {}, failures | dict.fromkeys(examined, failure), failure)
+    placed = zip(examined, side_by_side(partial(_placed, layout), examined.values()), strict=True)
     runs: dict[str, RunMarkers] = {}
-    for name, found in examined.items():
-        try:
-            runs[name] = place(found, layout)
-        except DataError as failure:
-            failures[name] = failure
+    for name, one in placed:
+        if isinstance(one, DataError):
+            failures[name] = one
+        else:
+            runs[name] = one
     return MarkerRuns(target, layout, runs, failures)
+
+
+def _read(session: Session, target: Target, run: Run) -> Examined | Failure | None:
+    """A run's markers, why they are not to be had, or None where it has none."""
+    try:
+        if run.trajectory is None or not holds_markers(run.trajectory):
+            return None
+        recording = read_recording(run.trajectory)
+        if session.T_base_recorded is not None:
+            recording = moved_recording(recording, session.T_base_recorded)
+        if fixes_poses(recording, target):
+            return examine(recording, target, run.window_s)
+    except (InputError, DataError) as failure:
+        return failure
+    return None
+
+
+def _placed(layout: SessionLayout, found: Examined) -> RunMarkers | DataError:
+    try:
+        return place(found, layout)
+    except DataError as failure:
+        return failure

@@ -13,6 +13,7 @@ from freeswing.cdpr.model.known_values import prior_whitener, with_effects
 from freeswing.cdpr.robot import Array
 from freeswing.cdpr.simulation.free_swing import Motion
 from freeswing.cdpr.simulation.sensitivity import linearise
+from freeswing.cdpr.system.threads import side_by_side
 from freeswing.ident.diagnose.leave_one_out import Evidence
 from freeswing.ident.diagnose.own_values import OwnValues
 from freeswing.ident.diagnose.variants import effect_of, inside
@@ -73,21 +74,22 @@ def screen(
             parameter = model.parameters[k]
             values[k] = (shapes or {}).get(name, {}).get(parameter.name, parameter.start)
     common = len(amplitudes_of(fit.samples))
-    triangles, counts, own = [], [], []
-    for motion, samples in zip(fit.motions, fit.samples, strict=True):
+
+    def reduced(motion: Motion, samples: Samples) -> tuple[Array, OwnValues | None]:
         mine = values.copy()
         mine[: len(fit.values)] = motion.values
         moved = replace(motion, model=model, values=mine)
-        reduced = reduce_run(
+        found = reduce_run(
             linearise(moved, len(values) - len(fit.values)),
             samples,
             noise_scales,
             motion_shifts(motion, samples, common) if common else None,
             prior_weight=float(np.sqrt(colour)),
         )
-        triangles.append(reduced.rows)
-        own.append(_own_values(reduced, moved, colour))
-        counts.append(_count(samples, model))
+        return found.rows, _own_values(found, moved, colour)
+
+    triangles, own = zip(*side_by_side(reduced, fit.motions, fit.samples), strict=True)
+    counts = [_count(samples, model) for samples in fit.samples]
     evidence = Evidence(
         tuple(s.name for s in fit.samples),
         np.array(triangles),

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy import complex128
+from numpy.typing import NDArray
 
 from freeswing.cdpr.robot import Array
 from freeswing.ident.likelihood.fit_swings import LikelihoodFit
@@ -55,15 +57,29 @@ def mean_log_spectrum(fit: LikelihoodFit, noise_scales: Array) -> tuple[Array, A
     """
     rate = min(1.0 / float(np.median(np.diff(run.times_s))) for run in fit.samples)
     duration = min(run.span_s[1] - run.span_s[0] for run in fit.samples)
-    frequencies = np.arange(LOWEST_HZ, 0.4 * rate, 0.25 / duration)
+    step = 0.25 / duration
+    frequencies = np.arange(LOWEST_HZ, 0.4 * rate, step)
     logs = np.zeros(len(frequencies))
     for motion, run in zip(fit.motions, fit.samples, strict=True):
         white = residuals(motion, run, noise_scales)
         window = np.hanning(len(white))
-        wave = np.exp(-2j * np.pi * np.outer(frequencies, run.times_s)) * window
-        power = np.abs(wave @ white) ** 2 / np.sum(window**2)
+        wave = _transformed(white * window[:, None], run.times_s, len(frequencies), step)
+        power = np.abs(wave) ** 2 / np.sum(window**2)
         logs += np.log(power.mean(axis=1) + 1e-12)
     return frequencies, np.exp(logs / len(fit.samples))
+
+
+def _transformed(series: Array, times_s: Array, count: int, step_hz: float) -> NDArray[complex128]:
+    """Fourier transform of a series (n, c) at `count` frequencies from `LOWEST_HZ`, (count, c).
+
+    Every wave is the product of a coarse one and a fine one: few of them have to be computed.
+    """
+    fine = int(np.ceil(np.sqrt(count)))
+    turns = -2j * np.pi * times_s[:, None]
+    between = np.exp(turns * step_hz * np.arange(fine))[:, :, None] * series[:, None, :]
+    first = LOWEST_HZ + fine * step_hz * np.arange(-(-count // fine))
+    found = np.exp(turns * first).T @ between.reshape(len(series), -1)
+    return found.reshape(-1, series.shape[1])[:count]
 
 
 def common_frequency(fit: LikelihoodFit, noise_scales: Array) -> float:

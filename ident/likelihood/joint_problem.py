@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from freeswing.cdpr.robot import Array
 from freeswing.cdpr.simulation.free_swing import LARGEST_TAIL, Motion, simulate, tails
 from freeswing.cdpr.simulation.nearby import Surroundings
 from freeswing.cdpr.simulation.sensitivity import linearise
+from freeswing.cdpr.system.threads import side_by_side
 from freeswing.ident.judge.consistency import nearest_possible
 from freeswing.ident.likelihood.fit import RANK_LIMIT
 from freeswing.ident.likelihood.payload_runs import Loads
@@ -156,9 +158,11 @@ class Problem:
         Raises:
             ValueError: when one cannot be followed, naming the run.
         """
+        runs = range(len(state.starts))
         motions = tuple(
-            self._followed(state, run, start, near[run] if near else None)
-            for run, start in enumerate(state.starts)
+            side_by_side(
+                partial(self._followed, state), runs, state.starts, near or [None] * len(runs)
+            )
         )
         starts = np.array([np.concatenate([one.zetas[0], one.rates[0]]) for one in motions])
         return replace(state, starts=starts, motions=motions)
@@ -227,12 +231,17 @@ class Problem:
             state: with its motions.
             before: of the state that it came from, or none.
         """
-        reduced, surroundings = [], []
-        for run, (motion, samples) in enumerate(zip(state.motions, self.samples, strict=True)):
+
+        def one(
+            motion: Motion, samples: Samples, near: Surroundings | None
+        ) -> tuple[Reduced, Surroundings]:
             linear = linearise(motion)
-            reduced.append(reduce_run(linear, samples, state.scales))
-            surroundings.append(Surroundings.of(linear, before[run] if before else None))
-        return Linear(tuple(reduced), tuple(surroundings))
+            return reduce_run(linear, samples, state.scales), Surroundings.of(linear, near)
+
+        runs = len(self.samples)
+        found = side_by_side(one, state.motions, self.samples, before or [None] * runs)
+        reduced, surroundings = zip(*found, strict=True)
+        return Linear(reduced, surroundings)
 
     def step(self, state: State, linear: Linear, damping: float) -> Step:
         """A damped Gauss-Newton step from a state with its motions to first order."""

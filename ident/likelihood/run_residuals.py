@@ -24,6 +24,7 @@ from freeswing.cdpr.simulation.sensitivity import Linearised
 from freeswing.ident.runs import Payload
 
 STATE = 12
+BY_ALL = (1, 2, 3, 4)  # all inputs of a model's functions but time
 BLOCK_OF_COLUMNS = 12  # rows a column: 0.2 MB for fifty
 
 
@@ -124,11 +125,9 @@ class Reduced:
 
 def predicted(motion: Motion, times_s: Array) -> Array:
     """What would be measured of the pose at times (n,), all six coordinates, (n, 6)."""
-    zetas, rates, _ = motion.at(times_s)
     if not _changes_measurement(motion):
-        return zetas
-    arguments = (times_s, zetas, rates, motion.inertia, motion.values)
-    return evaluate(motion.model.measured, *arguments)[0]
+        return motion.poses_at(times_s)
+    return evaluate(motion.model.measured, *_measured_from(motion, times_s))[0]
 
 
 def differences(seen: Array, samples: Samples) -> Array:
@@ -268,6 +267,17 @@ def _changes_measurement(motion: Motion) -> bool:
     return any(effect_named(name).changes_measurement for name in motion.model.effects)
 
 
+def _measured_from(motion: Motion, times_s: Array) -> tuple[Array, Array, Array, Array, Array]:
+    """What the model's `measured` takes at times (n,); no rates (zeros) where it uses none."""
+    by_rates = any(6 <= k < STATE for k in moved_columns(motion.model.measured, BY_ALL)[1])
+    if by_rates:
+        zetas, rates, _ = motion.at(times_s)
+    else:
+        zetas = motion.poses_at(times_s)
+        rates = np.zeros_like(zetas)
+    return times_s, zetas, rates, motion.inertia, motion.values
+
+
 def _whitened(off: Array, samples: Samples, scales: Array) -> Array:
     noise = samples.temper * scales[samples.groups]
     return (samples.whitener @ off[..., None])[..., 0] / noise
@@ -278,10 +288,8 @@ def _sample_rows(linear: Linearised, samples: Samples, maps: Array) -> Array:
     motion = linear.motion
     if not _changes_measurement(motion):
         return maps @ linear.poses_at(samples.times_s)
-    zetas, rates, _ = motion.at(samples.times_s)
-    function, columns = moved_columns(motion.model.measured, (1, 2, 3, 4))
-    arguments = (samples.times_s, zetas, rates, motion.inertia, motion.values)
-    slopes = maps @ evaluate(function, *arguments)[0]
+    function, columns = moved_columns(motion.model.measured, BY_ALL)
+    slopes = maps @ evaluate(function, *_measured_from(motion, samples.times_s))[0]
     by_state = np.zeros((*maps.shape[:2], STATE))
     states = [k for k in columns if k < STATE]
     by_state[..., states] = slopes[..., : len(states)]
@@ -321,7 +329,7 @@ def _length_rows(motion: Motion, samples: Samples) -> Array:
 
 def _start_slopes(motion: Motion, function: object) -> tuple[Array, Array]:
     start = (motion.starts_s[0], motion.zetas[0], motion.rates[0], motion.inertia, motion.values)
-    value, slopes = evaluate(with_jacobian(function, (1, 2, 3, 4)), *start)
+    value, slopes = evaluate(with_jacobian(function, BY_ALL), *start)
     return value, slopes
 
 

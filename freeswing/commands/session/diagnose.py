@@ -51,6 +51,7 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
 
     from freeswing.cdpr.effects import catalogue
     from freeswing.cdpr.files.documents import InputError
+    from freeswing.cdpr.system.threads import threads
     from freeswing.doctor.quaternions import refuse_mistaken_quaternions
     from freeswing.ident.diagnose.diagnose import diagnose
     from freeswing.results.diagnosis import Diagnosis
@@ -68,12 +69,13 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
     robot = load_robot(session)
     if is_bench(session, robot):
         return _make_bench(session, console, robot, only)
-    swings = list(load_swings(session, robot, load_target(session)))
+    count = crew.processes or os.cpu_count() or 1
+    with threads(count):
+        swings = list(load_swings(session, robot, load_target(session)))
     refuse_repeated(swings)
     refuse_mistaken_quaternions(swings, robot)
     refuse_exchanged_lengths(swings, robot)
     candidates = None if only is None else tuple(only)
-    count = crew.processes or os.cpu_count() or 1
     found = diagnose(swings, robot, console.progress, count, candidates, crew.executor)
     document = Diagnosis.from_json(found.document())
     _summarise(document, console)
