@@ -292,25 +292,29 @@ def with_jacobian(function: Any, inputs: tuple[int, ...], output: int = 0) -> An
     return ca.Function(name, symbols, results, function.name_in(), names)
 
 
-@_built_once(64)
-def moved_columns(function: Any, inputs: tuple[int, ...]) -> tuple[Any, tuple[int, ...]]:
+@_built_once(128)
+def moved_columns(
+    function: Any, inputs: tuple[int, ...], among: tuple[int, ...] | None = None
+) -> tuple[Any, tuple[int, ...]]:
     """The first output's Jacobian by concatenated `inputs`, as far as it depends on them.
 
     Args:
         function: a casadi Function of SX expressions with column outputs.
         inputs: which inputs to differentiate by, in order.
+        among: columns that are asked for, ascending; None: all.
 
     Returns:
         A function that gives the columns that are not structurally zero, and which these are.
     """
     symbols = [ca.SX.sym(f"x{i}", function.size1_in(i)) for i in range(function.n_in())]
     by = ca.vertcat(*[symbols[i] for i in inputs])
-    jacobian = ca.jacobian(function.call(symbols)[0], by)
-    columns = [k for k in range(jacobian.size2()) if jacobian[:, k].nnz()]
-    results = [ca.densify(jacobian[:, columns])]
+    asked = list(range(by.numel()) if among is None else among)
+    jacobian = ca.jacobian(function.call(symbols)[0], by[asked])
+    moved = [k for k in range(jacobian.size2()) if jacobian[:, k].nnz()]
+    results = [ca.densify(jacobian[:, moved])]
     name = f"{function.name()}_moved"
     made = ca.Function(name, symbols, results, function.name_in(), ["matrix_jacobian"])
-    return made, tuple(columns)
+    return made, tuple(asked[k] for k in moved)
 
 
 @_built_once(16)

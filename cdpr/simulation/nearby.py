@@ -35,8 +35,8 @@ class Surroundings:
 
     Attributes:
         motion: the known one.
-        states: derivatives of the segments' starts by [zeta_0; rates_0; inertia; values],
-            (s, 12, c).
+        columns: which of [zeta_0; rates_0; inertia; values] derivatives are by, (c,).
+        states: derivatives of the segments' starts by these, (s, 12, c).
         accelerations: of the node accelerations, (s, 6 m, c).
         inverses: of the collocation matrices there or nearby, (s, 6 m, 6 m).
         by_start: of a segment's accelerations by its own start, (s, 6 m, 12).
@@ -44,6 +44,7 @@ class Surroundings:
     """
 
     motion: Motion
+    columns: np.ndarray
     states: Array
     accelerations: Array
     inverses: Array
@@ -66,7 +67,9 @@ class Surroundings:
         else:
             inverses = np.linalg.inv(linear.matrices)
         parts = (linear.states, flat, inverses, linear.by_start, linear.ends)
-        return cls(linear.motion, *(part.astype(np.float32, copy=False) for part in parts))
+        return cls(
+            linear.motion, linear.columns, *(part.astype(np.float32, copy=False) for part in parts)
+        )
 
     def motion_at(
         self, zeta: Array, rates: Array, inertia: Array, values: Array, tolerance_m: float
@@ -94,9 +97,8 @@ class Surroundings:
                 values - known.values,
             ]
         )
-        found = known.accelerations + (self.accelerations @ change).reshape(
-            known.accelerations.shape
-        )
+        expected = self.accelerations @ change[self.columns]
+        found = known.accelerations + expected.reshape(known.accelerations.shape)
         aimed = replace(known, inertia=inertia, values=values)
         moved = self._settled(aimed, np.concatenate([zeta, rates]), found, tolerance_m)
         if moved is None or tails(moved).max() > LARGEST_TAIL * tolerance_m:

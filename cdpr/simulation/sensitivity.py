@@ -10,10 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from freeswing.cdpr.model.batch import evaluate, jacobians_about, with_jacobian
+from freeswing.cdpr.model.batch import evaluate, jacobians_about, moved_columns, with_jacobian
 from freeswing.cdpr.robot import Array
 from freeswing.cdpr.simulation.collocation import interpolation, of_segments, table
 from freeswing.cdpr.simulation.free_swing import Motion
+
+STATE = 12
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,14 +24,19 @@ class Linearised:
 
     Attributes:
         motion: the motion.
-        states: of [zeta; rates] at the segment starts, (s, 12, 21 + k).
-        accelerations: of the node accelerations, (s, m, 6, 21 + k).
+        asked: those that were asked for, ascending places in u: by default all; the first twelve
+            always.
+        columns: those of them that are told, (c,); those by the others asked for are zero.
+        states: of [zeta; rates] at the segment starts, (s, 12, c).
+        accelerations: of the node accelerations, (s, m, 6, c).
         matrices: of the collocation equations, one a segment, (s, 6 m, 6 m).
         by_start: derivatives of a segment's node accelerations by its own start, (s, 6 m, 12).
         ends: of the state at a segment's end by that at its start, (s, 12, 12).
     """
 
     motion: Motion
+    asked: np.ndarray
+    columns: np.ndarray
     states: Array
     accelerations: Array
     matrices: Array
@@ -37,7 +44,7 @@ class Linearised:
     ends: Array
 
     def at(self, times_s: Array) -> tuple[Array, Array]:
-        """Derivatives of zeta and of the rates at times (n,), each (n, 6, 21 + k)."""
+        """Derivatives of zeta and of the rates at times (n,), each (n, 6, c)."""
         motion, (s, m) = self.motion, self.accelerations.shape[:2]
         index, fractions = motion.locate(times_s)
         once = interpolation(m, fractions)[1]
@@ -48,7 +55,7 @@ class Linearised:
         return self.poses_at(times_s), rates.reshape(len(index), 6, -1)
 
     def poses_at(self, times_s: Array) -> Array:
-        """Derivatives of zeta alone at times (n,), (n, 6, 21 + k)."""
+        """Derivatives of zeta alone at times (n,), (n, 6, c)."""
         motion, (s, m) = self.motion, self.accelerations.shape[:2]
         index, fractions = motion.locate(times_s)
         twice = interpolation(m, fractions)[2]
@@ -59,12 +66,14 @@ class Linearised:
         return of_segments(weights, parts, index).reshape(len(index), 6, -1)
 
 
-def linearise(motion: Motion, still: int = 0) -> Linearised:
+def linearise(motion: Motion, still: int = 0, wanted: np.ndarray | None = None) -> Linearised:
     """Derivatives of a motion that obeys its equations.
 
     Args:
         motion: the motion.
         still: how many of the last values do nothing where they stand, which is quicker.
+        wanted: by which of the inertia and the values, (9 + k,) booleans; None: by all. What is
+            held costs nothing then.
     """
     t = table(motion.accelerations.shape[1])
     step = motion.steps_s[:, None, None]
@@ -75,14 +84,21 @@ def linearise(motion: Motion, still: int = 0) -> Linearised:
     )
     rates = motion.rates[:, None] + step * (t.once @ motion.accelerations)
     times = motion.starts_s[:, None] + motion.steps_s[:, None] * t.nodes
-    slopes = _slopes(motion, still, times, zetas, rates)
+    asked = np.arange(STATE + motion.inertia.size + motion.values.size)
+    columns = asked
+    if wanted is None:
+        slopes = _slopes(motion, still, times, zetas, rates)
+    else:
+        asked = asked[np.concatenate([np.ones(STATE, dtype=bool), wanted])]
+        slopes, columns = _slopes_by(motion, asked, times, zetas, rates)
     matrices, changes = _segment_changes(motion, slopes)
     states, ends = _chained(motion, changes)
     flat = changes.reshape(len(states), -1, changes.shape[-1])
     total = flat[..., :12] @ states
     total[..., 12:] += flat[..., 12:]
     accelerations = total.reshape(changes.shape)
-    return Linearised(motion, states, accelerations, matrices, flat[..., :12], ends[..., :12])
+    by_start, ends = flat[..., :STATE], ends[..., :STATE]
+    return Linearised(motion, asked, columns, states, accelerations, matrices, by_start, ends)
 
 
 def _slopes(motion: Motion, still: int, *instants: Array) -> Array:
@@ -98,6 +114,18 @@ def _slopes(motion: Motion, still: int, *instants: Array) -> Array:
         for function in jacobians_about(force, numbers)
     ]
     return np.concatenate(parts, axis=-1)
+
+
+def _slopes_by(motion: Motion, asked: np.ndarray, *instants: Array) -> tuple[Array, np.ndarray]:
+    """The same by some columns, (s, m, 6, c), and which of these are told."""
+    function, moved = moved_columns(motion.model.acceleration, (1, 2, 3, 4), tuple(asked.tolist()))
+    found = evaluate(function, *instants, motion.inertia, motion.values)[0]
+    columns = np.union1d(np.arange(STATE), np.array(moved, dtype=np.int64))
+    if len(columns) == len(moved):
+        return found, columns
+    whole = np.zeros((*found.shape[:-1], len(columns)))
+    whole[..., np.searchsorted(columns, moved)] = found
+    return whole, columns
 
 
 def _segment_changes(motion: Motion, slopes: Array) -> tuple[Array, Array]:

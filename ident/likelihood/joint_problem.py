@@ -138,6 +138,11 @@ class Problem:
         self.layout = self.seen.joined(PAYLOADS, self.loads.count)
         self.free = np.ones(self.layout.size, dtype=bool) if free is None else np.array(free)
         self.free[self.layout.place(EFFECTS)][model.own_values] = False
+        self.wanted = self.free[: self.seen.size].copy()
+        self.wanted[self.seen.place(EFFECTS)][model.own_values] = True
+        # What payloads do goes through the inertia that a run sees.
+        through = np.append(self.free[self.seen.place(INERTIA)], self.free[self.seen.size :])
+        self.wanted[self.seen.place(INERTIA)] = through.any()
         self.consistent = consistent
         self.estimate_scales = estimate_scales
         self.tolerance_m = tolerance_m
@@ -235,7 +240,7 @@ class Problem:
         def one(
             motion: Motion, samples: Samples, near: Surroundings | None
         ) -> tuple[Reduced, Surroundings]:
-            linear = linearise(motion)
+            linear = linearise(motion, wanted=self.wanted)
             return reduce_run(linear, samples, state.scales), Surroundings.of(linear, near)
 
         runs = len(self.samples)

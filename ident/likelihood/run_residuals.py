@@ -170,7 +170,8 @@ def reduce_run(
     """Linearise one run's residuals at a motion and eliminate its own unknowns.
 
     Args:
-        linear: the motion's first-order answer.
+        linear: the motion's first-order answer; by unknowns that it was not asked for nothing
+            changes.
         samples: what was measured.
         scales: noise scale of metres and of radians, (2,).
         shifts: what further shared unknowns, which come after the others, add to the measured
@@ -185,22 +186,25 @@ def reduce_run(
     maps = _residual_map(seen, off, samples, scales)
     matrix = _sample_rows(linear, samples, maps)
     white = _whitened(off, samples, scales)
-    size = matrix.shape[-1]
+    count = len(linear.asked)
     further = 0 if shifts is None else shifts.shape[2]
     lengths = lengths_residual(motion, samples)
-    everything = np.zeros((white.size + len(lengths), size + further + 1))
-    everything[: white.size, :size] = matrix.reshape(-1, size)
-    everything[white.size :, :size] = _length_rows(motion, samples)
+    everything = np.zeros((white.size + len(lengths), count + further + 1))
+    everything[: white.size, :count] = matrix.reshape(-1, count)
+    everything[white.size :, :count] = _length_rows(motion, samples)[:, linear.asked]
     everything[:, -1] = np.concatenate([white.reshape(-1), lengths])
     if shifts is not None:
-        everything[: white.size, size:-1] = (maps @ shifts).reshape(white.size, -1)
+        everything[: white.size, count:-1] = (maps @ shifts).reshape(white.size, -1)
     # What follows combines columns: a triangle of them serves as well, and is a hundredth as long.
     triangle = _triangle(everything)
-    rows, beside, right = triangle[:, :size], triangle[:, size:-1], triangle[:, -1]
+    beside, right = triangle[:, count:-1], triangle[:, -1]
+    rows = np.zeros((len(triangle), STATE + motion.inertia.size + motion.values.size))
+    rows[:, linear.asked] = triangle[:, :count]
     basis = _allowed_states(motion)
     directions = STATE - motion.model.robot.n_cables
     body = rows[:, :STATE] @ basis
     shared = body[:, directions:-1] + rows[:, STATE:]
+    shared[:, np.setdiff1d(np.arange(shared.shape[1]), linear.asked[STATE:] - STATE)] = 0.0
     mine = motion.inertia.size + motion.model.own_values
     own = np.hstack([body[:, :directions], shared[:, mine]])
     shared[:, mine] = 0.0
@@ -284,21 +288,24 @@ def _whitened(off: Array, samples: Samples, scales: Array) -> Array:
 
 
 def _sample_rows(linear: Linearised, samples: Samples, maps: Array) -> Array:
-    """Derivatives of the whitened residuals by the unknowns, (n, c, 21 + k)."""
+    """Derivatives of the whitened residuals by the unknowns asked for, (n, c, q)."""
     motion = linear.motion
+    found = np.zeros((*maps.shape[:2], len(linear.asked)))
+    told = np.searchsorted(linear.asked, linear.columns)
     if not _changes_measurement(motion):
-        return maps @ linear.poses_at(samples.times_s)
-    function, columns = moved_columns(motion.model.measured, BY_ALL)
+        found[..., told] = maps @ linear.poses_at(samples.times_s)
+        return found
+    function, columns = moved_columns(motion.model.measured, BY_ALL, tuple(linear.asked.tolist()))
     slopes = maps @ evaluate(function, *_measured_from(motion, samples.times_s))[0]
     by_state = np.zeros((*maps.shape[:2], STATE))
     states = [k for k in columns if k < STATE]
     by_state[..., states] = slopes[..., : len(states)]
     if by_state[..., 6:].any():
         change, change_rates = linear.at(samples.times_s)
-        found = by_state[..., :6] @ change + by_state[..., 6:] @ change_rates
+        found[..., told] = by_state[..., :6] @ change + by_state[..., 6:] @ change_rates
     else:
-        found = by_state[..., :6] @ linear.poses_at(samples.times_s)
-    found[..., list(columns[len(states) :])] += slopes[..., len(states) :]
+        found[..., told] = by_state[..., :6] @ linear.poses_at(samples.times_s)
+    found[..., np.searchsorted(linear.asked, columns[len(states) :])] += slopes[..., len(states) :]
     return found
 
 

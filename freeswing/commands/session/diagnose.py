@@ -70,13 +70,13 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
     if is_bench(session, robot):
         return _make_bench(session, console, robot, only)
     count = crew.processes or os.cpu_count() or 1
+    candidates = None if only is None else tuple(only)
     with threads(count):
         swings = list(load_swings(session, robot, load_target(session)))
-    refuse_repeated(swings)
-    refuse_mistaken_quaternions(swings, robot)
-    refuse_exchanged_lengths(swings, robot)
-    candidates = None if only is None else tuple(only)
-    found = diagnose(swings, robot, console.progress, count, candidates, crew.executor)
+        refuse_repeated(swings)
+        refuse_mistaken_quaternions(swings, robot)
+        refuse_exchanged_lengths(swings, robot)
+        found = diagnose(swings, robot, console.progress, count, candidates, crew.executor)
     document = Diagnosis.from_json(found.document())
     _summarise(document, console)
     motions = ladder_motions(found.ladder)

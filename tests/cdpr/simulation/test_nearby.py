@@ -37,6 +37,20 @@ def test_it_is_what_a_simulation_gives(size: float) -> None:
     assert tails(found).max() <= 4 * TOLERANCE_M
 
 
+def test_slopes_by_what_is_held_are_not_missed() -> None:
+    model, inertia, zeta, rates = swing_start("bologna-4", ("translational_drag",))
+    values = np.array([0.1, 0.3])
+    known = simulate(model, zeta, rates, SPAN_S, inertia, values, TOLERANCE_M)
+    held = linearise(known, wanted=np.zeros(11, dtype=bool))
+    speeds = admissible_rates(model, zeta + 1e-4, rates, inertia, values)
+    arguments = (zeta + 1e-4, speeds, inertia, values, TOLERANCE_M)
+    found = Surroundings.of(held).motion_at(*arguments)
+    whole = Surroundings.of(linearise(known)).motion_at(*arguments)
+    assert found is not None
+    assert whole is not None
+    np.testing.assert_allclose(found.zetas, whole.zetas, atol=TOLERANCE_M)
+
+
 def test_what_is_not_near_is_left_to_a_simulation(monkeypatch: pytest.MonkeyPatch) -> None:
     model, inertia, zeta, rates = swing_start("bologna-4", ())
     values = model.start_values

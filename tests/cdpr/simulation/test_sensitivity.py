@@ -112,3 +112,17 @@ def test_values_that_do_nothing_are_quicker_and_the_same():
     whole, quick = linearise(motion), linearise(motion, still=len(start) - 2)
     for one, other in ((whole.states, quick.states), (whole.accelerations, quick.accelerations)):
         np.testing.assert_allclose(other, one, atol=1e-9 * np.abs(one).max())
+
+
+def test_what_is_held_costs_nothing_and_changes_no_other_slope():
+    effects = ("translational_drag", "attachment_offset", "platform_frame")
+    model, inertia, zeta, rates = swing_start("bologna-4", effects)
+    motion = simulate(model, zeta, rates, (0.0, 1.5), inertia, model.start_values, TIGHT)
+    wanted = np.zeros(9 + len(model.start_values), dtype=bool)
+    wanted[[0, 4, 9, 12, -1]] = True
+    whole, some = linearise(motion), linearise(motion, wanted=wanted)
+    assert some.asked.tolist() == [*range(12), *(12 + np.flatnonzero(wanted))]
+    assert some.columns.tolist() == some.asked[:-1].tolist(), "the frame moves no platform"
+    for one, other in zip(whole.at(TIMES_S), some.at(TIMES_S), strict=True):
+        expected = one[..., some.columns]
+        np.testing.assert_allclose(other, expected, atol=1e-9 * np.abs(expected).max())
