@@ -142,10 +142,7 @@ def evaluate(function: Any, *arguments: Any) -> tuple[Array, ...]:
         ValueError: when an argument's last axis does not fit its input.
     """
     arrays = [np.asarray(argument, dtype=np.float64) for argument in arguments]
-    tails = [
-        () if name.startswith("scalar") else (function.size1_in(i),)
-        for i, name in enumerate(function.name_in())
-    ]
+    tails, sizes, names = _signature(function)
     heads = []
     for i, (array, tail) in enumerate(zip(arrays, tails, strict=True)):
         if tail and array.shape[-1:] != tail:
@@ -155,7 +152,6 @@ def evaluate(function: Any, *arguments: Any) -> tuple[Array, ...]:
             )
         heads.append(array.shape[: array.ndim - len(tail)])
     batch = np.broadcast_shapes(*heads)
-    sizes = [function.size_out(i) for i in range(function.n_out())]
     tape = tape_of(function) if prod(batch) > 1 else None
     if tape is None:
         flat = [
@@ -165,13 +161,21 @@ def evaluate(function: Any, *arguments: Any) -> tuple[Array, ...]:
         results = _interpreted(function, flat, sizes)
     else:
         results = _taped(tape, batch, arrays, tails, sizes)
-    return tuple(
-        _shaped(result, name, batch)
-        for result, name in zip(results, function.name_out(), strict=True)
-    )
+    return tuple(_shaped(result, name, batch) for result, name in zip(results, names, strict=True))
 
 
 Sizes = list[tuple[int, int]]
+
+
+@_built_once(256)
+def _signature(function: Any) -> tuple[list[tuple[int, ...]], Sizes, list[str]]:
+    """Trailing axes of each input, rows and columns of each output, and the outputs' names."""
+    tails = [
+        () if name.startswith("scalar") else (function.size1_in(i),)
+        for i, name in enumerate(function.name_in())
+    ]
+    sizes = [function.size_out(i) for i in range(function.n_out())]
+    return tails, sizes, function.name_out()
 
 
 def _taped(

@@ -20,10 +20,9 @@ from freeswing.cdpr.model.free_motion import coordinate_indices
 from freeswing.cdpr.robot import POSE_COORDINATES, Array
 from freeswing.cdpr.rotation import angle_rate_matrix, log_slope, pose_differences
 from freeswing.cdpr.simulation.free_swing import Motion
-from freeswing.cdpr.simulation.sensitivity import Linearised
+from freeswing.cdpr.simulation.sensitivity import STATE, Linearised
 from freeswing.ident.runs import Payload
 
-STATE = 12
 BY_ALL = (1, 2, 3, 4)  # all inputs of a model's functions but time
 BLOCK_OF_COLUMNS = 12  # rows a column: 0.2 MB for fifty
 
