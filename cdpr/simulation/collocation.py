@@ -100,6 +100,10 @@ def of_segments(weights: Array, parts: Array, index: np.ndarray) -> Array:
         weights: such as those of `interpolation`.
         parts: what they weigh.
         index: the segment of each row, (n,); quickest where neighbours share one.
+
+    Source:
+        Hairer, Norsett, Wanner 1993, Solving Ordinary Differential Equations I, sec. II.6:
+        continuous output.
     """
     found = np.empty((len(index), parts.shape[-1]))
     edges = [0, *(np.flatnonzero(np.diff(index)) + 1).tolist(), len(index)]
