@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
 
@@ -49,6 +50,14 @@ def kept(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     return tmp_path / "kept" / "kernels"
 
 
+@pytest.fixture(autouse=True)
+def forgotten() -> Iterator[None]:
+    """Modules stay until the test's end: a kernel that is read from the disk asks for its own."""
+    yield
+    for name in ("called", "caller"):
+        sys.modules.pop(name, None)
+
+
 def imported(folder: Path, called: str = CALLED, caller: str = CALLER) -> ModuleType:
     """The caller's module, from files written anew to a folder."""
     folder.mkdir(exist_ok=True)
@@ -63,8 +72,7 @@ def imported(folder: Path, called: str = CALLED, caller: str = CALLER) -> Module
             text, str(path), "exec", dont_inherit=True
         )  # a file as old and as long as the last one
         exec(code, sys.modules[name].__dict__)
-    sys.modules.pop("called")
-    return sys.modules.pop("caller")
+    return sys.modules["caller"]
 
 
 def files(kept: Path) -> list[str]:
