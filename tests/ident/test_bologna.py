@@ -16,7 +16,7 @@ from freeswing.session.session_file import read_session
 from tests.places import REAL, needs_real
 
 FOLDER = REAL / "bologna-2020"
-pytestmark = needs_real("bologna-2020")
+pytestmark = [pytest.mark.slow, needs_real("bologna-2020")]
 
 
 @pytest.fixture(scope="module")
@@ -119,7 +119,6 @@ def test_chosen_free_coordinates_make_free_and_full_agree(session):
     assert abs(full[2] - 0.2011) < 0.001, f"com_z {full[2]}"
 
 
-@pytest.mark.slow
 def test_both_methods_agree_on_the_real_robot(session):
     """Maximum likelihood by poses and by x, y alone: within three of their own deviations."""
     robot, runs = session

@@ -112,6 +112,7 @@ def test_any_bytes_read_or_are_refused(tmp_path_factory, name, data):
     assert survives(path)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not BOLOGNA.exists(), reason=f"the recorded session {BOLOGNA} is absent")
 def test_recorded_runs_load_fast_and_fit_to_their_noise():
     target, geometry = read_target(BOLOGNA / "target.toml"), read_robot(BOLOGNA / "robot.toml")

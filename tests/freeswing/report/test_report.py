@@ -188,6 +188,7 @@ PROBE = """<script>onload = () => {
 }</script>"""
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")
 @pytest.mark.parametrize("width", [1280, 390])
 def test_a_browser_shows_it_without_overflow(page: str, tmp_path: Path, width: int) -> None:

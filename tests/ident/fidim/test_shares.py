@@ -67,6 +67,7 @@ def sessions() -> list[tuple[Estimate, np.ndarray]]:
     return found
 
 
+@pytest.mark.slow
 def test_intervals_of_free_coordinates_hold_the_truth(sessions) -> None:
     """With stated lengths off by their 0.3 mm, uneven noise and a smoother."""
     z = np.array([(one.values - truth) / one.std for one, truth in sessions])
@@ -74,6 +75,7 @@ def test_intervals_of_free_coordinates_hold_the_truth(sessions) -> None:
     assert np.sqrt(np.mean(z**2)) > 0.4, f"{np.round(z, 1)}: deviations far too wide"
 
 
+@pytest.mark.slow
 def test_published_deviations_alone_do_not(sessions) -> None:
     """Without what the shares hold the same solutions are many deviations off."""
     stds = np.array([one.extra["published_std"] for one, _ in sessions])

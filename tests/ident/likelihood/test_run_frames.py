@@ -54,6 +54,7 @@ def both() -> tuple[Array, Array]:
     return np.array(told), np.array(blind)
 
 
+@pytest.mark.slow
 def test_claimed_deviations_hold_where_frames_differ(both: tuple[Array, Array]) -> None:
     told, _ = both
     z = told[:, 0] / told[:, 1]
@@ -62,6 +63,7 @@ def test_claimed_deviations_hold_where_frames_differ(both: tuple[Array, Array]) 
     assert np.abs(z).max() < 4.0, np.round(z, 1)
 
 
+@pytest.mark.slow
 def test_frames_that_are_unknowns_leave_smaller_errors(both: tuple[Array, Array]) -> None:
     told, blind = (np.sqrt(np.mean(one[:, 0] ** 2, axis=0)) for one in both)
     ratio = float(np.exp(np.mean(np.log(told / blind))))
