@@ -73,7 +73,9 @@ class Tape:
     def bound(self, points: Array, results: Array) -> Callable[[], None]:
         """What runs the tape over the same memory each time, for tight loops."""
         n = len(points)
-        fitting = interpreter(lanes_for(n))
+        # Machine code that a second thread made too would end with it, and run no more.
+        with _CASADI:
+            fitting = interpreter(lanes_for(n))
         work = _on_a_line(self.slots * fitting.lanes)
         arrays = (self.code, self.constants, points, results, work)
         code, constants, first, into, scratch = (array.ctypes.data for array in arrays)
@@ -83,7 +85,7 @@ class Tape:
             *(into, self.outputs, scratch),
         )
 
-        def run(keep: object = arrays) -> None:
+        def run(keep: object = (arrays, fitting)) -> None:
             call()
 
         return run

@@ -1,12 +1,16 @@
 """Threads share independent work and change nothing of it."""
 
 import threading
+import time
+from functools import cache
 
 import casadi as ca
 import numpy as np
 import pytest
 
-from freeswing.cdpr.model.batch import evaluate, with_jacobian
+from freeswing.cdpr.compiled import interpreter as compiled
+from freeswing.cdpr.model import batch
+from freeswing.cdpr.model.batch import evaluate, tape_of, with_jacobian
 from freeswing.cdpr.system.threads import side_by_side, threads
 
 x = ca.SX.sym("x", 3)
@@ -51,3 +55,30 @@ def test_the_first_failure_in_order_is_raised():
 
     with threads(3), pytest.raises(ValueError, match="run 2"):
         side_by_side(fails, range(6))
+
+
+def test_machine_code_is_made_by_one_thread_and_lives_as_long_as_it_runs(monkeypatch):
+    made = []
+
+    @cache
+    def slowly(lanes):
+        made.append(lanes)
+        time.sleep(0.05)
+        return compiled.interpreter.__wrapped__(lanes)
+
+    monkeypatch.setattr(batch, "interpreter", slowly)
+    tape, points = tape_of(SWING), np.ones((12, 3))
+    together = threading.Barrier(4)
+
+    def run(_):
+        together.wait(timeout=20.0)
+        return tape.run(points)
+
+    with threads(4):
+        found = side_by_side(run, range(4))
+    assert len(made) == 1, made
+    results = np.empty((12, tape.outputs))
+    bound = tape.bound(points, results)
+    slowly.cache_clear()
+    bound()
+    np.testing.assert_array_equal(results, found[0])
