@@ -58,16 +58,17 @@ def test_the_first_failure_in_order_is_raised():
 
 
 def test_machine_code_is_made_by_one_thread_and_lives_as_long_as_it_runs(monkeypatch):
-    made = []
+    made, made_here = [], compiled.interpreter.__wrapped__
 
     @cache
     def slowly(lanes):
         made.append(lanes)
         time.sleep(0.05)
-        return compiled.interpreter.__wrapped__(lanes)
+        return made_here(lanes)
 
     monkeypatch.setattr(batch, "interpreter", slowly)
     tape, points = tape_of(SWING), np.ones((12, 3))
+    assert tape is not None
     together = threading.Barrier(4)
 
     def run(_):
