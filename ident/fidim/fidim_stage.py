@@ -73,13 +73,15 @@ def fidim_estimates(
             failures[name] = _unusable_sentence(left_out(prepared, full))
             continue
         try:
-            raw = fidim([regressor(model, motion_of(run, full)) for run in unloaded])
+            equations = _equations(model, unloaded, full)
+            raw = fidim(equations)
             slack = _slack_runs(model, prepared, within_reach(raw), full)
             if slack:
                 prepared = without(prepared, slack)
-                unloaded = usable(prepared, full, None)
-                raw = fidim([regressor(model, motion_of(run, full)) for run in unloaded])
-            entry = _completed(model, prepared, raw, full, weighting, settings)
+                equations = _equations(model, usable(prepared, full, None), full)
+                raw = fidim(equations)
+            stack = Stack(equations, raw.essential)
+            entry = _completed(model, prepared, raw, stack, full, weighting, settings)
             found[name] = _consistent(entry, consistent)
         except (ValueError, np.linalg.LinAlgError) as error:
             failures[name] = str(error)
@@ -93,6 +95,7 @@ def _completed(
     model: Model,
     prepared: PreparedRuns,
     raw: FidimEstimate,
+    stack: Stack,
     full: bool,
     weighting: Weighting,
     settings: SignalSettings | None,
@@ -106,7 +109,8 @@ def _completed(
             weighted = weighted_fidim(noisy, raw.values)
         except (ValueError, np.linalg.LinAlgError) as error:
             notes.append(f"as published: the weighted form cannot be had ({error})")
-    shares = _shares(model, unloaded, raw, full, settings, noisy if weighted is None else [])
+    uneven = noisy if weighted is None else []
+    shares = _shares(model, unloaded, stack, full, settings, uneven)
     scatter = raw.solution.covariance if weighted is None else weighted.covariance
     if said := shares_sentence(shares, np.sqrt(np.diag(scatter))):
         notes.append(said)
@@ -118,6 +122,10 @@ def _completed(
     return replace(entry, mass=mass, notes=(*entry.notes, *why), without_run=without_run)
 
 
+def _equations(model: Model, runs: list[PreparedRun], full: bool) -> list[Array]:
+    return [regressor(model, motion_of(run, full)) for run in runs]
+
+
 def _noisy(model: Model, runs: list[PreparedRun], full: bool) -> list[NoisyRegressor]:
     return [noisy_regressor(model, signals_used(run, full), motion_of(run, full)) for run in runs]
 
@@ -125,13 +133,12 @@ def _noisy(model: Model, runs: list[PreparedRun], full: bool) -> list[NoisyRegre
 def _shares(
     model: Model,
     runs: list[PreparedRun],
-    raw: FidimEstimate,
+    stack: Stack,
     full: bool,
     settings: SignalSettings | None,
     noisy: list[NoisyRegressor],
 ) -> list[Share]:
     """What moves a solution beside its equations' scatter; `noisy` where columns count alike."""
-    stack = Stack([regressor(model, motion_of(run, full)) for run in runs], raw.essential)
     found = [calibration_share(model, runs, full, stack)]
     if settings is not None:
         found.append(None if full else length_share(model, runs, stack))
@@ -191,9 +198,11 @@ def _mass(
     for payload in payloads.values():
         runs = usable(prepared, full, payload)
         try:
-            one = fidim([regressor(model, motion_of(run, full)) for run in runs])
+            equations = _equations(model, runs, full)
+            one = fidim(equations)
             noisy = _noisy(model, runs, full) if settings else []
-            shares = _shares(model, runs, one, full, settings, noisy)
+            stack = Stack(equations, one.essential)
+            shares = _shares(model, runs, stack, full, settings, noisy)
         except (ValueError, np.linalg.LinAlgError) as error:
             notes.append(f"payload of {payload.mass_kg:g} kg not used: {error}")
             continue
