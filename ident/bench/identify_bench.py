@@ -21,11 +21,7 @@ from freeswing.ident.bench.told.classic import (
     held_sentences,
     leaning_sentence,
 )
-from freeswing.ident.bench.told.contradicted import (
-    exchange_sentence,
-    group_sentence,
-    wires_sentence,
-)
+from freeswing.ident.bench.told.contradicted import contradictions, exchange_sentence
 from freeswing.ident.bench.told.envelope import Envelope, envelopes, law_chances
 from freeswing.ident.bench.told.held_out import HeldOut, held_out
 from freeswing.ident.bench.told.report_objects import (
@@ -211,8 +207,8 @@ def _part(signal: Signal, inside: Array) -> Signal:
 
 def _notes(found: Solved, bench: Bench, robot: Robot) -> list[str]:
     fitted = [run for run in bench.runs if run.role == "identify"]
-    contradicted = (group_sentence(found), wires_sentence(found), exchange_sentence(fitted))
-    notes = [one for one in contradicted if one]
+    notes = contradictions(found)
+    notes += filter(None, [exchange_sentence(fitted)])
     notes += held_sentences(found)
     if bench.loads and found.mass is None and bench.mass_std_kg is None:
         notes.append(

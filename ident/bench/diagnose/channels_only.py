@@ -15,8 +15,6 @@ from freeswing.ident.bench.assemble import EFFECTS
 from freeswing.ident.bench.diagnose.causes import ALL_WIRES, LENGTHS
 from freeswing.ident.bench.diagnose.entries import (
     CLAMPS,
-    FORMAT,
-    NOTHING_LEFT,
     WIRES_GROUP,
     found_entry,
     granted_entry,
@@ -25,6 +23,7 @@ from freeswing.ident.bench.diagnose.entries import (
     mass_found,
     removed_entry,
     told_entry,
+    unscaled_document,
 )
 from freeswing.ident.bench.diagnose.removal import Removed, removals
 from freeswing.ident.bench.diagnose.search import Ground
@@ -32,9 +31,9 @@ from freeswing.ident.bench.diagnose.weigh import Fit
 from freeswing.ident.bench.identify_bench import BenchResult
 from freeswing.ident.bench.solve import WiresVerdict
 from freeswing.ident.bench.told.contradicted import (
-    group_sentence,
+    contradictions,
+    payload_reasons,
     surely_contradicted,
-    wires_sentence,
 )
 from freeswing.ident.bench.told.held_out import HeldOut
 
@@ -74,8 +73,7 @@ def channels_document(found: ByChannels) -> dict[str, Any]:
     solved = found.identified.solved
     rows = [removed_entry(one) for one in found.removed]
     accepted = [granted_entry(one) for one in found.removed if one.accepted]
-    mass = group_sentence(solved)
-    if mass:
+    if payload_reasons(solved):
         rows.append(mass_candidate(solved))
         accepted += [mass_found(solved)] if surely_contradicted(solved) else []
     if solved.wires is not None:
@@ -87,16 +85,9 @@ def channels_document(found: ByChannels) -> dict[str, Any]:
         for name in catalogue()
         if name not in looked_for
     ]
-    contradicted = [one for one in (mass, wires_sentence(solved)) if one]
-    predicted = [_predicted(one) for one in found.identified.validation]
-    return {
-        "format": FORMAT,
-        "candidates": rows,
-        "accepted": accepted,
-        "ladder": [],
-        "unexplained": NOTHING_LEFT,
-        "notes": [f"cannot tell more: {CHANNELS_ONLY}", *contradicted, *filter(None, predicted)],
-    }
+    predicted = filter(None, map(_predicted, found.identified.validation))
+    notes = [f"cannot tell more: {CHANNELS_ONLY}", *contradictions(solved), *predicted]
+    return unscaled_document(rows, accepted, notes)
 
 
 def _wires_row(wires: WiresVerdict) -> dict[str, Any]:

@@ -13,7 +13,6 @@ from freeswing.ident.bench.diagnose.entries import (
     CLAMPS,
     EXCHANGE,
     FORMAT,
-    NOTHING_LEFT,
     WIRES_GROUP,
     found_entry,
     granted_entry,
@@ -22,13 +21,14 @@ from freeswing.ident.bench.diagnose.entries import (
     mass_found,
     removed_entry,
     told_entry,
+    unscaled_document,
 )
 from freeswing.ident.bench.diagnose.search import Word
 from freeswing.ident.bench.diagnose.shown import Shown
 from freeswing.ident.bench.diagnose.unexplained import remaining
 from freeswing.ident.bench.solve import Solved
 from freeswing.ident.bench.swing import COMMON
-from freeswing.ident.bench.told.contradicted import group_sentence, wires_sentence
+from freeswing.ident.bench.told.contradicted import contradictions, group_sentence
 from freeswing.ident.bench.told.report_objects import objects_document, platform_rows
 from freeswing.ident.bench.told.scatter import is_systematic, scatter_sentence
 from freeswing.ident.diagnose.decision import RIVAL
@@ -85,16 +85,9 @@ def bench_document(found: BenchDiagnosis | ByChannels | CannotTell) -> dict[str,
 
 def _cannot_tell(found: CannotTell) -> dict[str, Any]:
     """Every effect untold, and what `identify` says that runs contradict."""
-    solved = found.identified.solved
-    contradicted = [one for one in (group_sentence(solved), wires_sentence(solved)) if one]
-    return {
-        "format": FORMAT,
-        "candidates": [told_entry(n, "not_identifiable", found.reason) for n in catalogue()],
-        "accepted": [],
-        "ladder": [],
-        "unexplained": NOTHING_LEFT,
-        "notes": [f"cannot tell: {found.reason}", *contradicted],
-    }
+    rows = [told_entry(n, "not_identifiable", found.reason) for n in catalogue()]
+    notes = [f"cannot tell: {found.reason}", *contradictions(found.identified.solved)]
+    return unscaled_document(rows, [], notes)
 
 
 def _unexplained(found: BenchDiagnosis) -> dict[str, Any]:

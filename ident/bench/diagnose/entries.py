@@ -30,6 +30,20 @@ CLAMPS = (
 )
 
 
+def unscaled_document(
+    candidates: list[dict[str, Any]], accepted: list[dict[str, Any]], notes: list[str]
+) -> dict[str, Any]:
+    """A diagnosis.json without `before` and `after`, of which runs have nothing to say."""
+    return {
+        "format": FORMAT,
+        "candidates": candidates,
+        "accepted": accepted,
+        "ladder": [],
+        "unexplained": NOTHING_LEFT,
+        "notes": notes,
+    }
+
+
 def told_entry(effect: str, verdict: str, reason: str, **more: Any) -> dict[str, Any]:
     """A row of `candidates`."""
     empty = {"delta_bic": None, "held_out_gain": None, "probability": None, "confounded_with": []}

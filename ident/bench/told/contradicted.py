@@ -88,6 +88,11 @@ def surely_contradicted(solved: Solved) -> bool:
     return abs(mass.fitted_kg - mass.declared_kg) > CONTRADICTED * std
 
 
+def contradictions(solved: Solved) -> list[str]:
+    """What runs contradict of the stated mass and wire lengths, a sentence each."""
+    return [one for one in (group_sentence(solved), wires_sentence(solved)) if one]
+
+
 def group_sentence(solved: Solved) -> str:
     """What runs with a known mass cannot tell apart, where they contradict the robot file."""
     mass, reasons = solved.mass, payload_reasons(solved)
