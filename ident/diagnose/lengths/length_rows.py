@@ -64,18 +64,11 @@ class LengthRows:
 def measured_rates(times_s: Array, values: Array) -> Array:
     """Time derivatives of samples (n, c) at their times (n,), by cubics over `RATES_OVER_S`.
 
-    A simulated motion would not do: where the model lacks much it is out of phase after a while.
-
     Source:
         Savitzky, Golay 1964, Smoothing and Differentiation of Data by Simplified Least
         Squares.
     """
-    step = float(np.median(np.diff(times_s)))
-    grid = np.arange(times_s[0], times_s[-1] + 0.5 * step, step)
-    even = np.array([np.interp(grid, times_s, column) for column in values.T])
-    width = min(2 * round(0.5 * RATES_OVER_S / step) + 1, len(grid) - 1 + len(grid) % 2)
-    rates = local_derivatives(even, max(width, 5), 3, 1, step)
-    return np.array([np.interp(times_s, grid, row) for row in rates]).T
+    return local_derivatives(times_s, values, RATES_OVER_S, 3, 1)
 
 
 def length_rows(
