@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,13 +15,20 @@ import numpy as np
 
 from freeswing.calib.camera.camera import Camera
 from freeswing.calib.camera.lens_models import FISHEYE
-from freeswing.calib.exchange.lens import ODD_ENTRY, distortion, lens, matrix, shortest, usable
+from freeswing.calib.exchange.lengths import in_metres
+from freeswing.calib.exchange.lens import (
+    ODD_ENTRY,
+    distortion,
+    lens,
+    matrix,
+    of_matrix,
+    shortest,
+    usable,
+)
 from freeswing.cdpr.files.documents import InputError, dump_toml, read_text
 from freeswing.cdpr.rotation import exp_rotation, log_rotation, transform
 
 _MOST_BYTES = 1 << 24
-FARTHEST_M = 60.0
-"""Laboratories are smaller; in millimetres it would be 6 cm, and no rig is that small."""
 
 
 def read(path: Path, tell: Callable[[str], None]) -> tuple[Camera, ...]:
@@ -45,7 +51,7 @@ def read(path: Path, tell: Callable[[str], None]) -> tuple[Camera, ...]:
             cameras.append(_camera(key, entry))
         except ODD_ENTRY as error:
             raise InputError(f"{path}: {key}: {error}") from error
-    return _in_metres(path, tuple(cameras), tell)
+    return in_metres(path, tuple(cameras), tell)
 
 
 def _has_pose(entry: dict[str, Any]) -> bool:
@@ -56,20 +62,6 @@ def _name(key: str, entry: dict[str, Any]) -> str:
     return str(entry.get("name", entry.get("cam_id", key)))
 
 
-def _in_metres(
-    path: Path, cameras: tuple[Camera, ...], tell: Callable[[str], None]
-) -> tuple[Camera, ...]:
-    farthest = max(float(np.linalg.norm(camera.position_base_m)) for camera in cameras)
-    if farthest < FARTHEST_M:
-        return cameras
-    tell(
-        f"{path}: cameras up to {farthest:.4g} units from the origin: taken for millimetres "
-        f"({1e-3 * farthest:.3g} m)"
-    )
-    poses = [transform(c.T_camera_base[:3, :3], 1e-3 * c.T_camera_base[:3, 3]) for c in cameras]
-    return tuple(replace(c, T_camera_base=T) for c, T in zip(cameras, poses, strict=True))
-
-
 def _camera(key: str, entry: dict[str, Any]) -> Camera:
     if int(entry.get("rotation_count", 0)) % 4:
         raise InputError(
@@ -77,10 +69,10 @@ def _camera(key: str, entry: dict[str, Any]) -> Camera:
             "it is shown, and whether lens and pose are of the turned one the file does not say: "
             "turn the recordings, calibrate them with rotation_count = 0"
         )
-    K = np.array(entry["matrix"], dtype=np.float64).reshape(3, 3)
+    focal, centre = of_matrix(entry["matrix"])
     fisheye = bool(entry.get("fisheye", False))
     coefficients = np.array(entry["distortions"], dtype=np.float64)
-    model, params = lens(K[[0, 1], [0, 1]], K[:2, 2], coefficients, fisheye=fisheye)
+    model, params = lens(focal, centre, coefficients, fisheye=fisheye)
     turn = usable(entry.get("rotation", np.zeros(3)), "rotation")
     R = turn.reshape(3, 3) if turn.size == 9 else exp_rotation(turn.reshape(3))
     shift = usable(entry.get("translation", np.zeros(3)), "translation").reshape(3)

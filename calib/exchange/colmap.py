@@ -31,22 +31,22 @@ def read(path: Path, tell: Callable[[str], None]) -> tuple[Camera, ...]:
     Where images of several folders have one name, the folders name the cameras.
     """
     folder = path if path.is_dir() else path.parent
-    return read_text_model(folder, folder)
+    return read_text_model(folder, folder, tell)
 
 
-def read_text_model(folder: Path, named: Path) -> tuple[Camera, ...]:
+def read_text_model(folder: Path, named: Path, tell: Callable[[str], None]) -> tuple[Camera, ...]:
     """The cameras of a text model that the user knows under another name.
 
     Raises:
         InputError: when it is none.
     """
     try:
-        return _cameras(folder)
+        return _cameras(folder, tell)
     except ODD_ENTRY as error:
         raise InputError(f"{named}: not COLMAP's text model: {str(error)[:200]}") from error
 
 
-def _cameras(folder: Path) -> tuple[Camera, ...]:
+def _cameras(folder: Path, tell: Callable[[str], None]) -> tuple[Camera, ...]:
     lenses: dict[str, tuple[str, tuple[int, int], np.ndarray]] = {}
     for row in _rows(folder / "cameras.txt"):
         number, model, width, height, *params = row
@@ -56,7 +56,13 @@ def _cameras(folder: Path) -> tuple[Camera, ...]:
         values[_centre(model)] -= HALF_PIXEL
         lenses[number] = (model, (int(width), int(height)), values)
     cameras = []
-    images = [row for row in _images(folder / "images.txt") if len(row) > 9 and row[8] in lenses]
+    stated = [row for row in _images(folder / "images.txt") if len(row) > 9]
+    images = [row for row in stated if row[8] in lenses]
+    for row in stated:
+        if row[8] not in lenses:
+            tell(f"image {' '.join(row[9:])}: its camera {row[8]} is not in cameras.txt: left out")
+    for number in sorted(set(lenses) - {row[8] for row in images}):
+        tell(f"camera {number} of cameras.txt took no image that has a pose: left out")
     stems = [Path(" ".join(row[9:])).with_suffix("") for row in images]
     names = distinct_names([stem.parts for stem in stems], [row[0] for row in images])
     for row, name in zip(images, names, strict=True):

@@ -51,7 +51,7 @@ def read(path: Path, tell: Callable[[str], None]) -> tuple[Camera, ...]:
     folder = path if path.is_dir() else path.parent
     with tempfile.TemporaryDirectory() as text:
         _converted(folder, Path(text), "text")
-        return colmap.read_text_model(Path(text), folder)
+        return colmap.read_text_model(Path(text), folder, tell)
 
 
 def write(path: Path, cameras: Sequence[Camera]) -> None:

@@ -7,6 +7,7 @@ first camera. Kalibr's pixel (0, 0) is the centre of the top-left pixel, as here
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -33,31 +34,48 @@ def read(path: Path, tell: Callable[[str], None]) -> tuple[Camera, ...]:
     no_poses = not any({"T_cam_imu", "T_cn_cnm1"} & set(entry) for entry in entries.values())
     if no_poses and len(entries) > 1:
         tell(f"{path}: holds no poses: all its cameras stand at the origin")
-    poses: dict[str, Array] = {}
+    poses = {key: np.eye(4) for key in keys} if no_poses else _poses(path, keys, entries)
     cameras: list[Camera] = []
     for key, name in zip(keys, distinct_names(topics, keys), strict=True):
         try:
-            before = keys[keys.index(key) - 1] if key != keys[0] and not no_poses else None
-            pose = _pose(entries[key], before, poses)
-            if pose is None:
-                tell(f"{path}: {key}: nothing joins it to {before} and so to the others: left out")
+            if key not in poses:
+                tell(f"{path}: {key}: nothing joins it to the others: left out")
                 continue
-            poses[key] = pose
-            cameras.append(_camera(name, entries[key], pose))
+            cameras.append(_camera(name, entries[key], poses[key]))
         except ODD_ENTRY as error:
             raise InputError(f"{path}: {key}: {error}") from error
     return tuple(cameras)
 
 
-def _pose(entry: dict[str, Any], before: str | None, poses: dict[str, Array]) -> Array | None:
-    """T_cam_base; None for a camera that nothing joins to the others."""
-    if "T_cam_imu" in entry:
-        return usable(entry["T_cam_imu"], "T_cam_imu")
-    if before is None:
-        return np.eye(4)
-    if "T_cn_cnm1" in entry and before in poses:
-        return usable(entry["T_cn_cnm1"], "T_cn_cnm1") @ poses[before]
-    return None
+def _poses(path: Path, keys: list[str], entries: dict[str, dict[str, Any]]) -> dict[str, Array]:
+    """T_cam_base of all that are joined, the links followed both ways.
+
+    The IMU is the base where one camera knows it, else the first camera.
+    """
+    poses: dict[str, Array] = {}
+    links: list[tuple[str, str, Array]] = []
+    for before, key in zip([None, *keys], keys, strict=False):
+        try:
+            if "T_cam_imu" in entries[key]:
+                poses[key] = usable(entries[key]["T_cam_imu"], "T_cam_imu").reshape(4, 4)
+            if "T_cn_cnm1" in entries[key] and before is not None and _on_end(before, key):
+                link = usable(entries[key]["T_cn_cnm1"], "T_cn_cnm1").reshape(4, 4)
+                links.append((before, key, link))
+        except ODD_ENTRY as error:
+            raise InputError(f"{path}: {key}: {error}") from error
+    poses = poses or {keys[0]: np.eye(4)}
+    for before, key, link in [*links, *links[::-1]]:
+        if before in poses and key not in poses:
+            poses[key] = link @ poses[before]
+        elif key in poses and before not in poses:
+            poses[before] = invert(link) @ poses[key]
+    return poses
+
+
+def _on_end(before: str, key: str) -> bool:
+    """Whether a camera's number follows the other's: `T_cn_cnm1` is the way from the last one."""
+    numbers = [re.findall(r"\d+", name) for name in (before, key)]
+    return not all(numbers) or int(numbers[1][-1]) == int(numbers[0][-1]) + 1
 
 
 def _camera(name: str, entry: dict[str, Any], pose: Array) -> Camera:
@@ -67,6 +85,8 @@ def _camera(name: str, entry: dict[str, Any], pose: Array) -> Camera:
     if kind not in ("radtan", "plumb_bob", "equidistant", "none"):
         raise InputError(f"distortion_model {kind!r} is not radtan, equidistant or none")
     values = np.array(entry["intrinsics"], dtype=np.float64)
+    if values.shape != (4,):
+        raise InputError(f"intrinsics {values.tolist()} are not fu fv pu pv of a pinhole")
     coefficients = np.array(entry.get("distortion_coeffs", []), dtype=np.float64)
     model, params = lens(values[:2], values[2:4], coefficients, fisheye=kind == "equidistant")
     width, height = (int(size) for size in entry["resolution"])

@@ -15,6 +15,7 @@ _MOST_COEFFICIENTS = 8
 # What numbers, lists and texts in each other's place lead to.
 ODD_ENTRY = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError)
 _MOST = 1e9
+_SKEW = 1e-6  # of the focal length: what is stated has some digits, what is rounded has not
 
 
 def usable(values: object, what: str) -> Array:
@@ -61,6 +62,32 @@ def shortest(coefficients: Array, lengths: tuple[int, ...]) -> Array:
         f"the lens uses {used} distortion coefficients, this format holds {lengths[-1]}; calibrate "
         "with --model OPENCV or use another format"
     )
+
+
+def of_matrix(K: Array) -> tuple[Array, Array]:
+    """Focal lengths and principal point of a camera matrix, (2,) each.
+
+    Raises:
+        InputError: for one with a skew, or that is none.
+
+    Source:
+        Hartley, Zisserman 2004, Multiple View Geometry in Computer Vision, sec. 6.1.
+    """
+    K = usable(K, "the camera matrix").reshape(3, 3)
+    if np.abs(K[[1, 2, 2], [0, 0, 1]]).max() > 0.0 or K[2, 2] != 1.0:
+        raise InputError(f"camera matrix {K.tolist()} is not one: its last row must be 0 0 1")
+    refuse_skew(float(K[0, 1]), float(K[0, 0]))
+    return K[[0, 1], [0, 1]], K[:2, 2]
+
+
+def refuse_skew(skew: float, focal: float) -> None:
+    """Passes pixels whose sides are square to each other.
+
+    Raises:
+        InputError: where they are not.
+    """
+    if not abs(skew) <= _SKEW * abs(focal):
+        raise InputError(f"a skew of {skew:g}: no lens here has one; calibrate with skew held at 0")
 
 
 def lens(focal: Array, centre: Array, coefficients: Array, *, fisheye: bool) -> tuple[str, Array]:

@@ -14,7 +14,16 @@ import numpy as np
 
 from freeswing.calib.camera.camera import Camera
 from freeswing.calib.camera.lens_models import FISHEYE
-from freeswing.calib.exchange.lens import ODD_ENTRY, distortion, lens, matrix, shortest, usable
+from freeswing.calib.exchange.lengths import in_metres
+from freeswing.calib.exchange.lens import (
+    ODD_ENTRY,
+    distortion,
+    lens,
+    matrix,
+    of_matrix,
+    shortest,
+    usable,
+)
 from freeswing.calib.exchange.plain_xml import load_opencv_xml
 from freeswing.calib.exchange.plain_yaml import load_yaml
 from freeswing.cdpr.files.documents import InputError, replace_file
@@ -38,7 +47,10 @@ def read(path: Path, tell: Callable[[str], None]) -> tuple[Camera, ...]:
     """
     document = _document(path)
     if _first(document, _STEREO[0][:3]) is not None:
-        return _stereo(path, document)
+        pair = in_metres(path, _stereo(path, document), tell)
+        apart = float(np.linalg.norm(pair[1].position_base_m))
+        tell(f"{path}: states no unit: its cameras are taken to stand {apart:.4g} m apart")
+        return pair
     listed = document.get("cameras", [document])
     if not isinstance(listed, list) or not listed:
         raise InputError(f"{path}: cameras is not a list")
@@ -52,7 +64,10 @@ def read(path: Path, tell: Callable[[str], None]) -> tuple[Camera, ...]:
                 f"{path}: {name}: not a camera of OpenCV's, with camera_matrix, "
                 f"distortion_coefficients, image_width and image_height ({error})"
             ) from error
-    return tuple(cameras)
+    placeless = [c.name for c, e in zip(cameras, listed, strict=True) if "T_camera_base" not in e]
+    if len(cameras) > 1 and placeless:
+        tell(f"{path}: {', '.join(placeless)}: no pose (T_camera_base), at the origin")
+    return in_metres(path, tuple(cameras), tell)
 
 
 def _document(path: Path) -> dict[str, Any]:
@@ -77,9 +92,9 @@ def _stereo(path: Path, document: dict[str, Any]) -> tuple[Camera, ...]:
         poses = np.eye(4), transform(_matrix(turn).reshape(3, 3), _matrix(shift).reshape(3))
         cameras = []
         for name, keys, pose in zip(("left", "right"), _STEREO, poses, strict=True):
-            K = _matrix(_first(document, keys[:3])).reshape(3, 3)
+            focal, centre = of_matrix(_matrix(_first(document, keys[:3])))
             k = _matrix(_first(document, keys[3:]))
-            model, params = lens(K[[0, 1], [0, 1]], K[:2, 2], k, fisheye=_is_fisheye(document))
+            model, params = lens(focal, centre, k, fisheye=_is_fisheye(document))
             cameras.append(Camera(name, (int(width), int(height)), model, params, pose))
     except ODD_ENTRY as error:
         raise InputError(f"{path}: not a pair of OpenCV's stereo_calib ({error})") from error
@@ -87,10 +102,10 @@ def _stereo(path: Path, document: dict[str, Any]) -> tuple[Camera, ...]:
 
 
 def _camera(entry: dict[str, Any], name: str) -> Camera:
-    K = _matrix(_named(entry, _MATRICES)).reshape(3, 3)
+    focal, centre = of_matrix(_matrix(_named(entry, _MATRICES)))
     k = _matrix(_named(entry, _DISTORTIONS))
     size = (int(_named(entry, _WIDTHS)), int(_named(entry, _HEIGHTS)))
-    model, params = lens(K[[0, 1], [0, 1]], K[:2, 2], k, fisheye=_is_fisheye(entry))
+    model, params = lens(focal, centre, k, fisheye=_is_fisheye(entry))
     pose = _matrix(entry["T_camera_base"]) if "T_camera_base" in entry else np.eye(4)
     return Camera(str(entry.get("name", name)), size, model, params, pose)
 

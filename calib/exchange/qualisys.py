@@ -15,7 +15,15 @@ import numpy as np
 
 from freeswing.calib.camera.camera import Camera
 from freeswing.calib.camera.lens_models import FISHEYE
-from freeswing.calib.exchange.lens import ODD_ENTRY, distortion, lens, shortest, turned, usable
+from freeswing.calib.exchange.lens import (
+    ODD_ENTRY,
+    distortion,
+    lens,
+    refuse_skew,
+    shortest,
+    turned,
+    usable,
+)
 from freeswing.cdpr.files.documents import InputError, read_text, replace_file
 from freeswing.cdpr.rotation import invert, transform
 
@@ -60,10 +68,11 @@ def _camera(name: str, entry: ElementTree.Element, tell: Callable[[str], None]) 
     corner = np.array([_number(area, "left"), _number(area, "top")])
     size = np.array([_number(area, "right"), _number(area, "bottom")]) - corner + 1.0
     quarters = round(float(entry.get("viewrotation", "0") or 0.0) / 90.0) % 4
-    if quarters % 2:
-        size, corner = size[::-1], corner[::-1]  # the picture is turned, the lens is not
     focal = np.array([_number(optics, f"focalLength{axis}") for axis in "UV"]) / SUBPIXELS
     centre = np.array([_number(optics, f"centerPoint{axis}") for axis in "UV"]) / SUBPIXELS
+    refuse_skew(_number(optics, "skew") if "skew" in optics.attrib else 0.0, focal[0] * SUBPIXELS)
+    if quarters % 2 and size[0] < size[1]:
+        size, corner = size[::-1], corner[::-1]  # the picture is turned, the lens is not
     binning = _binning(centre, corner, size)
     radial = [_number(optics, f"radialDistortion{k}") for k in (1, 2, 3)]
     tangential = [_number(optics, f"tangentalDistortion{k}") for k in (1, 2)]

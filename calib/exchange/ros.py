@@ -5,14 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from freeswing.calib.camera.camera import Camera
 from freeswing.calib.camera.lens_models import FISHEYE
-from freeswing.calib.exchange.lens import ODD_ENTRY, distortion, lens, matrix, shortest
+from freeswing.calib.exchange.lens import ODD_ENTRY, distortion, lens, matrix, of_matrix, shortest
 from freeswing.calib.exchange.plain_yaml import load_yaml
 from freeswing.cdpr.files.documents import InputError, replace_file
+
+_FISHEYES = ("equidistant", "fisheye")
+_KNOWN = "plumb_bob, rational_polynomial or equidistant"
 
 
 def read(path: Path, tell: Callable[[str], None]) -> tuple[Camera, ...]:
@@ -21,6 +25,8 @@ def read(path: Path, tell: Callable[[str], None]) -> tuple[Camera, ...]:
     if not files:
         raise InputError(f"{path}: holds no *.yaml")
     cameras = tuple(_read_one(file) for file in files)
+    if len(cameras) > 1:
+        tell(f"{path}: holds no poses: all its cameras stand at the origin")
     names = [camera.name for camera in cameras]
     if len(set(names)) == len(names):
         return cameras
@@ -28,15 +34,28 @@ def read(path: Path, tell: Callable[[str], None]) -> tuple[Camera, ...]:
     return tuple(replace(c, name=f.stem) for c, f in zip(cameras, files, strict=True))
 
 
+def _refuse_part(entry: dict[str, Any]) -> None:
+    """Passes pictures of the whole sensor, pixel by pixel."""
+    area = entry.get("roi") or {}
+    binned = max(int(entry.get(key, 0)) for key in ("binning_x", "binning_y")) > 1
+    if binned or any(int(area.get(key, 0)) for key in ("x_offset", "y_offset", "width", "height")):
+        raise InputError(
+            "binning or roi: camera_matrix is the whole sensor's, and the picture is not; "
+            "calibrate with the pictures as they are recorded"
+        )
+
+
 def _read_one(path: Path) -> Camera:
     entry = load_yaml(path)
     try:
-        K = np.array(entry["camera_matrix"]["data"], dtype=np.float64).reshape(3, 3)
+        focal, centre = of_matrix(entry["camera_matrix"]["data"])
         coefficients = np.array(entry["distortion_coefficients"]["data"], dtype=np.float64)
         kind = str(entry["distortion_model"])
+        if kind not in (*_FISHEYES, "plumb_bob", "rational_polynomial", "none", ""):
+            raise InputError(f"distortion_model {kind!r} is not {_KNOWN}")
+        _refuse_part(entry)
         size = (int(entry["image_width"]), int(entry["image_height"]))
-        fisheye = kind in ("equidistant", "fisheye")
-        model, params = lens(K[[0, 1], [0, 1]], K[:2, 2], coefficients, fisheye=fisheye)
+        model, params = lens(focal, centre, coefficients, fisheye=kind in _FISHEYES)
         return Camera(str(entry.get("camera_name", path.stem)), size, model, params, np.eye(4))
     except ODD_ENTRY as error:
         raise InputError(f"{path}: not a ROS camera_info file ({error})") from error

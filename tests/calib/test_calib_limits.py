@@ -16,7 +16,7 @@ from freeswing.calib.board.coverage import coverage_of
 from freeswing.calib.board.sightings import _wanted, smoothness
 from freeswing.calib.camera.camera import Camera
 from freeswing.calib.exchange import _refuse_impossible
-from freeswing.calib.exchange.anipose import _in_metres
+from freeswing.calib.exchange.lengths import in_metres
 from freeswing.calib.exchange.qualisys import _binning
 from freeswing.calib.verdict import survey_check, truth_checks
 from freeswing.calib.verdict.plumb_line import _refuse_one_plane
@@ -78,7 +78,7 @@ def test_cameras_sixty_units_apart_are_told_in_millimetres(far, as_stated) -> No
     pose[0, 3] = far
     camera = Camera("a", (640, 480), "PINHOLE", CAMERA.params, pose)
     said: list[str] = []
-    (found,) = _in_metres(Path("a.toml"), (camera,), said.append)
+    (found,) = in_metres(Path("a.toml"), (camera,), said.append)
     assert (found.T_camera_base[0, 3] == far) == as_stated == (said == [])
 
 
