@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from freeswing.cdpr.markers.distances import distances, pairs_of
+from freeswing.cdpr.markers.distances import distances, pairs_of, typical_distances
+from freeswing.cdpr.measured.marker_recording import MarkerRecording
 
 Array = NDArray[np.float64]
 
@@ -14,6 +15,18 @@ UNIT_FACTORS = (1000.0, 100.0, 10.0, 1.0 / 0.0254, 1.0 / 0.3048, 25.4)
 UNIT_TOLERANCE = 0.03
 SMALLEST_PLATFORM_M = 0.02
 LARGEST_PLATFORM_M = 10.0
+
+
+def far_apart(recording: MarkerRecording) -> list[str]:
+    """What is to be said of markers farther apart than any platform is large, else nothing."""
+    apart = typical_distances(recording.positions_m, pairs_of(len(recording.names)))
+    widest = float(np.max(apart[np.isfinite(apart)], initial=0.0))
+    if widest < LARGEST_PLATFORM_M:
+        return []
+    return [
+        f"its markers are up to {widest:.4g} m apart: if they are of one platform, "
+        f"{recording.source} states another unit than its numbers have"
+    ]
 
 
 def unit_between(layout: Array, apart: Array) -> tuple[float, bool] | None:

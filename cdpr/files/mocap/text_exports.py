@@ -6,6 +6,8 @@ Each reader finds labels, unit, rate and the first row; the rest is done here on
 
 from __future__ import annotations
 
+import csv
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -36,6 +38,8 @@ METRES_PER_UNIT = {
 }
 Array = NDArray[np.float64]
 
+RATE_TOLERANCE = 1e-3  # of a rate as it is printed; 29.97 for 30 is as much
+PRINTED_S = 1e-4  # times have four decimals at least
 MOTIVE_MARKERS = ("marker", "rigid body marker", "labeled marker")
 
 
@@ -51,6 +55,7 @@ class Layout:
         metres: per unit of the numbers.
         rate_hz: frames a second.
         time: column of the time in s, None: frame numbers over the rate.
+        announced: rows that the header announces, None where it does not.
     """
 
     separator: str
@@ -60,6 +65,7 @@ class Layout:
     metres: float
     rate_hz: float
     time: int | None
+    announced: int | None = None
 
 
 def is_mocap_text(path: Path | str) -> bool:
@@ -70,9 +76,11 @@ def is_mocap_text(path: Path | str) -> bool:
     except OSError:
         return False
     first = head.split("\n", 1)[0].strip().strip('"')
-    return first.startswith(("Format Version", "NO_OF_FRAMES")) or first.split(",")[0].split(";")[
-        0
-    ] in ("Trajectories", "Model Outputs", "Devices")
+    return first.startswith(("Format Version", "NO_OF_FRAMES")) or re.split("[,;\t]", first)[0] in (
+        "Trajectories",
+        "Model Outputs",
+        "Devices",
+    )
 
 
 def read_mocap_text(path: Path | str) -> MarkerRecording:
@@ -107,10 +115,36 @@ def _numbers(path: Path | str, lines: list[str], layout: Layout) -> tuple[Array,
     )
     comma = layout.separator != "," and any("," in line for line in lines[layout.first : last][:2])
     table = read_numbers(path, rows, layout.separator, columns, decimal_comma=comma)
+    if layout.announced is not None and layout.announced != len(table.values):
+        raise InputError(
+            f"{path}: its header announces {layout.announced} frames, but {len(table.values)} rows "
+            "follow; the file is cut short or was edited: export it again"
+        )
     check_times(path, table, layout.time or 0, "the time" if layout.time else "the frame number")
     stamps = table.values[:, layout.time or 0]
-    times = stamps if layout.time is not None else (stamps - stamps[0]) / layout.rate_hz
-    return table.values, times
+    if layout.time is None:
+        return table.values, (stamps - stamps[0]) / layout.rate_hz
+    refuse_other_rate(path, stamps, layout.rate_hz)
+    return table.values, stamps
+
+
+def refuse_other_rate(path: Path | str, times: Array, rate_hz: float) -> None:
+    """Passes times that step at the rate, frames that are left out apart.
+
+    Raises:
+        InputError: where they step at another one.
+    """
+    steps = np.diff(times)
+    steps = steps[steps < 1.5 * np.median(steps)] if len(steps) else steps
+    if not len(steps):
+        return
+    measured = 1.0 / float(steps.mean())
+    rounding = 2.0 * PRINTED_S / float(steps.sum())
+    if abs(measured / rate_hz - 1.0) > RATE_TOLERANCE + rounding:
+        raise InputError(
+            f"{path}: its header states {rate_hz:g} Hz, but its times step at {measured:.6g} Hz; "
+            "correct the header or export again"
+        )
 
 
 def read_motive_body(path: Path | str) -> Trajectory | None:
@@ -163,12 +197,13 @@ class _MotiveHead:
 
 def _motive_head(path: Path | str, lines: list[str]) -> _MotiveHead:
     """Pairs of key and value in line 1, then rows of type, name, id, kind and axis."""
-    cells = [cell.strip() for cell in lines[0].split(",")]
+    separator = ";" if lines[0].count(";") > lines[0].count(",") else ","
+    cells = [cell.strip() for cell in next(csv.reader(lines[:1], delimiter=separator))]
     told = dict(zip(cells[::2], cells[1::2], strict=False))
     rows: dict[str, list[str]] = {}
     first = 0
     for k, line in enumerate(lines[1:12], start=1):
-        row = [cell.strip().strip('"') for cell in line.split(",")]
+        row = [cell.strip().strip('"') for cell in line.split(separator)]
         if row[0] == "Frame":
             rows["axes"], first = row, k + 1
             break
@@ -191,10 +226,16 @@ def _motive_head(path: Path | str, lines: list[str]) -> _MotiveHead:
             is_quaternion = k >= 6 and axes[k - 4 : k] == ["X", "Y", "Z", "W"]
             bodies.append((name, k - 4 if is_quaternion else None, k))
     time = 1 if axes[1].startswith("Time") else None
+    if told.get("Coordinate Space", "Global").lower() != "global":
+        raise InputError(
+            f"{path}: Coordinate Space is {told['Coordinate Space'][:40]!r}: positions relative to "
+            "a body that moves itself; export with Coordinate Space Global"
+        )
     rate = _rate(path, told.get("Export Frame Rate") or told.get("Capture Frame Rate", ""))
     metres = _metres(path, told.get("Length Units", ""))
     chosen = tuple(_preferred(markers, types))
-    layout = Layout(",", len(axes), first, chosen, metres, rate, time)
+    frames = _announced(told.get("Total Exported Frames", ""))
+    layout = Layout(separator, len(axes), first, chosen, metres, rate, time, frames)
     return _MotiveHead(told, layout, tuple(bodies))
 
 
@@ -209,7 +250,7 @@ def _vicon(path: Path | str, lines: list[str]) -> Layout:
     at = next((k for k, line in enumerate(lines) if line.startswith("Trajectories")), None)
     if at is None or len(lines) < at + 6:
         raise InputError(f"{path}: no block 'Trajectories'; export the trajectories too")
-    separator = ";" if lines[at + 3].count(";") > lines[at + 3].count(",") else ","
+    separator = max(",;\t", key=lines[at + 3].count)
     rate = _rate(path, lines[at + 1].split(separator)[0])
     labels = [cell.strip() for cell in lines[at + 2].split(separator)]
     axes = [cell.strip() for cell in lines[at + 3].split(separator)]
@@ -250,7 +291,8 @@ def _qualisys(path: Path | str, lines: list[str]) -> Layout:
         before = 1
     markers = tuple((name, before + 3 * k) for k, name in enumerate(names))
     width = before + 3 * len(names)
-    return Layout("\t", width, first, markers, 1e-3, rate, 1 if before == 2 else None)
+    frames = _announced(" ".join(told.get("NO_OF_FRAMES", [])))
+    return Layout("\t", width, first, markers, 1e-3, rate, 1 if before == 2 else None, frames)
 
 
 def _last_row(lines: list[str], layout: Layout) -> int:
@@ -264,6 +306,10 @@ def _last_row(lines: list[str], layout: Layout) -> int:
 def _padded(line: str, layout: Layout) -> str:
     cells = line.count(layout.separator) + 1
     return line + layout.separator * max(layout.width - cells, 0)
+
+
+def _announced(text: str) -> int | None:
+    return int(text) if text.isdigit() else None
 
 
 def _rate(path: Path | str, text: str) -> float:

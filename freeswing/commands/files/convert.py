@@ -8,6 +8,7 @@ from pathlib import Path
 from freeswing.console import Console
 
 SUFFIXES = (".csv", ".tum", ".trc", ".c3d")
+READ = (*SUFFIXES, ".tsv")
 CAMERA_FORMATS = (
     "freeswing", "opencv", "kalibr", "ros", "anipose", "colmap", "colmap-binary", "qualisys",
 )  # fmt: skip
@@ -15,7 +16,7 @@ CAMERA_FORMATS = (
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Source, destination and what a change between poses and markers needs."""
-    kinds, cameras = ", ".join(SUFFIXES), ", ".join(CAMERA_FORMATS)
+    kinds, cameras = ", ".join(READ), ", ".join(CAMERA_FORMATS)
     parser.add_argument("source", metavar="FROM", help=f"trajectory ({kinds}) or cameras")
     parser.add_argument("result", metavar="TO", help="what to write; its ending tells a trajectory")
     parser.add_argument(
@@ -39,14 +40,13 @@ def run(options: Namespace, console: Console) -> None:
     source, result = Path(options.source), Path(options.result)
     if result.exists() and source.exists() and result.samefile(source):
         raise InputError(f"{result}: source and result are the same file; name another")
-    losses: list[str] = []
     if _is_of_cameras(source, options):
         from freeswing.export.camera_conversion import convert_cameras
 
         _refuse_trajectory(result)
         losses = convert_cameras(source, result, options.source_format, options.to)
     else:
-        _convert_trajectory(source, result, options)
+        losses = _convert_trajectory(source, result, options)
     console.say(str(result))
     for loss in losses:
         console.complain(f"{result}: {loss}")
@@ -55,7 +55,7 @@ def run(options: Namespace, console: Console) -> None:
 
 def _is_of_cameras(source: Path, options: Namespace) -> bool:
     told = options.source_format is not None or options.to is not None
-    return told or source.suffix.lower() not in SUFFIXES
+    return told or source.suffix.lower() not in READ
 
 
 def _refuse_trajectory(result: Path) -> None:
@@ -65,7 +65,7 @@ def _refuse_trajectory(result: Path) -> None:
         raise InputError(f"{result}: cameras do not become a trajectory; its ending says it is one")
 
 
-def _convert_trajectory(source: Path, result: Path, options: Namespace) -> None:
+def _convert_trajectory(source: Path, result: Path, options: Namespace) -> list[str]:
     from freeswing.cdpr.files.documents import InputError
 
     if result.suffix.lower() not in SUFFIXES:
@@ -73,9 +73,9 @@ def _convert_trajectory(source: Path, result: Path, options: Namespace) -> None:
         ending = result.suffix or "no ending"
         raise InputError(f"{result}: {ending!r} is not one of a trajectory: {known}")
     if result.suffix.lower() in (".trc", ".c3d"):
-        _write_markers(source, result, options)
-    else:
-        _write_poses(source, result, options)
+        return _write_markers(source, result, options)
+    _write_poses(source, result, options)
+    return []
 
 
 def _write_poses(source: Path, result: Path, options: Namespace) -> None:
@@ -86,17 +86,19 @@ def _write_poses(source: Path, result: Path, options: Namespace) -> None:
     write(result, trajectory)
 
 
-def _write_markers(source: Path, result: Path, options: Namespace) -> None:
+def _write_markers(source: Path, result: Path, options: Namespace) -> list[str]:
     from freeswing.cdpr.files.documents import InputError
     from freeswing.cdpr.files.trajectory_files import (
+        holds_markers,
         read_recording,
         read_trajectory,
         write_c3d,
         write_trc,
     )
+    from freeswing.cdpr.markers.units import far_apart
     from freeswing.cdpr.measured.marker_recording import recording_from_poses
 
-    if source.suffix.lower() in (".trc", ".c3d"):
+    if holds_markers(source):
         recording = read_recording(source)
     else:
         target = _target(options)
@@ -108,6 +110,7 @@ def _write_markers(source: Path, result: Path, options: Namespace) -> None:
         recording = recording_from_poses(trajectory, target)
     write = write_trc if result.suffix.lower() == ".trc" else write_c3d
     write(result, recording)
+    return far_apart(recording)
 
 
 def _robot(options: Namespace):
