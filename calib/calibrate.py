@@ -36,8 +36,8 @@ from freeswing.calib.verdict.calibration_result import (
     camera_entries,
     covariance_entry,
 )
-from freeswing.calib.verdict.plumb_line import StringView, find_vertical
-from freeswing.calib.verdict.plumb_line_file import read_plumb_line, vertical_entry
+from freeswing.calib.verdict.plumb_line import StringView, find_vertical, vertical_entry
+from freeswing.calib.verdict.plumb_line_file import read_plumb_line
 from freeswing.calib.verdict.survey_check import SurveyCheck, check_survey
 from freeswing.calib.verdict.trust import Verdict, judge
 from freeswing.calib.verdict.truth_checks import check_truth, widened

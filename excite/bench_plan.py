@@ -12,7 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from freeswing.cdpr.robot import Array
+from freeswing.cdpr.files.documents import DataError
+from freeswing.cdpr.robot import Array, Robot
 from freeswing.cdpr.simulation.parallel_wires import bending
 
 GRAVITY_M_S2 = 9.80665
@@ -27,6 +28,9 @@ CHOICES: Mapping[str, tuple[float, ...]] = {
     "length_m": (0.5, 1.0, 1.5, 2.0, 3.0),
     "radius": (0.5, 0.75, 1.0, 1.5),
 }
+
+HOOP = 0.5  # of mass x radius^2: the platform's inertia where none is given, a full disc's
+SMALL = 0.1  # the same of an object that lies on it
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,3 +223,34 @@ def planned(case: BenchCase, fixed: tuple[str, ...] = ()) -> tuple[BenchCase, li
             percent = 100.0 * total / case.load_izz_kg_m2
             rows.append(PlanRow(name, float(value), percent, value == mine))
     return best, rows
+
+
+def bench_case(robot: Robot, load_kg: float | None, load_izz: float | None) -> BenchCase:
+    """The case of a robot file whose wires hang parallel.
+
+    Args:
+        robot: two or three parallel wires.
+        load_kg: of the object; None: as heavy as the platform.
+        load_izz: a guess of its inertia, kg m2; None: a small object's.
+
+    Raises:
+        DataError: when the platform's mass is not given.
+    """
+    mass = robot.platform.mass_kg
+    if mass is None:
+        raise DataError("mass_kg of the platform is not given: weigh it with all that hangs on it")
+    ends = robot.attachments_m - robot.attachments_m.mean(axis=0)
+    radius = float(np.sqrt(np.mean(np.sum(ends**2, axis=1))))
+    length = float(np.mean(np.linalg.norm(robot.entries_m - robot.attachments_m, axis=1)))
+    given = robot.platform.specific_inertia_m2
+    izz = mass * (HOOP * radius**2 if given is None else float(given[2]))
+    load = load_kg or mass
+    return BenchCase(
+        mass_kg=mass,
+        izz_kg_m2=izz,
+        load_kg=load,
+        load_izz_kg_m2=load_izz or SMALL * load * radius**2,
+        radius_m=radius,
+        length_m=length,
+        known_kg=0.5 * load,
+    )

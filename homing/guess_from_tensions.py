@@ -17,6 +17,7 @@ from freeswing.cdpr.model.body import rotation
 from freeswing.cdpr.model.free_motion import coordinate_indices
 from freeswing.cdpr.model.pulley import Geometry, cable_state
 from freeswing.cdpr.robot import Robot
+from freeswing.homing.homing_files import Homing
 from freeswing.homing.rest_readings import evaluate_evenly, length_screws
 
 Array = NDArray[np.float64]
@@ -24,6 +25,10 @@ Array = NDArray[np.float64]
 _LARGEST_STEP = 0.3
 _MOST_STEPS = 60
 _MOST_HALVINGS = 12
+
+# Start tensions together, by the weight: what `default_tensions` asks for too. Cables that lean by
+# about 48 degrees.
+_WEIGHTS_OF_A_GUESS = 1.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,3 +190,33 @@ def acquisition_tensions(start_N: Array, largest_N: Array, n_poses: int) -> Arra
     tensions = np.tile(start, (n_poses, 1))
     tensions[np.arange(n_poses), cable] += share * (largest - start)[cable]
     return tensions
+
+
+def guess_poses(homing: Homing, energy: TensionEnergy) -> list[Array]:
+    """First guesses of all poses, (N, 6) each: one for every stable rest at the start tensions.
+
+    Tensions that were read serve where there are any, else the set-points of the procedure. There
+    is no guess where the platform cannot rest at the start tensions.
+
+    Source:
+        Ida, Merlet, Carricato 2019, eqs. (9), (29).
+    """
+    robot, readings = homing.robot, homing.readings
+    count = len(readings.sigma_rad)
+    tensions = acquisition_tensions(homing.start_tensions_N, homing.max_tensions_N, count)
+    if readings.tension_N is not None:
+        tensions = np.where(np.isfinite(readings.tension_N), readings.tension_N, tensions)
+    pulls = tensions / _weight_N(robot, homing.start_tensions_N)
+    guesses = []
+    for start in stable_starts(energy, pulls[0])[:4]:
+        rest = energy.settle(np.tile(start, (count, 1)), pulls)
+        guesses.append(np.where(rest.settled[:, None], rest.poses, start))
+    return guesses
+
+
+def _weight_N(robot: Robot, start_tensions_N: Array) -> float:
+    """The platform's weight; unknown, that which the start tensions would lift comfortably."""
+    gravity = float(np.linalg.norm(robot.gravity_m_s2))
+    if robot.platform.mass_kg is not None:
+        return robot.platform.mass_kg * gravity
+    return float(np.sum(start_tensions_N)) / _WEIGHTS_OF_A_GUESS

@@ -8,33 +8,25 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.cdpr.files.documents import DataError
-from freeswing.cdpr.robot import Robot
 from freeswing.homing.best_fit import best_fit, model_for
+from freeswing.homing.doubted_geometry import with_geometry_in_doubt
 from freeswing.homing.fit_start_pose import StartFit, StartProblem
 from freeswing.homing.guess_from_tensions import (
     TensionEnergy,
-    acquisition_tensions,
-    stable_starts,
+    guess_poses,
 )
 from freeswing.homing.homing_document import homing_document
-from freeswing.homing.homing_files import GeometryNoise, Homing, read_homing
+from freeswing.homing.homing_files import Homing, read_homing
 from freeswing.homing.many_starts import many_starts
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
-
-# Chi-square a degree of freedom: more than unlucky readings leave.
-_DOUBTFUL_FIT = 4.0
-# Start tensions together, by the weight: what `default_tensions` asks for too. Cables that lean by
-# about 48 degrees.
-_WEIGHTS_OF_A_GUESS = 1.5
 
 
 def home(path: Path | str, progress: Progress | None = None) -> dict:
@@ -90,47 +82,4 @@ def find_start(homing: Homing) -> StartFit:
         )
     model = model_for(homing, guesses[0][0])
     fit = best_fit(StartProblem(homing, model, homing.geometry), homing, guesses, energy)
-    if homing.geometry is not None or fit.chi_square < _DOUBTFUL_FIT * fit.degrees:
-        return fit
-    doubted = StartProblem(homing, model, GeometryNoise())
-    first = doubted.solve(homing.noise, fit.poses, doubted.start_border(fit.poses[0]))
-    wider = doubted.finish(first, replace(homing.noise, stated=True))
-    return wider if fit.cost - wider.cost > _information_price(wider, doubted) else fit
-
-
-def guess_poses(homing: Homing, energy: TensionEnergy) -> list[Array]:
-    """First guesses of all poses, (N, 6) each: one for every stable rest at the start tensions.
-
-    Tensions that were read serve where there are any, else the set-points of the procedure. There
-    is no guess where the platform cannot rest at the start tensions.
-
-    Source:
-        Ida, Merlet, Carricato 2019, eqs. (9), (29).
-    """
-    robot, readings = homing.robot, homing.readings
-    count = len(readings.sigma_rad)
-    tensions = acquisition_tensions(homing.start_tensions_N, homing.max_tensions_N, count)
-    if readings.tension_N is not None:
-        tensions = np.where(np.isfinite(readings.tension_N), readings.tension_N, tensions)
-    pulls = tensions / _weight_N(robot, homing.start_tensions_N)
-    guesses = []
-    for start in stable_starts(energy, pulls[0])[:4]:
-        rest = energy.settle(np.tile(start, (count, 1)), pulls)
-        guesses.append(np.where(rest.settled[:, None], rest.poses, start))
-    return guesses
-
-
-def _information_price(fit: StartFit, problem: StartProblem) -> float:
-    """Fall of the cost that as many newly known offsets must bring (Bayesian information)."""
-    if fit.geometry_std is None:
-        return np.inf
-    known = 1 - (fit.geometry_std / GeometryNoise().stack(problem.n)) ** 2
-    return float(np.clip(known, 0, 1).sum() * np.log(problem.present.sum()))
-
-
-def _weight_N(robot: Robot, start_tensions_N: Array) -> float:
-    """The platform's weight; unknown, that which the start tensions would lift comfortably."""
-    gravity = float(np.linalg.norm(robot.gravity_m_s2))
-    if robot.platform.mass_kg is not None:
-        return robot.platform.mass_kg * gravity
-    return float(np.sum(start_tensions_N)) / _WEIGHTS_OF_A_GUESS
+    return fit if homing.geometry is not None else with_geometry_in_doubt(homing, model, fit)

@@ -7,11 +7,10 @@ from numpy.typing import NDArray
 
 from freeswing.cdpr.robot import Robot
 from freeswing.homing.fit_start_pose import StartFit
+from freeswing.homing.reading_mistakes import suspect_readings
 from freeswing.homing.rest_readings import geometry_labels
 
 Array = NDArray[np.float64]
-
-_SUSPECT_WEIGHT = 0.6  # of the robust loss: a reading beyond five standard deviations
 
 
 def homing_document(robot: Robot, fit: StartFit, seconds: float) -> dict:
@@ -45,7 +44,7 @@ def homing_document(robot: Robot, fit: StartFit, seconds: float) -> dict:
             "stated": fit.noise.stated,
         },
         "chi_square_over_degrees": fit.chi_square / fit.degrees,
-        "suspect_readings": _suspects(fit),
+        "suspect_readings": suspect_readings(fit),
         "geometry": _geometry(robot, fit),
     }
 
@@ -57,18 +56,6 @@ def _wrapped(angles: Array) -> Array:
 def _rms(fit: StartFit, kind: str) -> float:
     columns = [k for k, row in enumerate(fit.rows) if row == kind]
     return float(np.sqrt(np.nanmean(fit.residuals[:, columns] ** 2)))
-
-
-def _suspects(fit: StartFit) -> list[dict]:
-    """Readings that the robust loss took weight from, the worst first, twenty at the most."""
-    n = len(fit.length_m)
-    names = [f"dsigma{i + 1}_rad" for i in range(n)] + [f"dl{i + 1}_m" for i in range(n)]
-    where = np.argwhere(fit.weights[:, : 2 * n] < _SUSPECT_WEIGHT)
-    found = [
-        {"row": int(k), "column": names[j], "residual": float(fit.residuals[k, j])}
-        for k, j in where[np.argsort([fit.weights[k, j] for k, j in where])]
-    ]
-    return found[:20]
 
 
 def _geometry(robot: Robot, fit: StartFit) -> list[dict]:

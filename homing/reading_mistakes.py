@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from freeswing.homing.fit_start_pose import StartFit
 from freeswing.homing.homing_files import Homing
 
 _CHANGES = (
@@ -18,6 +19,8 @@ _CHANGES = (
     ("with dl of the other sign: they count cable wound up, not cable let out", 1.0, -1.0),
     ("with dsigma and dl of the other sign", -1.0, -1.0),
 )
+
+SUSPECT_WEIGHT = 0.6  # of the robust loss: a reading beyond five standard deviations
 
 
 def likely_mistake(homing: Homing, explains: Callable[[Homing], bool]) -> str:
@@ -37,3 +40,15 @@ def _candidates(homing: Homing) -> Iterator[tuple[str, Homing]]:
             readings, sigma_rad=turn * readings.sigma_rad, length_m=stretch * readings.length_m
         )
         yield told, replace(homing, readings=changed)
+
+
+def suspect_readings(fit: StartFit) -> list[dict]:
+    """Readings that the robust loss took weight from, the worst first, twenty at the most."""
+    n = len(fit.length_m)
+    names = [f"dsigma{i + 1}_rad" for i in range(n)] + [f"dl{i + 1}_m" for i in range(n)]
+    where = np.argwhere(fit.weights[:, : 2 * n] < SUSPECT_WEIGHT)
+    found = [
+        {"row": int(k), "column": names[j], "residual": float(fit.residuals[k, j])}
+        for k, j in where[np.argsort([fit.weights[k, j] for k, j in where])]
+    ]
+    return found[:20]

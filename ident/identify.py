@@ -14,8 +14,8 @@ from freeswing.cdpr.robot import Robot
 from freeswing.ident.estimate import Estimate
 from freeswing.ident.fidim.fidim_stage import Weighting, fidim_estimates
 from freeswing.ident.inertia_starts import likelihood_starts
-from freeswing.ident.judge.comparison import ParameterComparison, between_runs, compare
 from freeswing.ident.judge.far_samples import far_from_prediction
+from freeswing.ident.judge.free_against_full import ParameterComparison, between_runs, compare
 from freeswing.ident.judge.free_swing_law import LawlessError, fidim_complaint
 from freeswing.ident.judge.lawful_runs import best_ml_estimate
 from freeswing.ident.judge.prediction import Prediction, fitted_motions

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +23,7 @@ from freeswing.vision.fuse.run_views import CameraViews
 from freeswing.vision.fuse.tag_layout import LayoutSums, layout_sums
 from freeswing.vision.look.follow import STATUS_NAMES, USED
 from freeswing.vision.look.watched_target import Watch
+from freeswing.vision.recorded_alone import recorded_by_two
 from freeswing.vision.rig.correct_rig import correct_rig
 from freeswing.vision.rig.rig_effects import Finding
 from freeswing.vision.settings import Settings
@@ -30,7 +31,6 @@ from freeswing.vision.settings import Settings
 Array = NDArray[np.float64]
 
 PROVENANCE = "cameras"
-LEAST_BY_TWO = 0.5  # a swing's poses that are left must be most of them, or alone is all there is
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,30 +110,6 @@ def _shared(poses: Poses, frame: Array | None, doubt: Array | None) -> Array | N
     causes = [] if frame is None else [frame_causes(poses, frame)]
     causes += [] if doubt is None else [doubt]
     return np.concatenate(causes, axis=2) if causes else None
-
-
-def recorded_by_two(poses: Poses, views: Sequence[CameraViews]) -> tuple[Poses, tuple[str, ...]]:
-    """The poses without those of the time in which one of several cameras recorded alone.
-
-    One camera's distances differ from those of two by more than its noise, so that the platform
-    seems to step where the other begins. What is hidden from a camera now and then is kept, and so
-    is everything where the others recorded less than half.
-    """
-    times = [view.middle_times() for view in views]
-    spans = [(np.nanmin(own), np.nanmax(own)) for own in times if np.isfinite(own).any()]
-    if len(spans) < 2:
-        return poses, ()
-    beat = float(np.median(np.diff(poses.times_s))) if len(poses.times_s) > 1 else 0.0
-    at = poses.times_s
-    cameras = sum((at > low - 0.6 * beat) & (at < high + 0.6 * beat) for low, high in spans)
-    both = poses.known & (np.asarray(cameras) >= 2)
-    alone = int(poses.known.sum() - both.sum())
-    if not alone or both.sum() < LEAST_BY_TWO * poses.known.sum():
-        return poses, ()
-    return replace(poses, known=both), (
-        f"{alone} of {int(poses.known.sum())} samples were recorded by one camera alone, before "
-        "others were started or after they ended: left out",
-    )
 
 
 def trajectory_of(poses: Poses, watch: Watch) -> Trajectory:

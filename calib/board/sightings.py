@@ -16,6 +16,8 @@ from freeswing.calib.board.detection import BoardDetector
 from freeswing.calib.board.kept_boards import KeptBoards
 from freeswing.calib.board.platform_tags import PlatformDetector, PlatformTags
 from freeswing.calib.board.recordings import Recording, read_frames
+from freeswing.calib.board.searched_frames import in_bursts, middle_frames
+from freeswing.calib.board.smooth_motion import smoothness
 from freeswing.calib.camera.lens_models import Array
 from freeswing.calib.footage.frame_times import frame_times
 from freeswing.calib.rig.views import Views, make_views
@@ -23,11 +25,6 @@ from freeswing.cdpr.files.documents import DataError
 
 Progress = Callable[[str, float], None]
 
-MOST_FRAMES = 600
-BURST = 5  # frames: three tell a smooth motion, of these three middles are told
-LEAST_FLOW = 4  # corners: a median of fewer follows one that is misread
-# Of the way in two frames: hands turn a board about within ten frames, cuts jump.
-_LARGEST_BEND = 0.35
 _WORKERS = 2
 _LOOKED_AT_AGAIN, _EVERY = 6, 5
 
@@ -134,7 +131,7 @@ def _see(
     told: Callable[[float], None],
 ) -> Sightings:
     count = len(recording.images) or _count_frames(recording)
-    wanted = _wanted(count) if isinstance(detector, BoardDetector) else _middle(count)
+    wanted = in_bursts(count) if isinstance(detector, BoardDetector) else middle_frames(count)
     still_at = set(np.linspace(0, count - 1, n_still).round().astype(int)) if n_still else set()
     boards = KeptBoards(detector, kept, recording, len(wanted))
     without: list[np.ndarray] = []  # some images without a board
@@ -197,53 +194,6 @@ def _count_frames(recording: Recording) -> int:
         return sum(1 for packet in container.demux(video=0) if packet.size)
 
 
-def _wanted(count: int) -> set[int]:
-    if count <= MOST_FRAMES:
-        return set(range(count))
-    starts = np.linspace(0, count - BURST, MOST_FRAMES // BURST).round().astype(int)
-    return {int(start + k) for start in starts for k in range(BURST)}
-
-
-def _middle(count: int) -> set[int]:
-    first = max((count - MOST_FRAMES) // 2, 0)
-    return set(range(first, min(first + MOST_FRAMES, count)))
-
-
-def smoothness(sightings: Sightings) -> tuple[np.ndarray, Array]:
-    """How the board moves through each frame.
-
-    It moves on smoothly where the bend of its way over three frames is small beside the step, or
-    beside the recording's usual step: where it turns round it hardly moves, and yet is not cut.
-
-    Returns:
-        1 where the frame and its two neighbours show one smooth motion, -1 where they do not (a
-        cut, a new pose), 0 where too little is seen to tell, (n,); and the image speed of the
-        board in px/s where the motion is smooth, else 0, (n,).
-
-    Source:
-        Abramowitz, Stegun 1964, Handbook of Mathematical Functions, sec. 25.3: central
-        differences.
-    """
-    pixels, stamps, numbers = sightings.pixels, sightings.stamps_s, sightings.numbers
-    smooth, speed = np.zeros(len(numbers), dtype=int), np.zeros(len(numbers))
-    if len(numbers) < 3:
-        return smooth, speed
-    ahead, behind = pixels[2:] - pixels[1:-1], pixels[1:-1] - pixels[:-2]
-    known = np.isfinite(ahead + behind)[..., 0]
-    span = stamps[2:] - stamps[:-2]
-    told = (numbers[2:] - numbers[:-2] == 2) & (known.sum(axis=1) >= LEAST_FLOW) & (span > 0.0)
-    bend, step = np.full(len(told), np.nan), np.full(len(told), np.nan)
-    for row in np.flatnonzero(told):
-        both = known[row]
-        bend[row] = np.median(np.linalg.norm((ahead - behind)[row, both], axis=-1))
-        step[row] = np.median(np.linalg.norm((ahead + behind)[row, both], axis=-1))
-    usual = float(np.median(step[told])) if told.any() else 0.0
-    goes_on = told & (bend < _LARGEST_BEND * np.maximum(step, usual) + 1.0)
-    smooth[1:-1] = goes_on.astype(int) - (told & ~goes_on)
-    speed[1:-1][goes_on] = (step / span)[goes_on]
-    return smooth, speed
-
-
 @dataclass(frozen=True, slots=True)
 class Gathered:
     """Simultaneous frames of the cameras put together.
@@ -284,7 +234,7 @@ def gather(
     joined = np.concatenate(keys) if keys else np.zeros(0)
     group, times = _moments(keys, _reach(all_sightings, keys, frame_rate_hz))
     camera = np.repeat(np.arange(len(keys)), [len(key) for key in keys])
-    moves = [smoothness(s) for s in all_sightings]
+    moves = [smoothness(s.pixels, s.stamps_s, s.numbers) for s in all_sightings]
     _, first = np.unique(np.stack([camera, group]), axis=1, return_index=True)
     first = np.sort(first)
     lag = joined - offsets[camera] - times[group] if stamped else np.zeros(len(joined))

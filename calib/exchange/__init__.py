@@ -6,16 +6,14 @@ import importlib
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-import numpy as np
-
 from freeswing.calib.camera.camera import Camera
 from freeswing.calib.camera.cameras_file import read_cameras, write_cameras
+from freeswing.calib.exchange.impossible_cameras import refuse_impossible
 from freeswing.cdpr.files.documents import InputError
 
 FORMATS = ("freeswing", "opencv", "kalibr", "ros", "anipose", "colmap", "colmap-binary", "qualisys")
 Tell = Callable[[str], None]
 _LOOKED_AT_BYTES = 20_000
-_RIGID = 1e-3  # files with four digits are off by 1e-4, a matrix of another kind by 0.1 and more
 _MODULES = {
     "opencv": "opencv_yaml",
     "kalibr": "kalibr",
@@ -43,7 +41,7 @@ def read(path: Path | str, kind: str | None = None, tell: Tell | None = None) ->
     if kind == "freeswing":
         return read_cameras(path)
     cameras = _module(kind).read(path, tell or _nobody)
-    _refuse_impossible(path, cameras)
+    refuse_impossible(path, cameras)
     return cameras
 
 
@@ -88,21 +86,6 @@ def guess(path: Path) -> str:
     if path.name == "cameras.txt":
         return "colmap"
     raise InputError(f"{path}: not a camera file known here; name the format: {', '.join(FORMATS)}")
-
-
-def _refuse_impossible(path: Path, cameras: Sequence[Camera]) -> None:
-    """Names that stand twice, images without pixels, poses that are no motion of a rigid body."""
-    names = [camera.name for camera in cameras]
-    for camera in cameras:
-        rotation = camera.T_camera_base[:3, :3]
-        with np.errstate(over="ignore", invalid="ignore"):
-            off = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
-        if not off < _RIGID or np.linalg.det(rotation) < 0.0:
-            raise InputError(f"{path}: camera {camera.name}: its rotation is none ({off:.3g} off)")
-        if min(camera.size_px) < 1:
-            raise InputError(f"{path}: camera {camera.name}: an image of {camera.size_px} pixels")
-        if names.count(camera.name) > 1:
-            raise InputError(f"{path}: two cameras are named {camera.name!r}")
 
 
 def _nobody(text: str) -> None:

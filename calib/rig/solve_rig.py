@@ -12,37 +12,30 @@ from freeswing.calib.board.board_motion import Timeline, in_pieces
 from freeswing.calib.camera.camera import Camera
 from freeswing.calib.camera.intrinsics import CameraStart, DroppedView, start_camera
 from freeswing.calib.camera.lens_models import Array
+from freeswing.calib.rig.board_shape import shape_std_m
 from freeswing.calib.rig.bundle_adjustment import (
-    MEDIAN_OF_RAYLEIGH,
     ROUGHLY_CONVERGED,
     Adjustment,
     adjust,
 )
-from freeswing.calib.rig.normal_equations import Problem, length_with_share
-from freeswing.calib.rig.reprojection import Scene, board_size, camera_slices, shape_modes
+from freeswing.calib.rig.line_times import reads_in_lines
+from freeswing.calib.rig.normal_equations import Problem
+from freeswing.calib.rig.outliers import (
+    LEAST_CORNERS,
+    determined_pieces,
+    views_kept,
+    without_far_corners,
+)
+from freeswing.calib.rig.reprojection import Scene, board_size, camera_slices
 from freeswing.calib.rig.reprojection_kernels import CLOCK, POSE, WARP
 from freeswing.calib.rig.rig_start import BaseTie, board_groups, place_in_base, start_rig
+from freeswing.calib.rig.survey_noise import survey_std
 from freeswing.calib.rig.views import FixedPoints, Views, joined_views
 
 Progress = Callable[[str, float], None]
 
-# Of its camera's usual error: a moved or misread board leaves more.
-VIEW_OUTLIER_SIGMAS = 5.0
-VIEW_OUTLIER_FLOOR_PX = 0.5  # below half a pixel nothing was misread, whatever the others reach
-CORNER_SIGMAS = 6.0  # one in 1e8 by chance: none of a session's 1e5 corners
-# share of normal errors within the limit of a corner's on its own, as large for corners together
-CORNER_WITHIN = 1.0 - np.exp(-0.5 * CORNER_SIGMAS**2)
-_LEAST_CORNERS = 4  # three leave four poses of the board open
-LINE_TIME_SIGMAS = 5.0
-LEAST_READOUT_S = 5e-4
 _MOST_SWEEPS = 3
 _SURVEY_ROUNDS = 3
-_SURVEY_PRIOR = 2.0
-LEAST_SURVEY_STD_M = 2e-5
-SAG_STD = 0.002
-"""Of the board's width. Aluminium and glass keep 0.0003, foam and card on wood 0.001 to 0.005."""
-GROWTH_STD = 0.02
-"""Of a marker's side: ink spreads by some hundredths, and public boards state theirs 4 % off."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,30 +143,6 @@ def solve_rig(
     return rig
 
 
-def shape_std_m(board_points_m: Array) -> Array:
-    """How far a board's shape is from its drawing before anything was seen: sags, growth, (3,).
-
-    Source:
-        Bishop 2006, Pattern Recognition and Machine Learning, sec. 3.3: a Gaussian prior; its sizes
-        are shares of the board's.
-    """
-    board_points_m = board_points_m[: board_size(board_points_m)]
-    modes = np.abs(shape_modes(board_points_m))
-    plane = board_points_m[:, :2]
-    extent = np.ptp(plane, axis=0)
-    side = 0.0
-    if modes[:, :, 2].any():
-        tags = plane.reshape(-1, 4, 2)
-        side = float(np.linalg.norm(tags[:, 1] - tags[:, 0], axis=1).mean())
-    return np.array([*(SAG_STD * extent), GROWTH_STD * side if side else np.inf])
-
-
-def reads_in_lines(line_time_s: float, std_s: float, rows: int) -> bool:
-    """Whether a line time stands out, and from the first row to the last makes a difference."""
-    stands_out = abs(line_time_s) > LINE_TIME_SIGMAS * std_s
-    return stands_out and rows * abs(line_time_s) > LEAST_READOUT_S
-
-
 def _without_idle_lines(rig: Rig) -> Rig:
     """Hold line times at zero where they do not stand out: most cameras have a global shutter."""
     free, scene = rig.problem.free.copy(), rig.adjustment.scene
@@ -233,10 +202,10 @@ def refine(
     """
     result = adjust(scene, problem, rounds=1, converged=ROUGHLY_CONVERGED)
     for _ in range(_MOST_SWEEPS):
-        keep, limits, errors = _views_kept(result, problem)
-        trimmed = _trimmed(result, problem)
+        keep, limits, errors = views_kept(result, problem)
+        trimmed = without_far_corners(result, problem)
         n_new = int(problem.views.seen.sum() - trimmed.seen.sum())
-        enough = keep & (trimmed.seen.sum(axis=1) >= _LEAST_CORNERS)
+        enough = keep & (trimmed.seen.sum(axis=1) >= LEAST_CORNERS)
         if enough.all() and n_new == 0:
             break
         dropped += tuple(
@@ -244,7 +213,7 @@ def refine(
             for i in np.flatnonzero(~enough)
         )
         n_trimmed += int(problem.views.seen[enough].sum() - trimmed.seen[enough].sum())
-        enough &= _determined(trimmed.select(enough), result.scene)[trimmed.piece]
+        enough &= determined_pieces(trimmed.select(enough), result.scene)[trimmed.piece]
         views, pieces = trimmed.select(enough).compacted()
         problem = replace(problem, views=views)
         result = adjust(
@@ -257,41 +226,6 @@ def refine(
     if not roughly:
         result = adjust(result.scene, problem, result.sigma_px, rounds=1)
     return Rig(result, problem, reference, dropped, n_trimmed)
-
-
-def _views_kept(result: Adjustment, problem: Problem) -> tuple[np.ndarray, Array, Array]:
-    """Views whose error stays near what is usual in their camera; limits and errors, px.
-
-    The error is the median corner's, each axis: one bad corner is trimmed, not the whole view.
-    """
-    lengths = np.linalg.norm(result.residuals_px, axis=-1)
-    errors = np.nanmedian(lengths, axis=1) / MEDIAN_OF_RAYLEIGH
-    limits = np.zeros(len(errors))
-    for index in range(len(result.scene.cameras)):
-        own = problem.views.camera == index
-        if own.any():
-            usual = max(float(np.median(errors[own])), float(result.sigma_px[index]))
-            limits[own] = max(VIEW_OUTLIER_SIGMAS * usual, VIEW_OUTLIER_FLOOR_PX)
-    return errors <= limits, limits, errors
-
-
-def _determined(views: Views, scene: Scene) -> np.ndarray:
-    """Whether a piece still has as many moments as its motion has coefficients, (n_pieces,)."""
-    pairs = np.unique(np.stack([views.piece, views.moment]), axis=1)
-    moments = np.bincount(pairs[0], minlength=len(scene.motion))
-    rests = np.bincount(views.piece, np.isnan(views.lag_s), len(scene.motion)) > 0
-    return moments > np.where(rests, 0, scene.motion.shape[1])
-
-
-def _trimmed(result: Adjustment, problem: Problem) -> Views:
-    """The views with far-off corners blanked, all that were found together."""
-    views = problem.views
-    white = views.whitened(result.residuals_px)
-    limit = length_with_share(CORNER_WITHIN, white.shape[-1]) * result.sigma_px[views.camera]
-    with np.errstate(invalid="ignore"):
-        far = np.linalg.norm(white, axis=-1) > limit[:, None]
-    far = np.repeat(far, views.group_size, axis=1)
-    return replace(views, pixels=np.where(far[..., None], np.nan, views.pixels))
 
 
 def tie_to_base(rig: Rig, fixed: FixedPoints, *, estimate_survey: bool = True) -> Rig:
@@ -313,24 +247,8 @@ def tie_to_base(rig: Rig, fixed: FixedPoints, *, estimate_survey: bool = True) -
     result = adjust(scene, problem, rig.adjustment.sigma_px, rounds=1)
     for _ in range(_SURVEY_ROUNDS if estimate_survey else 1):
         if estimate_survey:
-            std = _survey_std(result, fixed)
+            std = survey_std(result, fixed)
             fixed = replace(fixed, std_m=np.full(len(fixed.std_m), std))
             problem = replace(problem, fixed=fixed)
         result = adjust(result.scene, problem, result.sigma_px, rounds=1)
     return replace(rig, adjustment=result, problem=problem)
-
-
-def _survey_std(result: Adjustment, fixed: FixedPoints) -> float:
-    """Standard deviation of a surveyed coordinate from the corrections the cameras ask for.
-
-    Variance component estimation: squared corrections over the redundancy that carries them
-    (Foerstner and Wrobel 2016, sec. 4.2.4). Few corrections leave the given value nearly alone:
-    it counts as `_SURVEY_PRIOR` corrections of its own.
-    """
-    correction = result.scene.base_points_m - fixed.points_base_m
-    given = float(fixed.std_m.mean())
-    own = slice(len(result.covariance) - correction.size, None)
-    left = np.diag(result.covariance)[own] / given**2
-    redundancy = max(float(correction.size - left.sum()), 0.0)
-    total = float(np.sum(correction**2)) + _SURVEY_PRIOR * given**2
-    return max(np.sqrt(total / (redundancy + _SURVEY_PRIOR)), LEAST_SURVEY_STD_M)

@@ -11,13 +11,13 @@ import numpy as np
 from freeswing.calib.calibrate import CalibrationResult, Progress
 from freeswing.calib.rig.solve_rig import Rig
 from freeswing.calib.rig.views import FixedPoints
-from freeswing.calib.scene.frame import (
+from freeswing.calib.scene.lab_map import LabMap, map_of
+from freeswing.calib.scene.map_frame import (
     placed_points,
     roughly_in_base,
     tied_to_survey,
     with_distances,
 )
-from freeswing.calib.scene.lab_map import LabMap, map_of
 from freeswing.calib.scene.marks import (
     Click,
     clicked,
@@ -33,8 +33,9 @@ from freeswing.calib.scene.scene_verdict import (
     halves_of,
     judge_scene,
 )
-from freeswing.calib.scene.source import SceneSource, SurveyedPoint
+from freeswing.calib.scene.source import SceneSource
 from freeswing.calib.scene.stills import Still, rig_stills, walk_stills
+from freeswing.calib.scene.tape_measured import SurveyedPoint
 from freeswing.calib.tags.base_tags import SurveyedTag
 from freeswing.calib.verdict.calibration_result import FORMAT, camera_entries, covariance_entry
 from freeswing.calib.verdict.survey_check import SurveyCheck, check_survey

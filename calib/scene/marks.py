@@ -12,8 +12,8 @@ import numpy as np
 from freeswing.calib.camera.camera import Camera
 from freeswing.calib.camera.lens_models import Array
 from freeswing.calib.rig.views import FixedPoints
-from freeswing.calib.scene.source import SurveyedPoint
 from freeswing.calib.scene.stills import Still
+from freeswing.calib.scene.tape_measured import SurveyedPoint
 from freeswing.calib.tags.base_tags import SurveyedTag, find_base_tags
 from freeswing.cdpr.files.documents import InputError, read_text
 from freeswing.cdpr.files.number_table import comma_separated

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from freeswing.calib.scene.source import TAPE_STD_M, Distance, SceneSource, SurveyedPoint
+from freeswing.calib.scene.source import SceneSource
+from freeswing.calib.scene.tape_measured import TAPE_STD_M, Distance, SurveyedPoint
 from freeswing.cdpr.files.documents import Reader
 
 

@@ -16,14 +16,14 @@ from numpy.typing import NDArray
 
 from freeswing.calib.camera import lens_models
 from freeswing.calib.camera.camera import Camera
-from freeswing.calib.tags.gaussian_tables import TABLES
-from freeswing.calib.tags.tag_kernel import (
+from freeswing.calib.tags.accept_tag import (
     BLACK,
     COVARIANCE,
     PIXELS,
     RAYS,
     fit_guess,
 )
+from freeswing.calib.tags.gaussian_tables import TABLES
 from freeswing.calib.tags.tag_patterns import tag_cells
 
 Array = NDArray[np.float64]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +17,14 @@ WORST_STD_RAD = 0.05  # three degrees: people see that a frame does not stand up
 _ROUNDS = 4
 _STEP = 1e-5
 _TURN: tuple[str, ...] = ("rx_rad", "ry_rad", "rz_rad")
+
+# A string this many click deviations long has its direction to 1/20 rad: shorter ones say nothing.
+LEAST_LENGTH_STD = 20.0
+# Scatter of the clicks over their deviation: people misjudge that by a half; twice is a wrong
+# click.
+WORST_SCATTER = 2.0
+# Between the string and gravity_m_s2: by chance once in 90 where both are right.
+DEVIATIONS = 3.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -197,3 +206,61 @@ def _sign(owners: Sequence[Camera], views: Sequence[StringView], vertical: Array
             "list every string's points from the top down"
         )
     return signs[0]
+
+
+def vertical_entry(
+    vertical: Vertical, views: Sequence[StringView], gravity_m_s2: Array
+) -> dict[str, Any]:
+    """The `vertical` of results/calibration.json; `verdict` is agrees, differs or inconsistent.
+
+    Deviations are the claimed ones, times the scatter where that is above one.
+    """
+    size = float(np.linalg.norm(gravity_m_s2))
+    declared, down = gravity_m_s2 / size, vertical.down_base
+    angle = float(np.arctan2(np.linalg.norm(np.cross(declared, down)), declared @ down))
+    covariance = vertical.covariance * max(1.0, vertical.scatter) ** 2
+    std = _std_along(declared - down * (declared @ down), covariance)
+    verdict, sentence = _judged(vertical, angle, std, size * down)
+    return {
+        "verdict": verdict,
+        "sentence": sentence,
+        "down_base": down.tolist(),
+        "covariance": covariance.tolist(),
+        "gravity_m_s2": (size * down).tolist(),
+        "angle_to_gravity_mrad": 1e3 * angle,
+        "angle_std_mrad": 1e3 * std,
+        "scatter": vertical.scatter,
+        "degrees_of_freedom": vertical.degrees_of_freedom,
+        "views": [
+            {
+                "camera": view.camera,
+                "line": view.line,
+                "points": len(view.pixels),
+                "straightness_px": straightness,
+            }
+            for view, straightness in zip(views, vertical.straightness_px, strict=True)
+        ],
+    }
+
+
+def _std_along(difference: Array, covariance: Array) -> float:
+    """Deviation of the vertical along the difference; the largest one where there is none."""
+    length = float(np.linalg.norm(difference))
+    if length < 1e-9:
+        return float(np.sqrt(np.linalg.eigvalsh(covariance)[-1]))
+    return float(np.sqrt(difference @ covariance @ difference)) / length
+
+
+def _judged(vertical: Vertical, angle: float, std: float, gravity: Array) -> tuple[str, str]:
+    told = f"the plumb line is {1e3 * angle:.2f} mrad from gravity_m_s2 (deviation {1e3 * std:.2f})"
+    if vertical.scatter > WORST_SCATTER:
+        return "inconsistent", (
+            f"{told}, but the clicked points scatter by {vertical.scatter:.1f} times their "
+            f"std_px about one vertical, more than {WORST_SCATTER:g}: look for a wrong click, a "
+            "string that swayed or touched something, or state a larger std_px"
+        )
+    if angle <= DEVIATIONS * std:
+        return "agrees", f"{told}: they agree within {DEVIATIONS:g} deviations"
+    vector = ", ".join(f"{value:.5f}" for value in gravity)
+    turned = "the strings were clicked from the bottom up, or " if angle > np.pi / 2 else ""
+    return "differs", f"{told}: {turned}set gravity_m_s2 = [{vector}] in robot.toml"

@@ -3,27 +3,19 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from freeswing.calib.camera.lens_models import Array
-from freeswing.calib.verdict.plumb_line import StringView, Vertical
+from freeswing.calib.verdict.plumb_line import LEAST_LENGTH_STD, StringView
 from freeswing.cdpr.files.documents import InputError, read_text
 from freeswing.cdpr.files.number_table import comma_separated
 
 CLICK_STD_PX = 0.5  # where the file states none: people hit a thin string within the pixel
 _COLUMNS = ("camera", "u_px", "v_px")
 _MOST_BYTES = 1 << 24
-# A string this many click deviations long has its direction to 1/20 rad: shorter ones say nothing.
-LEAST_LENGTH_STD = 20.0
-# Scatter of the clicks over their deviation: people misjudge that by a half; twice is a wrong
-# click.
-WORST_SCATTER = 2.0
-# Between the string and gravity_m_s2: by chance once in 90 where both are right.
-DEVIATIONS = 3.0
 
 
 def read_plumb_line(path: Path | str, cameras: Collection[str]) -> tuple[StringView, ...]:
@@ -80,61 +72,3 @@ def _view(path: Path | str, camera: str, line: str, rows: Array) -> StringView:
             f"which is less than {least:.1f}; click along the whole string, from the top down"
         )
     return view
-
-
-def vertical_entry(
-    vertical: Vertical, views: Sequence[StringView], gravity_m_s2: Array
-) -> dict[str, Any]:
-    """The `vertical` of results/calibration.json; `verdict` is agrees, differs or inconsistent.
-
-    Deviations are the claimed ones, times the scatter where that is above one.
-    """
-    size = float(np.linalg.norm(gravity_m_s2))
-    declared, down = gravity_m_s2 / size, vertical.down_base
-    angle = float(np.arctan2(np.linalg.norm(np.cross(declared, down)), declared @ down))
-    covariance = vertical.covariance * max(1.0, vertical.scatter) ** 2
-    std = _std_along(declared - down * (declared @ down), covariance)
-    verdict, sentence = _judged(vertical, angle, std, size * down)
-    return {
-        "verdict": verdict,
-        "sentence": sentence,
-        "down_base": down.tolist(),
-        "covariance": covariance.tolist(),
-        "gravity_m_s2": (size * down).tolist(),
-        "angle_to_gravity_mrad": 1e3 * angle,
-        "angle_std_mrad": 1e3 * std,
-        "scatter": vertical.scatter,
-        "degrees_of_freedom": vertical.degrees_of_freedom,
-        "views": [
-            {
-                "camera": view.camera,
-                "line": view.line,
-                "points": len(view.pixels),
-                "straightness_px": straightness,
-            }
-            for view, straightness in zip(views, vertical.straightness_px, strict=True)
-        ],
-    }
-
-
-def _std_along(difference: Array, covariance: Array) -> float:
-    """Deviation of the vertical along the difference; the largest one where there is none."""
-    length = float(np.linalg.norm(difference))
-    if length < 1e-9:
-        return float(np.sqrt(np.linalg.eigvalsh(covariance)[-1]))
-    return float(np.sqrt(difference @ covariance @ difference)) / length
-
-
-def _judged(vertical: Vertical, angle: float, std: float, gravity: Array) -> tuple[str, str]:
-    told = f"the plumb line is {1e3 * angle:.2f} mrad from gravity_m_s2 (deviation {1e3 * std:.2f})"
-    if vertical.scatter > WORST_SCATTER:
-        return "inconsistent", (
-            f"{told}, but the clicked points scatter by {vertical.scatter:.1f} times their "
-            f"std_px about one vertical, more than {WORST_SCATTER:g}: look for a wrong click, a "
-            "string that swayed or touched something, or state a larger std_px"
-        )
-    if angle <= DEVIATIONS * std:
-        return "agrees", f"{told}: they agree within {DEVIATIONS:g} deviations"
-    vector = ", ".join(f"{value:.5f}" for value in gravity)
-    turned = "the strings were clicked from the bottom up, or " if angle > np.pi / 2 else ""
-    return "differs", f"{told}: {turned}set gravity_m_s2 = [{vector}] in robot.toml"

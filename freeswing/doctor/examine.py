@@ -17,7 +17,7 @@ from freeswing.doctor.recordings import (
     footage_findings,
     video_findings,
 )
-from freeswing.doctor.split import split_findings
+from freeswing.doctor.run_roles import split_findings
 from freeswing.ident.runs import SwingRun
 from freeswing.session.load_swings import load_robot, load_swing, load_target, trajectory_path
 from freeswing.session.marker_runs import MarkerRuns, read_marker_runs

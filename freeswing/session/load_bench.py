@@ -12,6 +12,7 @@ from freeswing.cdpr.files.signal_csv import coordinates_in, header_of, read_sign
 from freeswing.cdpr.measured.target import Target
 from freeswing.cdpr.measured.trajectory import Trajectory, angle_noise
 from freeswing.cdpr.robot import POSE_COORDINATES, Robot
+from freeswing.cdpr.simulation.parallel_wires import hangs_parallel
 from freeswing.ident.bench.runs import Bench, BenchRun, Signal
 from freeswing.ident.runs import SwingRun
 from freeswing.results.files import read_document
@@ -19,9 +20,7 @@ from freeswing.results.tracking import Tracking
 from freeswing.session.load_swings import load_trajectory, trajectory_path
 from freeswing.session.marker_runs import read_marker_runs
 from freeswing.session.session_file import Run, Session
-
-STRAIGHT_RAD = 0.05  # as well as one sets tags and wires square to each other
-PARALLEL_RAD = 0.02  # wires that lean towards each other by less hang parallel
+from freeswing.vision.planar.straight_wires import check_hangs_straight
 
 
 def is_bench(session: Session, robot: Robot) -> bool:
@@ -37,26 +36,6 @@ def is_bench(session: Session, robot: Robot) -> bool:
     if any(body.inertia_kg_m2.any() for run in session.runs for body in run.payloads):
         return True
     return hangs_parallel(robot) or any(_is_partial(run, robot) for run in session.runs)
-
-
-def hangs_parallel(robot: Robot) -> bool:
-    """Whether two or three wires without pulleys hang parallel, as of a bench.
-
-    Their entries and attachments are then the same figure, up to a turn and a shift.
-    """
-    if robot.n_cables not in (2, 3) or robot.radii_m.any():
-        return False
-    above = robot.entries_m - robot.entries_m.mean(axis=0)
-    below = robot.attachments_m - robot.attachments_m.mean(axis=0)
-    down = robot.gravity_m_s2 / np.linalg.norm(robot.gravity_m_s2)
-    if np.abs(above @ down).max() > PARALLEL_RAD * np.abs(above).max():
-        return False
-    sides = [_sides(points) for points in (above, below)]
-    return bool(np.abs(sides[0] - sides[1]).max() < PARALLEL_RAD * sides[0].max())
-
-
-def _sides(points: np.ndarray) -> np.ndarray:
-    return np.linalg.norm(points[:, None] - points[None], axis=2)
 
 
 def _is_partial(run: Run, robot: Robot) -> bool:
@@ -77,7 +56,7 @@ def load_bench(session: Session, robot: Robot, target: Target | None) -> Bench:
     columns = tuple(channel.column for channel in session.channels)
     places = planar_places(session)
     if places:
-        _check_hangs_straight(session, robot)
+        check_hangs_straight(session.robot, robot)
     runs = tuple(
         _load_run(session, run, robot, target, columns, places.get(run.name))
         for run in session.runs
@@ -117,25 +96,6 @@ def planar_places(session: Session) -> dict[str, np.ndarray]:
         for run in (() if told is None else told.runs)
         if run.planar is not None
     }
-
-
-def _check_hangs_straight(session: Session, robot: Robot) -> None:
-    """One camera from above shows the platform's axes at rest: the base frame's have to be these.
-
-    Raises:
-        InputError: where robot.toml has them turned against each other.
-    """
-    above = (robot.entries_m - robot.entries_m.mean(axis=0))[:, :2]
-    below = (robot.attachments_m - robot.attachments_m.mean(axis=0))[:, :2]
-    turn = np.arctan2(
-        np.sum(below[:, 0] * above[:, 1] - below[:, 1] * above[:, 0]), np.sum(below * above)
-    )
-    if abs(turn) > STRAIGHT_RAD:
-        raise InputError(
-            f"{session.robot}: the wires' upper ends are turned by {np.degrees(turn):.1f} degrees "
-            "against the lower ones: a film from above shows the platform's axes alone, so that "
-            "the base frame's have to be the platform's at rest; write entry_m in these"
-        )
 
 
 def _load_run(

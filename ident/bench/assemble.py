@@ -10,7 +10,6 @@ import numpy as np
 from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.robot import POSE_COORDINATES, Array, Robot
 from freeswing.ident.bench.averaged import averaged
-from freeswing.ident.bench.channel_blocks import channel_blocks
 from freeswing.ident.bench.channels import Channel
 from freeswing.ident.bench.chart import Chart
 from freeswing.ident.bench.first_guesses import (
@@ -23,28 +22,28 @@ from freeswing.ident.bench.first_guesses import (
 )
 from freeswing.ident.bench.from_rest import zero_blocks
 from freeswing.ident.bench.held_uncertain import named_sway, reference
-from freeswing.ident.bench.modal import SQUARE, ModalSwing
+from freeswing.ident.bench.modal import ModalSwing
 from freeswing.ident.bench.objects import body_of, moments, specific
+from freeswing.ident.bench.priors.body_priors import extent, load_block, platform_block
+from freeswing.ident.bench.priors.channel_priors import channel_blocks
+from freeswing.ident.bench.priors.motion_priors import (
+    amplitude_block,
+    loose_coordinates,
+    starts_block,
+)
+from freeswing.ident.bench.priors.wire_priors import (
+    EACH_LENGTH,
+    UNSTATED_LENGTH_STD_M,
+    WRONG_LENGTH,
+    centred_block,
+)
 from freeswing.ident.bench.runs import Bench, BenchRun, Load
-from freeswing.ident.bench.swing import COMMON, IZZ, BenchSwing, Column, Riding
+from freeswing.ident.bench.swing import COMMON, BenchSwing, Column, Riding
 from freeswing.ident.likelihood.unknowns import Gaussian, Unknown, Unknowns
 from freeswing.ident.signals.prepare import guessed_inertia
 
 EFFECTS = ("rotational_drag", "translational_drag")  # air is never absent
 UNIT_NOISE_M, UNIT_NOISE_RAD = 1e-4, 5e-4
-UNSTATED_LENGTH_STD_M = 1e-3  # by tape
-EACH_LENGTH = 1e-4  # of a wire's length: what weights stretch and rehanging shifts
-TWICE_AS_WIDE = 3.0  # of squared amplitude: a twist of twice the usual is one deviation off
-WRONG_LENGTH = 0.03  # of it: knots, hooks, a unit's slip; what is looked for where sway is seen
-SWAY_RAD = 0.02  # unseen sway after a twist by hand: a degree
-UNSEEN_RAD = 0.3  # an angle that no column measures directly
-SEEN_RAD = 0.5  # where it is measured the samples say all: nothing is assumed
-WIDE_COM = 0.3  # of the attachments' spread: a body lies or hangs among its wires
-UPRIGHT = 0.9  # of gravity along a platform axis: along it the centre may hang far down
-CENTRED_COM = 0.02  # the same of a platform, across: its wires share the weight to 4 %
-WIDE_TENSOR = 2.0  # of mass x spread^2: twice a hoop through the wires
-WIDE_PRODUCTS = 0.3  # of its Izz: a body of 1 to 2.5 whose axes lie askew by 25 degrees
-WIDE_MASS = 0.5  # of the declared mass, where payloads are to say it
 SCANNED_RUNS = 4
 
 
@@ -82,12 +81,6 @@ class Guess:
         for placed in run.loads:
             found = found + moments(self.loads[placed.load], placed.turn, placed.shift_m)
         return found
-
-
-def extent(robot: Robot) -> float:
-    """How far the attachments spread, root mean square, at least 5 cm."""
-    off = robot.attachments_m - robot.attachments_m.mean(axis=0)
-    return max(0.05, float(np.sqrt(np.mean(np.sum(off**2, axis=1)))))
 
 
 def columns_of(run: BenchRun, channels: Sequence[Channel]) -> tuple[Column, ...]:
@@ -249,7 +242,7 @@ def _swing(
         chart=chart,
         riding=tuple(riding),
         known=known,
-        loose=_loose(columns, _lengths(run)),
+        loose=loose_coordinates(columns, _lengths(run)),
     )
 
 
@@ -263,19 +256,19 @@ def _unknowns(
     gains: Gains,
 ) -> Unknowns:
     robot = model.robot
-    blocks = [_platform(robot, bench, runs, guess)]
-    blocks += [_load(bench.load(name), robot, body) for name, body in guess.loads.items()]
+    blocks = [platform_block(robot, bench, runs, guess.platform)]
+    blocks += [load_block(bench.load(name), robot, body) for name, body in guess.loads.items()]
     blocks.append(_effects(model, len(runs)))
     for name in dict.fromkeys(swing.wires for swing in swings):
         run = runs[[swing.wires for swing in swings].index(name)]
         std = run.lengths_std_m or UNSTATED_LENGTH_STD_M
-        blocks.append(_centred(name, np.zeros(robot.n_cables), std, "cable_lengths_std_m"))
+        blocks.append(centred_block(name, np.zeros(robot.n_cables), std, "cable_lengths_std_m"))
     mean = float(np.mean([_lengths(run) for run in runs]))
-    blocks.append(_centred(COMMON, np.zeros(1), WRONG_LENGTH * mean, "wires as sway has them"))
+    blocks.append(centred_block(COMMON, np.zeros(1), WRONG_LENGTH * mean, "wires as sway has them"))
     each = EACH_LENGTH * mean
     zero = np.zeros((len(runs), robot.n_cables))
-    blocks.append(_centred("wires_each", zero, each, "wires between runs", each_run=True))
-    blocks.append(_starts(swings, glimpses))
+    blocks.append(centred_block("wires_each", zero, each, "wires between runs", each_run=True))
+    blocks.append(starts_block(swings, glimpses))
     for place, channel in enumerate(bench.channels):
         if channel.name in gains:
             named = named_sway(bench, runs, place)
@@ -283,7 +276,7 @@ def _unknowns(
     blocks += zero_blocks(_places(swings), len(runs))
     scaled = reference(bench, runs)
     if scaled is not None:
-        blocks.append(_amplitude(scaled))
+        blocks.append(amplitude_block(scaled))
     return Unknowns(tuple(blocks))
 
 
@@ -297,58 +290,6 @@ def _places(swings: Sequence[BenchSwing]) -> dict[int, Array]:
     }
 
 
-def _amplitude(channel: Channel) -> Unknown:
-    """How much larger than assumed amplitudes are, squared: as wide as the gain's own spread."""
-    main = channel.main_coordinate
-    wide = TWICE_AS_WIDE
-    if main in channel.gains:
-        wide = 2.0 * channel.gains_std.get(main, 0.0) / abs(channel.gains[main]) + 1e-6
-    prior = Gaussian(np.ones(1), np.full(1, wide), "gains" if main in channel.gains else "a twist")
-    low = np.full(1, 1e-3)
-    return Unknown(SQUARE, np.ones(1), np.full(1, min(1.0, wide)), prior, low=low)
-
-
-def _platform(robot: Robot, bench: Bench, runs: Sequence[BenchRun], guess: Guess) -> Unknown:
-    mass, size = guess.platform[0], extent(robot)
-    payload = any(run.payloads for run in runs)
-    std = bench.mass_std_kg or (WIDE_MASS * mass if payload else None)
-    wide = wide_body(mass, size, guess.platform[IZZ])
-    down = np.abs(robot.gravity_m_s2) / np.linalg.norm(robot.gravity_m_s2)
-    wide[:3] *= np.where(down > UPRIGHT, 1.0, CENTRED_COM / WIDE_COM)
-    spread = np.concatenate([[std or 1.0], wide])
-    mean = np.concatenate([guess.platform[:7], np.zeros(3)])
-    estimated = np.array([std is not None] + [True] * 9)
-    scale = np.concatenate([[0.1 * mass], 0.5 * wide])
-    prior = Gaussian(mean, spread, "a body of the attachments' spread")
-    return Unknown("platform", guess.platform, scale, prior, estimated)
-
-
-def wide_body(mass_kg: float, extent_m: float, izz_kg_m2: float) -> Array:
-    """Prior spread of centre and tensor of a body of which nothing but its size is known, (9,).
-
-    Source:
-        Bishop 2006, Pattern Recognition and Machine Learning, sec. 2.3: a wide prior; sizes
-        by m l^2.
-    """
-    tensor = np.full(3, WIDE_TENSOR * mass_kg * extent_m**2)
-    products = np.full(3, WIDE_PRODUCTS * abs(izz_kg_m2))
-    return np.concatenate([np.full(3, WIDE_COM * extent_m), tensor, products])
-
-
-def _load(load: Load, robot: Robot, body: Array) -> Unknown:
-    wide = wide_body(load.mass_kg, extent(robot), body[IZZ])
-    if load.com_std_m is not None:
-        wide[:3] = load.com_std_m
-    mass_std = load.mass_std_kg or 0.0
-    spread = np.concatenate([[mass_std or 1.0], wide])
-    mean = np.concatenate([body[:7], np.zeros(3)])
-    estimated = np.array([mass_std > 0.0] + [True] * 9)
-    scale = np.concatenate([[mass_std or 1.0], 0.5 * wide])
-    return Unknown(
-        f"load.{load.name}", body, scale, Gaussian(mean, spread, "session.toml"), estimated
-    )
-
-
 def _effects(model: Model, runs: int) -> Unknown:
     """Drag, which each run has for itself: what it acts on differs with the load."""
     start = model.start_values
@@ -358,29 +299,3 @@ def _effects(model: Model, runs: int) -> Unknown:
     values = np.tile(start, (runs, 1))
     prior = Gaussian(start, spread, "plausible drag")
     return Unknown("effects", values, scale, prior, rates, each_run=True)
-
-
-def _centred(name: str, values: Array, std: float, source: str, each_run: bool = False) -> Unknown:
-    spread = np.full(values.shape[-1], std)
-    return Unknown(name, values, spread, Gaussian(0.0 * spread, spread, source), each_run=each_run)
-
-
-def _starts(swings: Sequence[BenchSwing], glimpses: Sequence[Glimpse]) -> Unknown:
-    values = np.array(
-        [
-            swing.chart.numbers(first.zeta, first.rates)
-            for swing, first in zip(swings, glimpses, strict=True)
-        ]
-    )
-    spread = np.full(values.shape[1], SEEN_RAD)
-    spread[len(spread) // 2 :] *= 2.0 * np.pi  # turned round once a second
-    prior = Gaussian(np.zeros(len(spread)), spread, "a swing")
-    return Unknown("start", values, 0.2 * spread, prior, each_run=True)
-
-
-def _loose(columns: Sequence[Column], lengths_m: Array) -> Array:
-    """How far coordinates that no column measures directly may be from rest, (6,)."""
-    seen = [column.coordinate for column in columns if column.coordinate is not None]
-    found = np.repeat([SWAY_RAD * float(np.mean(lengths_m)), UNSEEN_RAD], 3)
-    found[seen] = np.inf
-    return found

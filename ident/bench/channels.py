@@ -14,9 +14,11 @@ from types import MappingProxyType
 
 import numpy as np
 
+from freeswing.cdpr.files.problems import DataError
 from freeswing.cdpr.robot import POSE_COORDINATES, Array
 
 HIGHEST_ORDER = 3  # at six degrees a fourth power leaves 1e-4 of the amplitude
+LEAST_OVER_NOISE = 5.0  # a channel's spread over the noise between its neighbours
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,3 +101,28 @@ class Channel:
                 rest = term[:place] + term[place + 1 :]
                 found[:, self.columns[term[place]]] += gain * np.prod(own[:, rest], axis=1)
         return found
+
+
+def check_moves(run: str, column: str, values: Array) -> None:
+    """Refuses a channel that never leaves its noise in a run.
+
+    Args:
+        run: its name.
+        column: of the channel.
+        values: its samples, (n,).
+
+    Raises:
+        DataError: naming both.
+    """
+    known = values[np.isfinite(values)]
+    if len(known) < 20:
+        raise DataError(f"run {run}: channel column {column} holds {len(known)} samples")
+    # Second differences: a swing's own curvature between neighbours is far below its size.
+    noise = float(np.std(np.diff(known, 2))) / np.sqrt(6.0)
+    spread = float(np.std(known))
+    if not spread > LEAST_OVER_NOISE * noise:
+        raise DataError(
+            f"run {run}: channel column {column} never moves above its noise: it "
+            f"spreads by {spread:.3g}, its noise is {noise:.3g} ({LEAST_OVER_NOISE:g} times that "
+            "is needed); twist wider, or leave the channel out"
+        )

@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 
 from freeswing.cdpr.files.problems import DataError
-from freeswing.cdpr.model.batch import evaluate
-from freeswing.cdpr.model.equations import Model, build_model
+from freeswing.cdpr.model.equations import build_model
 from freeswing.cdpr.robot import POSE_COORDINATES, Array, Robot
 from freeswing.ident.bench.assemble import EFFECTS, assembled
+from freeswing.ident.bench.channels import check_moves
+from freeswing.ident.bench.priors.wire_priors import with_lengths
 from freeswing.ident.bench.runs import Bench, BenchRun, Signal
 from freeswing.ident.bench.solve import Solved, solved
 from freeswing.ident.bench.told.budget import budget
@@ -30,10 +31,7 @@ from freeswing.ident.bench.told.report_objects import (
     platform_rows,
 )
 from freeswing.ident.bench.told.rolled import rolled_sentences
-from freeswing.ident.bench.told.scatter import scatter_sentence
-
-LEAST_OVER_NOISE = 5.0  # a channel's spread over the noise between its neighbours
-FROM_POSES_STD_M = 2e-3  # wire lengths from mean poses: as good as the wires' ends are known
+from freeswing.ident.bench.told.scatter_by_kind import scatter_sentence
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,7 +110,7 @@ def identify_bench(bench: Bench, robot: Robot) -> BenchResult:
     """
     _check(bench, robot)
     model = build_model(robot, EFFECTS)
-    runs = tuple(_with_lengths(model, run) for run in bench.runs)
+    runs = tuple(with_lengths(model, run) for run in bench.runs)
     bench = replace(bench, runs=tuple(_windowed(run) for run in runs))
     fitted = [run for run in bench.runs if run.role == "identify"]
     try:
@@ -150,37 +148,8 @@ def _check(bench: Bench, robot: Robot) -> None:
                 "cable_lengths_m is not given: give the wires' lengths"
             )
         for signal in run.signals:
-            _check_moves(run, signal)
-
-
-def _check_moves(run: BenchRun, signal: Signal) -> None:
-    if signal.is_coordinate:
-        return
-    known = signal.values[np.isfinite(signal.values)]
-    if len(known) < 20:
-        raise DataError(
-            f"run {run.name}: channel column {signal.column} holds {len(known)} samples"
-        )
-    # Second differences: a swing's own curvature between neighbours is far below its size.
-    noise = float(np.std(np.diff(known, 2))) / np.sqrt(6.0)
-    spread = float(np.std(known))
-    if not spread > LEAST_OVER_NOISE * noise:
-        raise DataError(
-            f"run {run.name}: channel column {signal.column} never moves above its noise: it "
-            f"spreads by {spread:.3g}, its noise is {noise:.3g} ({LEAST_OVER_NOISE:g} times that "
-            "is needed); twist wider, or leave the channel out"
-        )
-
-
-def _with_lengths(model: Model, run: BenchRun) -> BenchRun:
-    """A run of full poses without stated lengths gets those of its mean poses."""
-    if run.lengths_m is not None:
-        return run
-    columns = {signal.column: signal.values for signal in run.signals}
-    poses = np.stack([columns[name] for name in POSE_COORDINATES], axis=1)
-    known = poses[np.isfinite(poses).all(axis=1)]
-    lengths = evaluate(model.lengths, known, model.start_values)[0].mean(axis=0)
-    return replace(run, lengths_m=lengths, lengths_std_m=run.lengths_std_m or FROM_POSES_STD_M)
+            if not signal.is_coordinate:
+                check_moves(run.name, signal.column, signal.values)
 
 
 def _windowed(run: BenchRun) -> BenchRun:

@@ -9,12 +9,14 @@ import numpy as np
 from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.model.statics import Equilibrium, modes
 from freeswing.cdpr.robot import Array
-from freeswing.ident.bench.assemble import UNSTATED_LENGTH_STD_M, Assembled
+from freeswing.ident.bench.assemble import Assembled
 from freeswing.ident.bench.held_uncertain import Held, considered, gauge, holding, sees_sway, unseen
 from freeswing.ident.bench.mass_verdict import CONTRADICTED, MassVerdict, doubt, weighed_mass
-from freeswing.ident.bench.noise import WIDE_SCATTER, rescaled, scatter_block, scatter_std
+from freeswing.ident.bench.noise import rescaled
 from freeswing.ident.bench.objects import moments, specific
+from freeswing.ident.bench.priors.wire_priors import UNSTATED_LENGTH_STD_M
 from freeswing.ident.bench.runs import Bench
+from freeswing.ident.bench.scatter import WIDE_SCATTER, scatter_block, scatter_std
 from freeswing.ident.bench.swing import COMMON, IZZ, BenchSwing
 from freeswing.ident.likelihood.fit import Solution, fit
 from freeswing.ident.likelihood.fit_blocks import Dense

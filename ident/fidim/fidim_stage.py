@@ -22,8 +22,8 @@ from freeswing.ident.fidim.weighted_least_squares import (
     noisy_regressor,
     weighted_fidim,
 )
-from freeswing.ident.judge.comparison import between_runs
 from freeswing.ident.judge.consistency import nearest_possible
+from freeswing.ident.judge.free_against_full import between_runs
 from freeswing.ident.likelihood.between_runs import widened
 from freeswing.ident.runs import DroppedRun
 from freeswing.ident.signals.derivatives import SignalSettings

@@ -32,6 +32,7 @@ from freeswing.ident.likelihood.minimise import minimised
 from freeswing.ident.likelihood.payload_runs import Loads
 from freeswing.ident.likelihood.run_residuals import Samples, differences, predicted, residuals
 from freeswing.ident.likelihood.unknowns import Mask, Unknowns
+from freeswing.ident.signals.residual_colour import enlargement, low_band_factor
 
 Progress = Callable[[str, float], None]
 WHOLE = "maximum likelihood: whole runs"
@@ -40,10 +41,8 @@ FIRST_STATES_S = 0.4  # short enough that no mode turns round: rough first state
 FIRST_STRETCH_S = 1.5
 STRETCH_GROWTH = 2.5
 STEPS = 30
-LOW_BAND_HZ = 5.0  # hanging platforms swing at 0.3 to 3 Hz: what a model misses follows them
 CONVERGED_DECREASE = 0.01
 ROUGH_DECREASE = 5.0
-COLOURED = 1.2  # correlation from which residuals are not white
 # Lengths known to a micrometre are walls that a step cannot follow: they are let down in stages.
 LOOSE_LENGTH_STD_M = 5e-4
 TIGHTER_LENGTH_STD_M = 2e-5
@@ -159,7 +158,7 @@ class LikelihoodFit(Solution):
     @property
     def enlargement(self) -> float:
         """By what the covariance was multiplied for residuals that are not white."""
-        return _enlargement(self.correlation)
+        return enlargement(self.correlation)
 
     @property
     def n_samples(self) -> int:
@@ -279,7 +278,7 @@ def _packed(problem: Problem, state: State, step: Step, taken: int, stop: Stop) 
     covariance = shared_covariance(step.triangle, determined, problem.free, problem.unit)
     return LikelihoodFit(
         unknowns=model_unknowns(problem.model, problem.loads, found, problem.free),
-        covariance=covariance * _enlargement(correlation),
+        covariance=covariance * enlargement(correlation),
         cost=cost,
         residuals=tuple(run.ravel() for run in white),
         singular_values=step.singular_values,
@@ -292,10 +291,6 @@ def _packed(problem: Problem, state: State, step: Step, taken: int, stop: Stop) 
         deviance=cost + 2.0 * float(counts @ np.log(state.scales)),
         between=jackknife_std(step.runs, step.priors, problem.free, problem.unit),
     )
-
-
-def _enlargement(correlation: float) -> float:
-    return correlation if correlation > COLOURED else 1.0
 
 
 def _values(problem: Problem, state: State) -> Array:
@@ -311,15 +306,3 @@ def correlation_factor(
     """Power of the residuals below 5 Hz over what white noise of their variance would have."""
     pairs = zip(motions, samples, strict=True)
     return low_band_factor([(residuals(motion, run, scales), run.times_s) for motion, run in pairs])
-
-
-def low_band_factor(series: Sequence[tuple[Array, Array]]) -> float:
-    """Power of series (n, c), each with its times (n,), below 5 Hz over that of white noise."""
-    low, whole = 0.0, 0.0
-    for white, times_s in series:
-        power = np.abs(np.fft.rfft(white, axis=0)) ** 2
-        frequencies = np.fft.rfftfreq(len(white), float(np.median(np.diff(times_s))))
-        inside = (frequencies > 0.0) & (frequencies <= LOW_BAND_HZ)
-        low += float(power[inside].mean(axis=0).sum())
-        whole += float(power[1:].mean(axis=0).sum())
-    return low / whole if whole > 0 else 1.0

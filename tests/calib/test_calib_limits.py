@@ -13,9 +13,10 @@ import numpy as np
 import pytest
 
 from freeswing.calib.board.coverage import coverage_of
-from freeswing.calib.board.sightings import _wanted, smoothness
+from freeswing.calib.board.searched_frames import in_bursts
+from freeswing.calib.board.smooth_motion import smoothness
 from freeswing.calib.camera.camera import Camera
-from freeswing.calib.exchange import _refuse_impossible
+from freeswing.calib.exchange.impossible_cameras import refuse_impossible
 from freeswing.calib.exchange.lengths import in_metres
 from freeswing.calib.exchange.qualisys import _binning
 from freeswing.calib.verdict import survey_check, truth_checks
@@ -38,7 +39,7 @@ def test_an_image_is_filled_by_sixteenths() -> None:
 
 
 def test_a_long_film_is_looked_at_in_bursts_of_five() -> None:
-    wanted = np.array(sorted(_wanted(100000)))
+    wanted = np.array(sorted(in_bursts(100000)))
     lengths = np.diff(np.flatnonzero(np.r_[True, np.diff(wanted) > 1, True]))
     assert set(lengths.tolist()) == {5}
 
@@ -48,8 +49,8 @@ def smooth(corners: int, first_px: float, second_px: float) -> int:
     pixels = np.full((3, 8, 2), np.nan)
     pixels[:, :corners, 1] = np.arange(corners)
     pixels[:, :corners, 0] = np.array([0.0, first_px, first_px + second_px])[:, None]
-    seen = stub(pixels=pixels, stamps_s=0.1 * np.arange(3.0), numbers=np.arange(3))
-    return int(smoothness(seen)[0][1])
+    numbers = np.arange(3)
+    return int(smoothness(pixels, 0.1 * numbers, numbers)[0][1])
 
 
 @pytest.mark.parametrize(("corners", "told"), [(3, 0), (4, 1)])
@@ -69,7 +70,7 @@ def test_a_rotation_of_a_file_is_one_to_a_thousandth(off, refused) -> None:
     pose[:3, :3] *= np.sqrt(1.0 + off)
     camera = stub(name="a", size_px=(640, 480), T_camera_base=pose)
     with pytest.raises(InputError, match="its rotation is none") if refused else nullcontext():
-        _refuse_impossible(Path("a.toml"), [camera])
+        refuse_impossible(Path("a.toml"), [camera])
 
 
 @pytest.mark.parametrize(("far", "as_stated"), [(58.0, True), (62.0, False)])

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from freeswing.excite import bench_plan, bench_table, plan_tables
-from freeswing.excite.bench_plan import BenchCase
+from freeswing.excite.bench_plan import BenchCase, bench_case
 
 CASE = BenchCase(1.26, 0.04, 0.8, 0.0093, 0.25, 1.2, 0.4)
 
@@ -42,7 +42,7 @@ def test_bodies_of_which_nothing_is_said_are_a_disc_and_a_small_object() -> None
         attachments_m=ends, entries_m=ends + np.array([0.0, 0.0, 1.0]),
         platform=SimpleNamespace(mass_kg=2.0, specific_inertia_m2=None),
     )  # fmt: skip
-    case = bench_table.bench_case(robot, None, None)
+    case = bench_case(robot, None, None)
     disc, small = 0.5 * 2.0 * 0.3**2, 0.5 * 2.0 * (0.45 * 0.3) ** 2
     assert case.izz_kg_m2 == pytest.approx(disc, rel=0.1)
     assert case.load_izz_kg_m2 == pytest.approx(small, rel=0.15)

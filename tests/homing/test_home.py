@@ -17,8 +17,8 @@ from freeswing.homing.acquisition import (
 )
 from freeswing.homing.best_fit import best_fit, model_for
 from freeswing.homing.fit_start_pose import StartProblem
-from freeswing.homing.guess_from_tensions import TensionEnergy
-from freeswing.homing.home import find_start, guess_poses, home
+from freeswing.homing.guess_from_tensions import TensionEnergy, guess_poses
+from freeswing.homing.home import find_start, home
 from freeswing.homing.homing_files import GeometryNoise, Homing, ReadingNoise, Readings
 from tests.paper_robots import LARGEST_N, PERTURBED_N, START_N, bologna_3, bologna_4
 
@@ -190,5 +190,7 @@ def test_advised_axes_home_better():
     robot = bologna_3()
     declared = homing_quality(robot, EXACT)
     _, advised = better_axes(robot, EXACT, lambda *_: None)
+    assert declared is not None
+    assert advised is not None
     gain = declared.position_std_m / advised.position_std_m
     assert gain > 1.1, f"the advised axes gain a factor of {gain:.2f}"

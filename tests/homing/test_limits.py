@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 
 from freeswing.cdpr.files.documents import DataError
-from freeswing.homing import acquisition, best_fit, home, swivel_advice
+from freeswing.homing import acquisition, best_fit, doubted_geometry, home, swivel_advice
 from freeswing.homing.acquisition import PERFECT, simulate_acquisition
 from freeswing.homing.best_fit import PLAIN, ROBUST
-from freeswing.homing.homing_document import _suspects
+from freeswing.homing.guess_from_tensions import _weight_N
 from freeswing.homing.homing_files import Homing, ReadingNoise, Readings
+from freeswing.homing.reading_mistakes import suspect_readings
 from tests.paper_robots import LARGEST_N, START_N, bologna_3
 
 
@@ -80,7 +81,8 @@ def test_a_fit_whose_geometry_is_doubted(monkeypatch, chi_square, doubted) -> No
 
     monkeypatch.setattr(home, "guess_poses", lambda *_: [np.zeros((9, 6))])
     monkeypatch.setattr(home, "model_for", lambda *_: None)
-    monkeypatch.setattr(home, "StartProblem", Doubted)
+    for where in (home, doubted_geometry):
+        monkeypatch.setattr(where, "StartProblem", Doubted)
     monkeypatch.setattr(home, "best_fit", lambda *_: fit)
     assert home.find_start(homing) is fit
     assert any(asked) == doubted
@@ -91,7 +93,7 @@ def test_readings_that_lost_weight_are_told(weight, told) -> None:
     weights = np.ones((3, 6))
     weights[1, 4] = weight
     fit = SimpleNamespace(length_m=np.zeros(3), weights=weights, residuals=np.zeros((3, 6)))
-    assert [one["column"] for one in _suspects(fit)] == (["dl2_m"] if told else [])
+    assert [one["column"] for one in suspect_readings(fit)] == (["dl2_m"] if told else [])
 
 
 def test_where_the_loss_of_a_wrong_reading_bends() -> None:
@@ -145,7 +147,7 @@ def test_start_tensions_of_an_unknown_mass_hold_it_one_and_a_half_times() -> Non
     robot = SimpleNamespace(
         gravity_m_s2=np.array([0.0, 0.0, -9.8]), platform=SimpleNamespace(mass_kg=None)
     )
-    assert 95.0 < home._weight_N(robot, np.full(3, 50.0)) < 105.0
+    assert 95.0 < _weight_N(robot, np.full(3, 50.0)) < 105.0
 
 
 def test_a_slack_cable_still_pulls_by_a_fiftieth_of_the_weight(monkeypatch) -> None:

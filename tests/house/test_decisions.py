@@ -51,7 +51,7 @@ def test_what_is_read_when_a_file_is_imported_is_not_changed_in_memory() -> None
     assert can_be_in_place(
         "vision/planar/dots.py", "REACH", "tests/vision/planar/test_planar_limits.py"
     )
-    assert not can_be_in_place("calib/tags/tag_kernel.py", "_LEAST_CONTRAST", __file__)
+    assert not can_be_in_place("calib/tags/accept_tag.py", "_LEAST_CONTRAST", __file__)
 
 
 NUMBERS = named_numbers()

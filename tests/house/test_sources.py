@@ -23,6 +23,7 @@ NO_FORMULA = {
     "cdpr/measured/marker_recording.py:marker_position": "picks a column",
     "homing/rest_readings.py:evaluate_evenly": "pads a batch",
     "ident/bench/noise.py:column_residuals": "splits an array",
+    "ident/bench/priors/motion_priors.py:loose_coordinates": "widths by coordinate",
     "vision/fuse/linearised_block.py:lags": "differences of time stamps",
     "vision/fuse/run_views.py:instants_of": "picks time stamps",
 }

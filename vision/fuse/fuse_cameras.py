@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from freeswing.vision.fuse.blocks import blocks
 from freeswing.vision.fuse.linearised_block import block_poses, lags, seen_by
+from freeswing.vision.fuse.motion_from_poses import motion_of_poses
 from freeswing.vision.fuse.noise import Noise, NoiseSums, alike, whitened
 from freeswing.vision.fuse.pose_kernels import (
     ROBUST_LIMIT,
@@ -24,7 +25,7 @@ from freeswing.vision.fuse.pose_kernels import (
     linearise_block,
     solve_block,
 )
-from freeswing.vision.fuse.poses import Poses, motion_of_poses, unknown_poses
+from freeswing.vision.fuse.poses import Poses, unknown_poses
 from freeswing.vision.fuse.run_views import Block, CameraViews
 from freeswing.vision.look.watched_target import Watch
 

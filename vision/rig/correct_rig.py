@@ -21,7 +21,6 @@ from freeswing.vision.fuse.poses import Poses
 from freeswing.vision.fuse.run_views import CameraViews, instants_of
 from freeswing.vision.look.marker_names import label_markers
 from freeswing.vision.look.watched_target import Watch
-from freeswing.vision.rig.alignment import Missed, aligned
 from freeswing.vision.rig.gross_faults import moved_too_far, refuse_disagreement, refuse_gross
 from freeswing.vision.rig.rig_effects import (
     LEAST_CLOCK_S,
@@ -36,6 +35,7 @@ from freeswing.vision.rig.rig_effects import (
 )
 from freeswing.vision.rig.rig_kernels import CLOCK, LINE, PER_CAMERA, POSE
 from freeswing.vision.rig.stamp_jitter import stamp_jitter_s, widened_poses, widened_step
+from freeswing.vision.rig.started_apart import Missed, aligned
 from freeswing.vision.rig.untied import untied_shifts
 
 Array = NDArray[np.float64]

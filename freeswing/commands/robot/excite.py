@@ -72,7 +72,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(options: Namespace, console: Console) -> None:
     """Plan, and say what the plan is worth."""
     from freeswing.cdpr.files.robot_file import read_robot
-    from freeswing.session.load_bench import hangs_parallel
+    from freeswing.cdpr.simulation.parallel_wires import hangs_parallel
 
     if options.drive:
         asked = {"duration_s": SECONDS, "starts": SCORED, "random": RANDOM}

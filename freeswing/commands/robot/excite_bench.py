@@ -37,8 +37,8 @@ def add_bench_arguments(parser: ArgumentParser) -> None:
 def run_bench(robot: Robot, options: Namespace, console: Console) -> None:
     """The bench's one table."""
     from freeswing.cdpr.system.confine import results_folder
-    from freeswing.excite.bench_plan import planned
-    from freeswing.excite.bench_table import bench_case, bench_document, bench_words
+    from freeswing.excite.bench_plan import bench_case, planned
+    from freeswing.excite.bench_table import bench_document, bench_words
     from freeswing.results.planning import BenchPlan
     from freeswing.session.made import Made, write_made
 

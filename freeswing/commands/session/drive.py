@@ -10,15 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 from freeswing.commands.arguments import add_effects, add_results
 from freeswing.console import Console
+from freeswing.ident.drive.trust import ABOVE_NOISE
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from freeswing.results.driven.estimates import DriveResult
     from freeswing.session.drive_session import DriveFile
-
-# Residuals of a right model are their noise: counts that stand still make 1.1 of it at most.
-MISFIT = 1.5
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -257,7 +255,7 @@ def _warn(document: DriveResult, console: Console) -> None:
             f"current_limits_A at {entry.samples} samples: they are taken to give the limit"
         )
     times = document.residual.times_noise
-    wrong = [f"{run} {value:.1f}" for run, value in times.items() if value and value > MISFIT]
+    wrong = [f"{run} {value:.1f}" for run, value in times.items() if value and value > ABOVE_NOISE]
     if wrong:
         console.complain(
             f"the angles' residuals are above their noise (times: {', '.join(wrong)}): something "

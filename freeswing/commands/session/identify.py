@@ -144,7 +144,7 @@ def _recording_notes(
 ) -> list[str]:
     """What of the recordings was left out, put right or contradicts the session file."""
     from freeswing.doctor.markers import marker_findings
-    from freeswing.doctor.motion import stamp_findings
+    from freeswing.doctor.time_stamps import stamp_findings
 
     found = list(marker_findings(markers))
     notes = []

@@ -17,6 +17,7 @@ from freeswing.ident.drive.joint import Estimate
 from freeswing.ident.drive.kinematics import Kinematics
 from freeswing.ident.drive.ramps import Ramp
 from freeswing.ident.drive.run_problem import DriveRun
+from freeswing.ident.drive.trust import is_untold
 from freeswing.results.driven.estimates import DriveResult
 from freeswing.results.driven.motion import DriveMotion
 
@@ -28,9 +29,6 @@ SPECTRUM_S = 1.0  # of a piece, so that the lowest rate is 1 Hz
 DIGITS = 6  # of what is only shown
 EVIDENCE_S = 0.5  # of a run: what an effect explains is told in pieces of this length
 MOST_EVIDENCE = 5
-
-# A number whose deviation is more of itself is not an estimate.
-LARGEST_SHARE = 0.3
 
 
 def drive_document(
@@ -167,11 +165,6 @@ def times_noise(session: DriveSession, fit: RunFit) -> float:
     return fit.rms_rad / session.noise.angle_std_rad
 
 
-def unknown(std: float, value: float) -> bool:
-    """Whether a number is not determined."""
-    return not np.isfinite(std) or std > LARGEST_SHARE * abs(value)
-
-
 def _parameters(
     names: Sequence[str], values: Array, std: Array, on_bound: NDArray[np.bool_] | None = None
 ) -> list[dict[str, Any]]:
@@ -179,7 +172,7 @@ def _parameters(
     for k, name in enumerate(names):
         # What an effect adds has no size of its own to compare with.
         is_offset = name.partition(".")[0] in known
-        lost = not np.isfinite(std[k]) if is_offset else unknown(std[k], values[k])
+        lost = not np.isfinite(std[k]) if is_offset else is_untold(std[k], values[k])
         entry = {"name": name, "value": None if lost else values[k]}
         entry |= {"std": None if lost else std[k], "identifiable": not lost}
         entries.append(entry | {"on_bound": bool(on_bound is not None and on_bound[k])})

@@ -23,7 +23,7 @@ from freeswing.ident.bench.modal import ModalSwing
 from freeswing.ident.bench.runs import Bench
 from freeswing.ident.bench.solve import FINE, Solved
 from freeswing.ident.bench.swing import COMMON
-from freeswing.ident.bench.told.scatter import is_systematic
+from freeswing.ident.bench.told.scatter_by_kind import is_systematic
 from freeswing.ident.likelihood.fit import fit
 
 Progress = Callable[[str, float], None]

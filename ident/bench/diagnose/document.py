@@ -30,7 +30,7 @@ from freeswing.ident.bench.solve import Solved
 from freeswing.ident.bench.swing import COMMON
 from freeswing.ident.bench.told.contradicted import contradictions, group_sentence
 from freeswing.ident.bench.told.report_objects import objects_document, platform_rows
-from freeswing.ident.bench.told.scatter import is_systematic, scatter_sentence
+from freeswing.ident.bench.told.scatter_by_kind import is_systematic, scatter_sentence
 from freeswing.ident.diagnose.decision import RIVAL
 from freeswing.ident.diagnose.experiments import separating_experiment
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from freeswing.cdpr.robot import POSE_COORDINATES
-from freeswing.ident.bench.assemble import UNSTATED_LENGTH_STD_M
 from freeswing.ident.bench.mass_verdict import CONTRADICTED
+from freeswing.ident.bench.priors.wire_priors import UNSTATED_LENGTH_STD_M
 from freeswing.ident.bench.runs import BenchRun
 from freeswing.ident.bench.solve import Solved
 from freeswing.ident.bench.swing import COMMON, IZZ

@@ -20,7 +20,6 @@ from freeswing.cdpr.model.batch import evaluate, only, with_jacobian
 from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.robot import Array
 from freeswing.cdpr.rotation import angle_rate_matrix, matrix_from_angles
-from freeswing.ident.diagnose.lengths.inclusion import Chances, mixed
 from freeswing.ident.diagnose.lengths.joint_lengths import (
     Blocks,
     Normal,
@@ -36,6 +35,7 @@ from freeswing.ident.diagnose.lengths.length_rows import (
     usual_drift,
 )
 from freeswing.ident.diagnose.lengths.local_polynomials import local_derivatives
+from freeswing.ident.diagnose.lengths.place_probabilities import Chances, mixed
 from freeswing.ident.likelihood.run_residuals import Samples
 
 # Instants of a run at which slopes are taken, and parts of it whose means tell the noise of all.

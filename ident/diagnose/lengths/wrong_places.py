@@ -17,14 +17,6 @@ from freeswing.cdpr.model.batch import evaluate, only
 from freeswing.cdpr.model.equations import Model, build_model
 from freeswing.cdpr.robot import Array, Robot
 from freeswing.ident.diagnose.lengths.equilibria import Equilibrium, Witness, equilibrium, heard
-from freeswing.ident.diagnose.lengths.inclusion import (
-    Chances,
-    alone,
-    groups,
-    mixed,
-    probability,
-    set_probabilities,
-)
 from freeswing.ident.diagnose.lengths.joint_lengths import (
     Blocks,
     Normal,
@@ -35,6 +27,14 @@ from freeswing.ident.diagnose.lengths.joint_lengths import (
     total,
 )
 from freeswing.ident.diagnose.lengths.length_rows import length_rows, measured_rates
+from freeswing.ident.diagnose.lengths.place_probabilities import (
+    Chances,
+    alone,
+    groups,
+    mixed,
+    probability,
+    set_probabilities,
+)
 from freeswing.ident.diagnose.variants import effect_of, inside
 from freeswing.ident.likelihood.fit_swings import LikelihoodFit
 from freeswing.ident.likelihood.run_residuals import Samples

@@ -21,14 +21,13 @@ from freeswing.ident.drive.identify import (
 from freeswing.ident.drive.inverse_dynamics import inverse_dynamics
 from freeswing.ident.drive.joint import Problem
 from freeswing.ident.drive.slack import before_slack
+from freeswing.ident.drive.trust import ABOVE_NOISE
 
 REFITTED = 4  # a round: the screen orders them well, and each takes seconds
 # A candidate must be worth this much BIC, as must a lead over its rivals.
 LEAST_BIC = 10.0
 CONFOUNDED = 12.0
 MOST_EFFECTS = 4
-# Held-out residuals of a right model are their noise: counts that stand still make 1.1 of it.
-WELL = 1.5
 # Where something is left over for good, a cause must at least halve the residual and leave half of
 # what any rival leaves: the nearest candidate does neither.
 HALVED = 0.5
@@ -235,7 +234,7 @@ def _drop_what_became_idle(search: _Search) -> None:
 
 def _judged(search: _Search) -> DriveDiagnosis:
     before, after = search.ladder[0], search.top
-    explained = after.times_noise <= WELL
+    explained = after.times_noise <= ABOVE_NOISE
     accepted = []
     below = before
     for fit, lead in zip(search.ladder[1:], search.leads, strict=False):
@@ -254,6 +253,6 @@ def _judged(search: _Search) -> DriveDiagnosis:
         below = fit
     ladder = search.ladder[: len(accepted) + 1]
     confounded = any(v.verdict == "confounded" for v in search.verdicts.values())
-    unexplained = not confounded and ladder[-1].times_noise > WELL
+    unexplained = not confounded and ladder[-1].times_noise > ABOVE_NOISE
     verdicts = tuple(search.verdicts.values())
     return DriveDiagnosis(before, ladder[-1], verdicts, tuple(accepted), tuple(ladder), unexplained)

@@ -1,4 +1,6 @@
 """Which views, corners, clocks and shapes a rig rejects: both sides of each limit."""
+# Stubs stand for what is not looked at.
+# pyright: reportArgumentType=false
 
 from __future__ import annotations
 
@@ -9,7 +11,13 @@ import pytest
 
 from freeswing.calib.board.boards import Board
 from freeswing.calib.camera.camera import Camera
-from freeswing.calib.rig import coarse_clocks, solve_rig
+from freeswing.calib.rig import (
+    board_shape,
+    coarse_clocks,
+    line_times,
+    outliers,
+    survey_noise,
+)
 from freeswing.calib.rig.bundle_adjustment import MEDIAN_OF_RAYLEIGH
 from freeswing.calib.rig.coarse_clocks import Lag, _best_lag, _speeds, board_moves
 from freeswing.calib.rig.triangulation import triangulate
@@ -37,7 +45,7 @@ def result_of(errors_px, sigma_px: float):
     [(0.2, 0.93, True), (0.2, 1.07, False), (0.02, 0.47, True), (0.02, 0.53, False)],
 )
 def test_views_that_miss_more_than_their_camera_usually_does(usual_px, error_px, kept) -> None:
-    found, _, _ = solve_rig._views_kept(*result_of([usual_px] * 9 + [error_px], usual_px))
+    found, _, _ = outliers.views_kept(*result_of([usual_px] * 9 + [error_px], usual_px))
     assert found.tolist() == [True] * 9 + [kept]
 
 
@@ -45,7 +53,7 @@ def test_views_that_miss_more_than_their_camera_usually_does(usual_px, error_px,
 def test_a_corner_far_from_where_it_should_be(sigmas, left) -> None:
     result, problem = result_of([0.1], 0.1)
     result.residuals_px[0, 3] = [0.1 * sigmas, 0.0]
-    assert solve_rig._trimmed(result, problem).seen.sum() == left
+    assert outliers.without_far_corners(result, problem).seen.sum() == left
 
 
 @pytest.mark.parametrize(
@@ -59,17 +67,17 @@ def test_a_corner_far_from_where_it_should_be(sigmas, left) -> None:
 )
 def test_line_times_that_stand_out(line_time_s, std_s, stands_out) -> None:
     """Five deviations, and half a millisecond over 480 rows."""
-    assert solve_rig.reads_in_lines(line_time_s, std_s, 480) == stands_out
+    assert line_times.reads_in_lines(line_time_s, std_s, 480) == stands_out
 
 
 def test_boards_are_flat_to_some_thousandths_before_anything_was_seen() -> None:
     """Card on wood over half a metre bends by a millimetre, markers grow by some per cent."""
     board = Board("charuco", 7, 5, 0.08, 0.06, "DICT_5X5_100")
-    along, across, growth = solve_rig.shape_std_m(board.points_m)
+    along, across, growth = board_shape.shape_std_m(board.points_m)
     assert 0.9e-3 < along < 1.2e-3
     assert 0.6e-3 < across < 0.85e-3
     assert 1.0e-3 < growth < 1.4e-3
-    assert np.isinf(solve_rig.shape_std_m(Board("chessboard", 6, 4, 0.08).points_m)[2])
+    assert np.isinf(board_shape.shape_std_m(Board("chessboard", 6, 4, 0.08).points_m)[2])
 
 
 def survey_std(given_m: float, correction_m: float, known: bool) -> float:
@@ -79,7 +87,7 @@ def survey_std(given_m: float, correction_m: float, known: bool) -> float:
         scene=SimpleNamespace(base_points_m=surveyed + correction_m),
         covariance=np.eye(12) * (0.0 if known else given_m**2),
     )
-    return solve_rig._survey_std(
+    return survey_noise.survey_std(
         result, SimpleNamespace(points_base_m=surveyed, std_m=np.full(4, given_m))
     )
 

@@ -75,10 +75,10 @@ def test_a_view_keeps_four_corners(monkeypatch, corners, dropped) -> None:
     views = stub(seen=seen, label=(("cam0", 0),), select=lambda _: views)
     monkeypatch.setattr(solve_rig, "adjust", lambda *_, **__: stub(scene=None))
     monkeypatch.setattr(
-        solve_rig, "_views_kept", lambda *_: (np.ones(1, bool), np.ones(1), np.zeros(1))
+        solve_rig, "views_kept", lambda *_: (np.ones(1, bool), np.ones(1), np.zeros(1))
     )
-    monkeypatch.setattr(solve_rig, "_trimmed", lambda *_: views)
-    monkeypatch.setattr(solve_rig, "_determined", reached)
+    monkeypatch.setattr(solve_rig, "without_far_corners", lambda *_: views)
+    monkeypatch.setattr(solve_rig, "determined_pieces", reached)
     with pytest.raises(Reached) if dropped else nullcontext():
         assert solve_rig.refine(stub(), stub(views=views), 0, roughly=True).dropped == ()
 

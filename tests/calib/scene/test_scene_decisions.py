@@ -11,7 +11,8 @@ import pytest
 from freeswing.calib.camera.camera import Camera
 from freeswing.calib.rig.normal_equations import Problem
 from freeswing.calib.scene.calibrate_scene import calibrate_scene, refuse_untied
-from freeswing.calib.scene.frame import (
+from freeswing.calib.scene.lab_map import LabMap
+from freeswing.calib.scene.map_frame import (
     DISTANCE_SIGMAS,
     roughly_in_base,
     scale_of,
@@ -19,7 +20,6 @@ from freeswing.calib.scene.frame import (
     tied_to_survey,
     with_distances,
 )
-from freeswing.calib.scene.lab_map import LabMap
 from freeswing.calib.scene.marks import Click, clicked, read_clicks
 from freeswing.calib.scene.scene_rig import chosen_points, rig_of_map, rig_part
 from freeswing.calib.scene.scene_verdict import (
@@ -28,8 +28,9 @@ from freeswing.calib.scene.scene_verdict import (
     halves_of,
     judge_scene,
 )
-from freeswing.calib.scene.source import Distance, SceneSource, SurveyedPoint
+from freeswing.calib.scene.source import SceneSource
 from freeswing.calib.scene.stills import Still, walk_stills
+from freeswing.calib.scene.tape_measured import Distance, SurveyedPoint
 from freeswing.cdpr.files.documents import DataError, InputError
 from freeswing.cdpr.rotation import exp_rotation, transform
 from freeswing.main import main

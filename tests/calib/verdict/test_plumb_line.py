@@ -10,8 +10,8 @@ from freeswing.calib.camera.camera import Camera
 from freeswing.calib.camera.cameras_file import read_cameras
 from freeswing.calib.camera.lens_models import PARAMETER_NAMES
 from freeswing.calib.verdict.calibration_result import CameraCovariance
-from freeswing.calib.verdict.plumb_line import StringView, find_vertical
-from freeswing.calib.verdict.plumb_line_file import read_plumb_line, vertical_entry
+from freeswing.calib.verdict.plumb_line import StringView, find_vertical, vertical_entry
+from freeswing.calib.verdict.plumb_line_file import read_plumb_line
 from freeswing.cdpr.files.documents import DataError, InputError
 from freeswing.cdpr.rotation import exp_rotation
 from freeswing.main import main

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from freeswing.calib.rig.views import FixedPoints
-from freeswing.calib.verdict.plumb_line import Vertical
-from freeswing.calib.verdict.plumb_line_file import read_plumb_line, vertical_entry
+from freeswing.calib.verdict.plumb_line import Vertical, vertical_entry
+from freeswing.calib.verdict.plumb_line_file import read_plumb_line
 from freeswing.calib.verdict.survey_check import check_survey
 from freeswing.cdpr.files.documents import InputError
 from tests.calib.rigs import rig

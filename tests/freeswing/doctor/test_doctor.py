@@ -16,7 +16,7 @@ from freeswing.cdpr.robot import POSE_COORDINATES
 from freeswing.doctor.geometry import robot_findings
 from freeswing.doctor.motion import run_findings
 from freeswing.doctor.recordings import calibration_findings
-from freeswing.doctor.split import split_findings
+from freeswing.doctor.run_roles import split_findings
 from freeswing.ident.runs import SwingRun
 from freeswing.session.session_file import read_session
 from tests.oracle.scenes.robots import declared_robot

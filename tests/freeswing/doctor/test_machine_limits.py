@@ -9,7 +9,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from freeswing.doctor import machine, motion
+from freeswing.doctor import cable_lengths as lengths
+from freeswing.doctor import machine
 
 
 @pytest.mark.parametrize(("gigabytes", "level"), [(1.9, "warning"), (2.1, "note")])
@@ -25,12 +26,14 @@ def test_two_gigabytes_are_comfortable(monkeypatch, gigabytes, level) -> None:
 )
 def test_axes_are_turned_where_a_fifth_is_left_of_a_centimetre(monkeypatch, found_m, share, said):
     """How much cables change as recorded, and how much of it with the axis y up."""
-    spreads = iter([found_m, *(share * found_m if a == "y" else found_m for a in motion.UP_TURNS)])
-    monkeypatch.setattr(motion, "build_model", lambda _: SimpleNamespace(lengths=0, start_values=0))
-    monkeypatch.setattr(motion, "moved_trajectory", lambda *_: SimpleNamespace(values=np.zeros(3)))
-    monkeypatch.setattr(motion, "evaluate", lambda *_: [np.zeros(3)])
-    monkeypatch.setattr(motion, "_spread", lambda _: next(spreads))
+    spreads = iter([found_m, *(share * found_m if a == "y" else found_m for a in lengths.UP_TURNS)])
+    monkeypatch.setattr(
+        lengths, "build_model", lambda _: SimpleNamespace(lengths=0, start_values=0)
+    )
+    monkeypatch.setattr(lengths, "moved_trajectory", lambda *_: SimpleNamespace(values=np.zeros(3)))
+    monkeypatch.setattr(lengths, "evaluate", lambda *_: [np.zeros(3)])
+    monkeypatch.setattr(lengths, "_spread", lambda _: next(spreads))
     part = SimpleNamespace(take=lambda known: None, is_known=None)
-    findings = list(motion._turned("run a", part, None, np.zeros((3, 1))))
+    findings = list(lengths._turned("run a", part, None, np.zeros((3, 1))))
     assert len(findings) == said
     assert all('up = "y"' in one.remedy for one in findings)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from freeswing.cdpr.measured.trajectory import Trajectory
-from freeswing.doctor.motion import stamp_findings
+from freeswing.doctor.time_stamps import stamp_findings
 from freeswing.ident.diagnose.decision import _verdict
 from freeswing.main import main
 from freeswing.report.words import number, with_decimals
@@ -128,7 +128,7 @@ def test_times_since_1970_are_named_and_written_out(session: Path, capsys) -> No
 
 @pytest.mark.parametrize(("start_s", "is_said"), [(0.9e9, False), (1.1e9, True)])
 def test_a_machine_that_ran_for_long(start_s: float, is_said: bool) -> None:
-    times = start_s + 0.01 * np.arange(100)
+    times = start_s + 0.01 * np.arange(100.0)
     motion = Trajectory(times, ("chi",), np.sin(times - start_s)[:, None])
     found = [one.text for one in stamp_findings("run a", motion, None)]
     assert any("count from 1970" in text for text in found) == is_said

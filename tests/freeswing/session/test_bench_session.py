@@ -11,9 +11,10 @@ from freeswing.cdpr.files.documents import InputError
 from freeswing.cdpr.files.robot_file import read_robot
 from freeswing.cdpr.files.signal_csv import read_signals
 from freeswing.cdpr.files.trajectory_csv import read_csv
+from freeswing.cdpr.simulation.parallel_wires import hangs_parallel
 from freeswing.ident.bench.runs import Bench
 from freeswing.main import main
-from freeswing.session.load_bench import hangs_parallel, is_bench, load_bench
+from freeswing.session.load_bench import is_bench, load_bench
 from freeswing.session.session_file import read_session
 
 ROBOT = """format = "freeswing-robot/1"
@@ -83,6 +84,7 @@ def test_keys_are_read(tmp_path: Path) -> None:
     bench = load_bench(session, robot, None)
     assert bench.mass_std_kg == 0.02
     assert [run.coordinates for run in bench.runs] == [("chi",), ()]
+    assert bench.loads[0].com_std_m is not None
     np.testing.assert_allclose(bench.loads[0].com_std_m, 0.002)
 
 

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,12 +12,13 @@ import pytest
 
 from freeswing.cdpr.files.problems import InputError, Problems
 from freeswing.cdpr.files.table_reader import Reader
+from freeswing.cdpr.simulation.parallel_wires import hangs_parallel
 from freeswing.session import drive_session, exchanged_lengths
 from freeswing.session.bench_keys import _read_place
 from freeswing.session.drive_session import read_drive_session
-from freeswing.session.load_bench import _check_hangs_straight, hangs_parallel
 from freeswing.session.new_recordings import next_role
 from freeswing.starter.markers import role
+from freeswing.vision.planar.straight_wires import check_hangs_straight
 
 
 def two_wires(**changes) -> SimpleNamespace:
@@ -45,12 +47,11 @@ def test_wires_that_are_turned_by_three_degrees(turn, refused) -> None:
         c, s = np.cos(way), np.sin(way)
         beam = two_wires().entries_m
         robot = two_wires(entries_m=beam @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]))
-        session = SimpleNamespace(robot="robot.toml")
         if refused:
             with pytest.raises(InputError, match="upper ends are turned"):
-                _check_hangs_straight(session, robot)
+                check_hangs_straight(Path("robot.toml"), robot)
         else:
-            _check_hangs_straight(session, robot)
+            check_hangs_straight(Path("robot.toml"), robot)
 
 
 @pytest.mark.parametrize(("off", "refused"), [(0.019, False), (0.021, True)])

@@ -12,11 +12,11 @@ import pytest
 
 from freeswing.cdpr.files.documents import DataError
 from freeswing.ident.bench import mass_verdict, noise, solve
-from freeswing.ident.bench.channels import Channel
-from freeswing.ident.bench.identify_bench import _check_moves
+from freeswing.ident.bench.channels import Channel, check_moves
 from freeswing.ident.bench.modal import SQUARE
-from freeswing.ident.bench.noise import _colours, rescaled, scatter_std
-from freeswing.ident.bench.runs import Bench, BenchRun, Signal
+from freeswing.ident.bench.noise import _colours, rescaled
+from freeswing.ident.bench.runs import Bench
+from freeswing.ident.bench.scatter import scatter_std
 from freeswing.ident.bench.swing import COMMON, Column
 from freeswing.ident.bench.told.classic import BESIDE, ClassicRun, leaning_sentence, sine_period
 from freeswing.ident.bench.told.report_objects import _in_true_scale, told_object
@@ -170,11 +170,8 @@ def test_a_channel_that_moves_above_its_noise(over, usable) -> None:
     random = np.random.default_rng(0).standard_normal(4000)
     slow = np.sin(np.arange(4000) / 300.0)
     values = slow / slow.std() * np.sqrt(over**2 - 1.0) + random / random.std()
-    signal = Signal("laser", values, None)
-    times = np.arange(4000) / 100.0
-    run = BenchRun("a", "identify", times, (signal,), None, None, None, (), ())
     with nullcontext() if usable else pytest.raises(DataError, match="never moves above its noise"):
-        _check_moves(run, signal)
+        check_moves("a", "laser", values)
 
 
 @pytest.mark.parametrize(("share", "told"), [(0.9, True), (1.1, False)])

@@ -10,10 +10,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from freeswing.ident.bench import assemble, identify_bench, solve
-from freeswing.ident.bench.assemble import Guess, wide_body
-from freeswing.ident.bench.channel_blocks import channel_blocks, gain_spread
+from freeswing.ident.bench import assemble, solve
+from freeswing.ident.bench.assemble import Guess
 from freeswing.ident.bench.channels import Channel
+from freeswing.ident.bench.priors import wire_priors
+from freeswing.ident.bench.priors.body_priors import platform_block, wide_body
+from freeswing.ident.bench.priors.channel_priors import channel_blocks, gain_spread
+from freeswing.ident.bench.priors.motion_priors import amplitude_block, loose_coordinates
 from freeswing.ident.bench.runs import Bench, BenchRun, KnownBody, Signal
 from freeswing.ident.bench.swing import COMMON
 from freeswing.ident.likelihood.unknowns import Gaussian, Unknown, Unknowns
@@ -34,7 +37,7 @@ def run(**more) -> BenchRun:
 
 
 def platform(gravity=(0.0, 0.0, -9.8), **more) -> Unknown:
-    return assemble._platform(robot(gravity), Bench(()), [run(**more)], Guess(BODY, {}))
+    return platform_block(robot(gravity), Bench(()), [run(**more)], BODY)
 
 
 def blocks() -> Unknowns:
@@ -111,14 +114,14 @@ def test_a_body_of_which_only_the_size_is_known() -> None:
 
 
 def test_a_twist_of_twice_the_usual_is_one_deviation_off() -> None:
-    prior = assemble._amplitude(Channel("dot", "dot_px", ("chi", "x"))).prior
+    prior = amplitude_block(Channel("dot", "dot_px", ("chi", "x"))).prior
     assert prior is not None
     assert prior.std[0] == pytest.approx(2.0**2 - 1.0, rel=0.15)
 
 
 def test_what_no_column_shows_stays_small() -> None:
     """Sway by a degree of the wires' length, an angle by 17 degrees; what is seen is free."""
-    loose = assemble._loose((SimpleNamespace(coordinate=5),), np.full(3, 1.5))
+    loose = loose_coordinates((SimpleNamespace(coordinate=5),), np.full(3, 1.5))
     np.testing.assert_allclose(loose[:3], 1.5 * np.deg2rad(1.15), rtol=0.15)
     np.testing.assert_allclose(loose[3:5], np.deg2rad(17.0), rtol=0.15)
     assert np.isinf(loose[5])
@@ -162,11 +165,11 @@ def test_a_channels_polynomial_ends_at_cubes(order, allowed) -> None:
 
 def test_lengths_of_mean_poses_are_as_good_as_the_wires_ends(monkeypatch) -> None:
     """Two ends of a millimetre and a half each."""
-    monkeypatch.setattr(identify_bench, "evaluate", lambda *_: (np.ones((11, 3)),))
+    monkeypatch.setattr(wire_priors, "evaluate", lambda *_: (np.ones((11, 3)),))
     poses = tuple(Signal(name, TIMES) for name in ("x", "y", "z", "phi", "theta", "chi"))
-    monkeypatch.setattr(identify_bench, "POSE_COORDINATES", [one.column for one in poses])
+    monkeypatch.setattr(wire_priors, "POSE_COORDINATES", [one.column for one in poses])
     given = replace(run(), lengths_m=None, signals=poses)
-    found = identify_bench._with_lengths(SimpleNamespace(lengths=None, start_values=None), given)
+    found = wire_priors.with_lengths(SimpleNamespace(lengths=None, start_values=None), given)
     assert found.lengths_std_m == pytest.approx(np.hypot(1.5e-3, 1.5e-3), rel=0.1)
 
 

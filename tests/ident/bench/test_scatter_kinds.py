@@ -8,7 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from freeswing.ident.bench.told.scatter import by_kind, is_systematic, kinds, scatter_sentence
+from freeswing.ident.bench.told.scatter_by_kind import (
+    by_kind,
+    is_systematic,
+    kinds,
+    scatter_sentence,
+)
 
 KINDS = [0, 0, 0, 1, 1, 1, 2, 2, 2, 2]
 

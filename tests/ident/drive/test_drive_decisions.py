@@ -9,7 +9,7 @@ import pytest
 
 from freeswing.ident.drive.diagnose import diagnose as module
 from freeswing.ident.drive.joint import Problem
-from freeswing.results.driven.drive import unknown
+from freeswing.ident.drive.trust import is_untold
 
 
 class Fit(SimpleNamespace):
@@ -136,4 +136,4 @@ def test_numbers_go_so_far_from_where_they_start():
 
 @pytest.mark.parametrize(("std", "lost"), [(0.29, False), (0.31, True), (np.inf, True)])
 def test_a_number_is_determined_to_three_tenths(std, lost):
-    assert unknown(std, -1.0) == lost
+    assert is_untold(std, -1.0) == lost

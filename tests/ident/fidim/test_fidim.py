@@ -10,7 +10,7 @@ from freeswing.cdpr.robot import INERTIA_NAMES
 from freeswing.ident.fidim.fidim import essential_parameters, fidim, near_zero
 from freeswing.ident.fidim.payload_mass import LoadedCentre, mass_from_payloads
 from freeswing.ident.fidim.total_least_squares import total_least_squares
-from freeswing.ident.judge.comparison import compare
+from freeswing.ident.judge.free_against_full import compare
 from freeswing.ident.judge.validate import sigma_perp
 from freeswing.ident.runs import Payload
 from freeswing.ident.signals.derivatives import Signals
@@ -150,7 +150,7 @@ def loaded_centre(mass: float, com: np.ndarray, payload: Payload, covariance: np
 
 def test_mass_from_payloads_is_exact_without_noise():
     com, tiny = TRUE_INERTIA[:3], 1e-10 * np.eye(3)
-    loads = [Payload(1.0, [0.2, 0.0, 0.05]), Payload(0.5, [0.0, -0.15, 0.0])]
+    loads = [Payload(1.0, np.array([0.2, 0.0, 0.05])), Payload(0.5, np.array([0.0, -0.15, 0.0]))]
     found = mass_from_payloads(com, tiny, [loaded_centre(8.0, com, p, tiny) for p in loads])
     assert found.mass_kg == pytest.approx(8.0, rel=1e-9), f"{found.mass_kg}"
 
@@ -160,7 +160,7 @@ def test_mass_intervals_cover():
     generator = np.random.default_rng(2)
     com = TRUE_INERTIA[:3]
     covariance = np.diag([1e-4, 2e-4, 4e-4]) ** 2
-    loads = [Payload(1.0, [0.3, 0.0, 0.05]), Payload(1.0, [0.0, -0.3, 0.0])]
+    loads = [Payload(1.0, np.array([0.3, 0.0, 0.05])), Payload(1.0, np.array([0.0, -0.3, 0.0]))]
     scores = []
     for _ in range(300):
         centres = []

@@ -6,7 +6,7 @@ import pytest
 from freeswing.ident.estimate import fidim_entry
 from freeswing.ident.fidim.fidim import fidim
 from freeswing.ident.fidim.fidim_stage import _as_runs_say
-from freeswing.ident.judge.comparison import between_runs, compare
+from freeswing.ident.judge.free_against_full import between_runs, compare
 
 ALL = np.ones(9, dtype=bool)
 

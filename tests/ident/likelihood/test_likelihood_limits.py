@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 
 from freeswing.cdpr.robot import POSE_COORDINATES
-from freeswing.ident.likelihood import fit_swings, session_estimates
+from freeswing.ident.likelihood import session_estimates
 from freeswing.ident.likelihood.between_runs import jackknife_std, widened
 from freeswing.ident.likelihood.calibration_modes import Calibrated
-from freeswing.ident.likelihood.fit_swings import low_band_factor
 from freeswing.ident.likelihood.payload_runs import Loads, mass_of
 from freeswing.ident.likelihood.raw_samples import prepare
 from freeswing.ident.runs import Payload, SwingRun
+from freeswing.ident.signals import residual_colour
+from freeswing.ident.signals.residual_colour import low_band_factor
 from tests.ident.swings import recorded, swing
 
 
@@ -27,7 +28,7 @@ def test_cameras_are_off_from_four_and_a_half_deviations(largest, said):
 
 @pytest.mark.parametrize(("correlation", "by"), [(1.18, 1.0), (1.22, 1.22)])
 def test_deviations_are_enlarged_from_a_fifth_of_colour(correlation, by):
-    assert fit_swings._enlargement(correlation) == by
+    assert residual_colour.enlargement(correlation) == by
 
 
 @pytest.mark.parametrize(("rate_hz", "low"), [(4.8, True), (5.2, False)])

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from freeswing.cdpr.rotation import exp_rotation
+from freeswing.vision.fuse.motion_from_poses import is_noise, motion_of_poses
 from freeswing.vision.fuse.noise import (
     Noise,
     NoiseSums,
@@ -18,7 +19,6 @@ from freeswing.vision.fuse.noise import (
     turns_of,
     whitened,
 )
-from freeswing.vision.fuse.poses import is_noise, motion_of_poses
 
 FOCAL, INSTANTS, TAGS = 500.0, 150, 5
 

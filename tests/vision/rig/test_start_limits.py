@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from freeswing.cdpr.files.documents import DataError
-from freeswing.vision.rig import alignment, correct_rig, rig_effects, stamp_jitter, untied
-from freeswing.vision.rig.alignment import Missed, _chosen, deviations_apart
-from freeswing.vision.rig.pairs import _correlations, _is_plausible
+from freeswing.vision.rig import correct_rig, rig_effects, stamp_jitter, started_apart, untied
+from freeswing.vision.rig.pair_lags import _correlations, _is_plausible
+from freeswing.vision.rig.started_apart import Missed, _chosen, deviations_apart
 from tests.vision.scenes import camera
 
 VIEW = camera()
@@ -32,15 +32,15 @@ def stub(**attributes: Any) -> Any:
     return SimpleNamespace(**attributes)
 
 
-def started(monkeypatch, lag_s: float, deviations: float) -> alignment.Aligned:
+def started(monkeypatch, lag_s: float, deviations: float) -> started_apart.Aligned:
     """Two cameras of 10 Hz, the second so much later."""
     pair = stub(lag_s=lag_s, at_zero_m=0.1)
     view = stub(camera=VIEW, believed=lambda moved: moved)
-    monkeypatch.setattr(alignment, "own_track", lambda _: stub(step_s=0.1))
-    monkeypatch.setattr(alignment, "_next", lambda *_: (0, 1, pair))
-    monkeypatch.setattr(alignment, "_needed", lambda _: True)
-    monkeypatch.setattr(alignment, "_chosen", lambda *_: (lag_s, 0.1, 0.2, deviations))
-    return alignment.aligned([view, view], 0, reached)
+    monkeypatch.setattr(started_apart, "own_track", lambda _: stub(step_s=0.1))
+    monkeypatch.setattr(started_apart, "_next", lambda *_: (0, 1, pair))
+    monkeypatch.setattr(started_apart, "_needed", lambda _: True)
+    monkeypatch.setattr(started_apart, "_chosen", lambda *_: (lag_s, 0.1, 0.2, deviations))
+    return started_apart.aligned([view, view], 0, reached)
 
 
 @pytest.mark.parametrize(("lag_s", "later"), [(0.048, False), (0.052, True)])

@@ -14,7 +14,6 @@ from freeswing.ident.diagnose.lengths.equilibria import (
     heard,
     with_equilibria,
 )
-from freeswing.ident.diagnose.lengths.inclusion import mixed
 from freeswing.ident.diagnose.lengths.joint_lengths import (
     Blocks,
     normal_equations,
@@ -23,6 +22,7 @@ from freeswing.ident.diagnose.lengths.joint_lengths import (
     total,
 )
 from freeswing.ident.diagnose.lengths.length_rows import LengthRows, length_rows
+from freeswing.ident.diagnose.lengths.place_probabilities import mixed
 from freeswing.ident.likelihood.raw_samples import prepare
 from freeswing.session.load_swings import load_robot, load_swings, load_target
 from freeswing.session.session_file import read_session

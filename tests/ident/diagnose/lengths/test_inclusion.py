@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from freeswing.ident.diagnose.lengths import inclusion
+from freeswing.ident.diagnose.lengths import place_probabilities
 from freeswing.ident.diagnose.lengths.equilibria import Witness
-from freeswing.ident.diagnose.lengths.inclusion import (
+from freeswing.ident.diagnose.lengths.joint_lengths import Blocks, Normal, solved, total
+from freeswing.ident.diagnose.lengths.place_probabilities import (
     groups,
     mixed,
     probability,
     set_probabilities,
 )
-from freeswing.ident.diagnose.lengths.joint_lengths import Blocks, Normal, solved, total
 from freeswing.ident.diagnose.lengths.wrong_places import Kinematics, RunLengths, Way, WrongPlace
 
 BLOCKS = Blocks(
@@ -27,7 +27,7 @@ def made(truth, noise_m=1e-3, runs=12, seed=0, rows=None):
     matrices, rights = [], []
     for run in range(runs):
         seen = rng.normal(size=(24, 4)) if rows is None else rows(rng)
-        value = truth(run) if callable(truth) else truth
+        value = np.asarray(truth(run) if callable(truth) else truth)
         left = -seen @ value + noise_m * rng.normal(size=24)
         matrices.append(seen.T @ seen / noise_m**2)
         rights.append(seen.T @ left / noise_m**2)
@@ -36,15 +36,15 @@ def made(truth, noise_m=1e-3, runs=12, seed=0, rows=None):
 
 def test_evidence_is_that_of_the_linear_problem_itself(monkeypatch):
     normal = made(np.array([1e-3, 2e-3, -3e-3, 1e-3]), noise_m=8e-3)
-    monkeypatch.setattr(inclusion, "DRAWS", 1)
+    monkeypatch.setattr(place_probabilities, "DRAWS", 1)
 
     class Even:
         def dirichlet(self, alpha, draws):
             return np.full((draws, len(alpha)), 1.0 / len(alpha))
 
-    monkeypatch.setattr(inclusion.np.random, "default_rng", lambda seed: Even())
+    monkeypatch.setattr(place_probabilities.np.random, "default_rng", lambda seed: Even())
     found = set_probabilities(normal, BLOCKS)
-    odds = np.log(inclusion.CHANCE_OF_WRONG / (1.0 - inclusion.CHANCE_OF_WRONG))
+    odds = np.log(place_probabilities.CHANCE_OF_WRONG / (1.0 - place_probabilities.CHANCE_OF_WRONG))
     logs = {
         wrong: solved(total(normal), BLOCKS.spread(wrong)).log_evidence + odds * len(wrong)
         for wrong in found
@@ -68,7 +68,7 @@ def test_what_two_runs_of_twelve_say_is_not_sure():
     whole = solved(total(torn), BLOCKS.spread(["second"]))
     none = solved(total(torn), BLOCKS.spread([]))
     assert whole.log_evidence - none.log_evidence > 10.0  # all runs at once would be sure
-    assert probability(set_probabilities(torn, BLOCKS), ["second"]) < inclusion.ACCEPTED
+    assert probability(set_probabilities(torn, BLOCKS), ["second"]) < place_probabilities.ACCEPTED
 
 
 def test_blocks_that_replace_each_other_are_one_group_and_the_mean_holds_both_ways():
@@ -79,7 +79,7 @@ def test_blocks_that_replace_each_other_are_one_group_and_the_mean_holds_both_wa
 
     normal = made(np.array([0.0, 0.0, 9e-3, 0.0]), noise_m=2e-3, rows=alike)
     found = set_probabilities(normal, BLOCKS)
-    assert probability(found, ["second"]) < inclusion.ACCEPTED
+    assert probability(found, ["second"]) < place_probabilities.ACCEPTED
     (group,) = groups(found, list(BLOCKS.columns))
     assert sorted(group) == ["second", "third"]
     both = mixed(normal, BLOCKS, found, group)

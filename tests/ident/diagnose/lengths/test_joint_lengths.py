@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from freeswing.ident.diagnose.lengths.inclusion import set_probabilities
 from freeswing.ident.diagnose.lengths.joint_lengths import (
     Blocks,
     honest_covariance,
@@ -14,6 +13,7 @@ from freeswing.ident.diagnose.lengths.joint_lengths import (
 )
 from freeswing.ident.diagnose.lengths.length_noise import repetition, slow_size
 from freeswing.ident.diagnose.lengths.length_rows import LengthRows, measured_rates
+from freeswing.ident.diagnose.lengths.place_probabilities import set_probabilities
 
 NOISE_M = 5e-5
 BLOCKS = Blocks(

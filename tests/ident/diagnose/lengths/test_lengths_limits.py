@@ -12,8 +12,8 @@ import pytest
 
 from freeswing.cdpr.robot import POSE_COORDINATES
 from freeswing.ident.diagnose.lengths import equilibria, length_rows
-from freeswing.ident.diagnose.lengths.inclusion import groups, mixed, set_probabilities
 from freeswing.ident.diagnose.lengths.joint_lengths import Blocks, Normal
+from freeswing.ident.diagnose.lengths.place_probabilities import groups, mixed, set_probabilities
 from freeswing.ident.likelihood.raw_samples import prepare
 from tests.ident.swings import paper_model, recorded, swing
 

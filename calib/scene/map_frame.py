@@ -15,7 +15,7 @@ from freeswing.calib.rig.solve_rig import Rig
 from freeswing.calib.rig.triangulation import triangulate
 from freeswing.calib.rig.views import FixedPoints
 from freeswing.calib.scene.scene_rig import scaled
-from freeswing.calib.scene.source import Distance
+from freeswing.calib.scene.tape_measured import Distance
 from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.rotation import transform
 
