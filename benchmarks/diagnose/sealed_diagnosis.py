@@ -176,14 +176,15 @@ def summary(rows: list[dict[str, Any]]) -> list[str]:
 
 def main(arguments: list[str] | None = None) -> None:
     """Make, diagnose and judge the sessions."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description="The diagnosis on sealed sessions.")
     parser.add_argument("out", type=Path)
     parser.add_argument("--tier", choices=TIERS, default="quick")
     parser.add_argument("--only", help="cases whose name holds this")
+    parser.add_argument("--draw", type=int, default=0, help="another number: other seeds")
     options = parser.parse_args(arguments)
     rows = []
     print(f"{'case':66s} ok?   before    after      s answer (errors over the noise floor)")
-    for case in telling_first(selected(options.tier, options.only)):
+    for case in telling_first(selected(options.tier, options.only, options.draw)):
         rows.append(diagnosed(case, options.out))
         print(line(rows[-1]), flush=True)
     print("\n".join(summary(rows)))

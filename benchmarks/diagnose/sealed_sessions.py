@@ -28,13 +28,13 @@ SEEN_RUNS = 4  # of each session; their visibility is scaled up to all runs
 HEADER = f"{'case':70s} {'seconds':>7s} {'taut N':>7s} {'reach mm':>8s} {'visible':>8s}"
 
 
-def selected(tier: str, only: str | None) -> list[Case]:
-    """The cases of a tier whose name holds `only`.
+def selected(tier: str, only: str | None, draw: int = 0) -> list[Case]:
+    """The cases of a tier whose name holds `only`, with the seeds of a draw.
 
     Raises:
         ValueError: when there is none.
     """
-    cases = [case for case in manifest(tier) if only is None or only in case.name]
+    cases = [case for case in manifest(tier, draw) if only is None or only in case.name]
     if not cases:
         raise ValueError(f"no case of tier {tier!r} has {only!r} in its name")
     return cases
@@ -83,13 +83,14 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("out", type=Path)
     parser.add_argument("--tier", choices=TIERS, default="quick")
     parser.add_argument("--only", help="part of the names wanted")
+    parser.add_argument("--draw", type=int, default=0, help="another number: other seeds")
     parser.add_argument(
         "--visibility", action="store_true", help="fit the plain model to noise-free data"
     )
     options = parser.parse_args(arguments)
     print(HEADER)
     rows = []
-    for case in selected(options.tier, options.only):
+    for case in selected(options.tier, options.only, options.draw):
         rows.append(made(case, options.out, options.visibility))
         print(line(rows[-1]), flush=True)
     path = options.out / "sealed_sessions.json"

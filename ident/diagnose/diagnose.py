@@ -14,7 +14,7 @@ from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.model.equations import build_model
 from freeswing.cdpr.robot import POSE_COORDINATES, Array, Robot
 from freeswing.ident.diagnose.answer.decay import swing_decay
-from freeswing.ident.diagnose.answer.deviations import chance_of_nothing, honest_covariance
+from freeswing.ident.diagnose.answer.deviations import honest_covariance
 from freeswing.ident.diagnose.answer.entries import (
     accepted_entries,
     candidate_entry,
@@ -26,8 +26,8 @@ from freeswing.ident.diagnose.answer.entries import (
 from freeswing.ident.diagnose.answer.final_verdicts import final_verdicts, rivals_of
 from freeswing.ident.diagnose.answer.next_swing import NextSwing, next_swing
 from freeswing.ident.diagnose.answer.settled_geometry import cut, settled_places, with_settled
+from freeswing.ident.diagnose.answer.taken_back import taken_back
 from freeswing.ident.diagnose.decision import (
-    ACCEPTED,
     LARGEST_EXCESS_LEFT,
     LEAST_SHARE_EXPLAINED,
     Candidate,
@@ -233,11 +233,11 @@ def _told(
             # Held-out runs are on their way in other processes.
             final = _with_own_noise(last.fit)
             spread = honest_covariance(final, last)
-            doubt = _doubt(accepted, final, spread)
-            if not doubt:
+            fewer = taken_back(accepted, last, final, spread, scales)
+            if fewer is None:
                 break
-            notes.append(doubt)
-            last = accepted.pop().before
+            last, accepted, note = fewer
+            notes.append(note)
             rest = unexplained(last.fit, fitted, full, scales)
         begun = search.rounds[0].before if accepted else last
         first = _with_own_noise(begun.fit) if accepted else final
@@ -255,20 +255,6 @@ def _kept_from_dynamics(
     if KEPT_FROM_DYNAMICS not in notes:
         notes.append(KEPT_FROM_DYNAMICS)
     return cut(last, noise_scales), True
-
-
-def _doubt(accepted: list[Round], final: LikelihoodFit, spread: Array) -> str:
-    """Why the effect accepted last is not to be believed as it would be told, or nothing."""
-    if not accepted or accepted[-1].by_lengths:
-        return ""
-    name = effect_of(accepted[-1].decision.key)
-    chance = chance_of_nothing(final, spread, name)
-    if chance < 1.0 - ACCEPTED:
-        return ""
-    return (
-        f"{name} would be told with values that are nothing within their deviations (chance "
-        f"{chance:.2f}): not accepted"
-    )
 
 
 def _next_swings(accepted: list[Round], noise_scales: Array) -> dict[str, NextSwing]:

@@ -43,6 +43,12 @@ def test_tiers_grow_and_names_and_seeds_are_unique() -> None:
     assert len({case.seed for case in lists[2]}) == len(lists[2])
 
 
+def test_another_draw_has_the_same_names_and_other_seeds() -> None:
+    first, again = (manifest("full", draw) for draw in (0, 1))
+    assert [case.name for case in first] == [case.name for case in again]
+    assert not {case.seed for case in first} & {case.seed for case in again}
+
+
 def test_unknown_tier_is_refused() -> None:
     with pytest.raises(ValueError, match="must be one of"):
         manifest("huge")

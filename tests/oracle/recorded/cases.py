@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import zlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from tests.oracle.recorded.lab_days import EFFECTS as OF_LAB_DAYS
 from tests.oracle.recorded.lab_days import make_lab_day
@@ -42,7 +43,8 @@ class Case:
         robot: "bologna-4" or "three-cable".
         pose: full poses, or the free coordinates alone.
         effects: (name, size) of each.
-        seed: of the session, from the name alone.
+        draw: which of the sessions of this name; the first is 0.
+        seed: of the session, from name and draw alone.
     """
 
     name: str
@@ -50,23 +52,25 @@ class Case:
     robot: str
     pose: bool
     effects: tuple[tuple[str, object], ...]
+    draw: int = 0
 
     @property
     def seed(self) -> int:
-        """A number that only the name decides, so that lists can grow."""
-        return zlib.crc32(self.name.encode())
+        """A number that only name and draw decide, so that lists can grow."""
+        told = f"{self.name}#{self.draw}" if self.draw else self.name
+        return zlib.crc32(told.encode())
 
-    def make(self, root: Path | str, **options: object) -> SessionTruth:
+    def make(self, root: Path | str, **options: Any) -> SessionTruth:
         """The session in `root/name`; options go to `make_session`."""
         folder = Path(root) / self.name
         if self.kind.endswith("lab"):
             return make_lab_day(folder, self.seed, self.robot, dict(self.effects), **options)
-        settings = {"pose": self.pose, **options}
+        settings: dict[str, Any] = {"pose": self.pose, **options}
         return make_session(folder, self.seed, self.robot, dict(self.effects), **settings)
 
 
-def manifest(tier: str = "standard") -> tuple[Case, ...]:
-    """The cases of a tier; each tier holds the one before it.
+def manifest(tier: str = "standard", draw: int = 0) -> tuple[Case, ...]:
+    """The cases of a tier; each tier holds the one before it, each draw has seeds of its own.
 
     quick: 8 clean, every effect once, 4 pairs, 4 outside (37 cases). standard: 40 clean, every
     effect at three sizes with robot and measurement taking turns, 12 pairs, every outside effect
@@ -79,9 +83,10 @@ def manifest(tier: str = "standard") -> tuple[Case, ...]:
     if tier not in TIERS:
         raise ValueError(f"tier {tier!r} must be one of {TIERS}")
     if tier == "lab":
-        return tuple(_lab_day(k) for k in range(LAB_DAYS))
-    cases = [*_clean(tier), *_single(tier), *_pairs(tier), *_outside(tier)]
-    return tuple({case.name: case for case in cases}.values())
+        cases = [_lab_day(k) for k in range(LAB_DAYS)]
+    else:
+        cases = [*_clean(tier), *_single(tier), *_pairs(tier), *_outside(tier)]
+    return tuple({case.name: replace(case, draw=draw) for case in cases}.values())
 
 
 def _case(kind: str, robot: str, pose: bool, effects: tuple[tuple[str, str], ...], tag: str = ""):
