@@ -33,9 +33,6 @@ from freeswing.ident.drive.unknowns import Asked
 
 Array = NDArray[np.float64]
 
-# How far from its start a number may go: Table 1's initial inertia is 33 times the robot's.
-DYNAMIC_REACH = 1e3
-KINEMATIC_REACH = 3.0
 ON_BOUND = 1e-6
 
 
@@ -128,8 +125,7 @@ class Problem:
         """Least and greatest values, (size,) each."""
         low, high = np.full(self.size, -np.inf), np.full(self.size, np.inf)
         at = self.start()[: self.k]
-        reach = np.full(self.k, DYNAMIC_REACH)
-        reach[: self.asked.n_kinematic] = KINEMATIC_REACH
+        reach = self.asked.reach
         positive = at > 0.0
         low[: self.k][positive] = (at / reach)[positive]
         high[: self.k][positive] = (at * reach)[positive]

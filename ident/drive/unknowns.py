@@ -11,6 +11,10 @@ from freeswing.cdpr.driven.model import DrivenModel
 
 Array = NDArray[np.float64]
 
+# How far from its start a number may go: Table 1's initial inertia is 33 times the robot's.
+DYNAMIC_REACH = 1e3
+KINEMATIC_REACH = 3.0
+
 
 @dataclass(frozen=True, slots=True)
 class Group:
@@ -43,6 +47,12 @@ class Asked:
     def names(self) -> tuple[str, ...]:
         """One name an unknown."""
         return tuple(group.name for group in self.groups)
+
+    @property
+    def reach(self) -> Array:
+        """Times its start that each may end at, or one over it, (k,)."""
+        kinematic = np.arange(len(self.groups)) < self.n_kinematic
+        return np.where(kinematic, KINEMATIC_REACH, DYNAMIC_REACH)
 
     @property
     def kinematic(self) -> Asked:

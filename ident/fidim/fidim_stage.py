@@ -17,6 +17,7 @@ from freeswing.ident.fidim.fidim import FidimEstimate, fidim
 from freeswing.ident.fidim.length_share import length_share
 from freeswing.ident.fidim.payload_mass import LoadedCentre, MassEstimate, mass_from_payloads
 from freeswing.ident.fidim.shares import Share, Stack, shares_sentence
+from freeswing.ident.fidim.slack_runs import slack_runs, within_reach
 from freeswing.ident.fidim.weighted_least_squares import (
     NoisyRegressor,
     noisy_regressor,
@@ -27,7 +28,6 @@ from freeswing.ident.judge.free_against_full import between_runs
 from freeswing.ident.likelihood.between_runs import widened
 from freeswing.ident.runs import DroppedRun
 from freeswing.ident.signals.derivatives import SignalSettings
-from freeswing.ident.signals.motions import lowest_tension
 from freeswing.ident.signals.prepare import (
     PreparedRun,
     PreparedRuns,
@@ -40,8 +40,6 @@ from freeswing.ident.signals.prepare import (
 )
 
 Weighting = Literal["published", "covariance"]
-# Two standard deviations: what the swings themselves leave open.
-REACH = 2.0
 
 
 def fidim_estimates(
@@ -75,7 +73,7 @@ def fidim_estimates(
         try:
             equations = _equations(model, unloaded, full)
             raw = fidim(equations)
-            slack = _slack_runs(model, prepared, within_reach(raw), full)
+            slack = slack_runs(model, prepared, within_reach(raw), full)
             if slack:
                 prepared = without(prepared, slack)
                 equations = _equations(model, usable(prepared, full, None), full)
@@ -215,41 +213,6 @@ def _mass(
     except ValueError as error:
         return None, [*notes, str(error)]
     return found, notes
-
-
-def within_reach(raw: FidimEstimate) -> Array:
-    """The estimate and what lies `REACH` deviations off along its principal axes, (19, 9).
-
-    Source:
-        Bishop 2006, Pattern Recognition and Machine Learning, sec. 2.3: principal axes of a
-        Gaussian.
-    """
-    sizes, axes = np.linalg.eigh(raw.solution.covariance)
-    steps = REACH * (axes * np.sqrt(np.maximum(sizes, 0.0))).T
-    return np.concatenate([raw.values[None], raw.values + steps, raw.values - steps])
-
-
-def _slack_runs(
-    model: Model, prepared: PreparedRuns, inertias: Array, full: bool
-) -> dict[str, str]:
-    """Runs along which a cable pushes by every inertia that the swings allow: name and sentence.
-
-    An inertia that they do not determine may make any cable push, and proves nothing.
-    """
-    slack = {}
-    for run in prepared.runs:
-        # Measured poses settle it; free coordinates only where there is nothing better.
-        if not full and run.full is not None:
-            continue
-        motion = run.full if full else run.free
-        if motion is None or run.run.payload is not None:
-            continue
-        lowest, cable = lowest_tension(model, motion, inertias[0])
-        if lowest < 0.0 and all(lowest_tension(model, motion, one)[0] < 0.0 for one in inertias):
-            slack[run.name] = (
-                f"cable {cable} goes slack: its tension falls to {lowest:.2f} N per kg of platform"
-            )
-    return slack
 
 
 def _unusable_sentence(dropped: tuple[DroppedRun, ...]) -> str:

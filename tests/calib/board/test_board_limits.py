@@ -14,7 +14,8 @@ from freeswing.calib.board import board_check, chessboards, circles, detection
 from freeswing.calib.board.boards import Board
 from freeswing.calib.board.platform_tags import platform_tags
 from freeswing.calib.camera.camera import Camera
-from freeswing.calib.camera.cameras_file import _question_lens, read_cameras, write_cameras
+from freeswing.calib.camera.cameras_file import read_cameras, write_cameras
+from freeswing.calib.camera.impossible_lenses import question_lens
 from freeswing.cdpr.files.documents import InputError
 
 CHARUCO = Board("charuco", 5, 4, 0.04, marker_m=0.03, dictionary="DICT_4X4_50")
@@ -114,7 +115,7 @@ def test_no_lens_leaves_a_third_of_the_angle_half_way_to_the_corners(share, refu
     said = []
     entry = SimpleNamespace(add=lambda key, text: said.append(text))
     params = np.array([focal, focal, 400.0, 300.0, k, 0.0, 0.0, 0.0])
-    _question_lens(entry, "OPENCV", size, params)
+    question_lens(entry, "OPENCV", size, params)
     assert bool(said) == refused, said
 
 
@@ -137,5 +138,5 @@ def test_focal_lengths_that_no_lens_has(share, questioned) -> None:
     said: list[str] = []
     entry = SimpleNamespace(add=lambda key, text: said.append(text))
     params = np.array([800.0 * share, 399.5, 299.5])
-    _question_lens(entry, "SIMPLE_PINHOLE", np.array([800.0, 600.0]), params)
+    question_lens(entry, "SIMPLE_PINHOLE", np.array([800.0, 600.0]), params)
     assert any("focal lengths" in text for text in said) == questioned, said

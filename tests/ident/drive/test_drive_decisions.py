@@ -10,6 +10,7 @@ import pytest
 from freeswing.ident.drive.diagnose import diagnose as module
 from freeswing.ident.drive.joint import Problem
 from freeswing.ident.drive.trust import is_untold
+from freeswing.ident.drive.unknowns import Asked
 
 
 class Fit(SimpleNamespace):
@@ -126,7 +127,7 @@ def test_numbers_go_so_far_from_where_they_start():
         size=2,
         k=2,
         start=lambda: np.array([3.0, 2.0]),
-        asked=SimpleNamespace(n_kinematic=1, groups=groups),
+        asked=Asked(tuple(groups), 1),
         given=SimpleNamespace(model=SimpleNamespace(numbers=numbers, index="ab".index)),
     )
     low, high = Problem.bounds(problem)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from freeswing.ident.fidim import fidim as module
-from freeswing.ident.fidim import fidim_stage, weighted_least_squares
+from freeswing.ident.fidim import slack_runs, weighted_least_squares
 from freeswing.ident.fidim.fidim import near_zero
 from freeswing.ident.fidim.total_least_squares import TotalLeastSquares
 from freeswing.ident.judge.consistency import Consistency, least_moment, nearest_possible
@@ -68,13 +68,13 @@ def test_two_runs_tell_no_spread_and_three_do():
 @pytest.mark.parametrize(("off", "slack"), [(1.9, []), (2.1, ["a"])])
 def test_a_cable_pushes_where_all_within_two_deviations_say_so(monkeypatch, off, slack):
     """The estimate's first number is so many deviations below where the cable goes slack."""
-    monkeypatch.setattr(fidim_stage, "lowest_tension", lambda model, motion, one: (one[0], "1"))
+    monkeypatch.setattr(slack_runs, "lowest_tension", lambda model, motion, one: (one[0], "1"))
     solution = SimpleNamespace(covariance=1e-4 * np.eye(9))
-    inertias = fidim_stage.within_reach(
+    inertias = slack_runs.within_reach(
         SimpleNamespace(solution=solution, values=np.r_[-0.01 * off, np.zeros(8)])
     )
     run = SimpleNamespace(name="a", full=True, run=SimpleNamespace(payload=None))
-    found = fidim_stage._slack_runs(None, SimpleNamespace(runs=[run]), inertias, True)
+    found = slack_runs.slack_runs(None, SimpleNamespace(runs=[run]), inertias, True)
     assert list(found) == slack
 
 

@@ -1,10 +1,12 @@
 """Slackness is concluded only from an inertia that the swings determine."""
+# Stubs stand for what is not looked at.
+# pyright: reportArgumentType=false
 
 from types import SimpleNamespace
 
 import numpy as np
 
-from freeswing.ident.fidim import fidim_stage
+from freeswing.ident.fidim import slack_runs
 
 
 def raw(std):
@@ -19,10 +21,10 @@ def slack_with(monkeypatch, std, limit):
     def lowest(model, motion, inertia):
         return inertia[0] - limit, "2"
 
-    monkeypatch.setattr(fidim_stage, "lowest_tension", lowest)
+    monkeypatch.setattr(slack_runs, "lowest_tension", lowest)
     run = SimpleNamespace(name="swing", full=object(), free=None, run=SimpleNamespace(payload=None))
     prepared = SimpleNamespace(runs=(run,))
-    return fidim_stage._slack_runs(None, prepared, fidim_stage.within_reach(raw(std)), True)
+    return slack_runs.slack_runs(None, prepared, slack_runs.within_reach(raw(std)), True)
 
 
 def test_a_sure_inertia_makes_runs_slack_and_an_unsure_one_does_not(monkeypatch):
@@ -32,6 +34,6 @@ def test_a_sure_inertia_makes_runs_slack_and_an_unsure_one_does_not(monkeypatch)
 
 
 def test_two_deviations_either_way_along_every_axis_are_within_reach():
-    found = fidim_stage.within_reach(raw(0.5))
+    found = slack_runs.within_reach(raw(0.5))
     assert found.shape == (19, 9)
     assert np.abs(found - found[0]).max() == np.float64(1.0)
