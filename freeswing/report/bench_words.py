@@ -8,6 +8,7 @@ from freeswing.results.diagnosis import Diagnosis, HeldOut
 from freeswing.results.identification import BodyParameter, BudgetShare, ClassicRow, Identification
 
 HALF_WIDTH_95 = 1.959964
+LEAST_SHARE = 0.01  # per cent of Izz: what two decimals show
 
 
 def bench_lines(document: Identification) -> list[str]:
@@ -50,11 +51,17 @@ def object_row(row: BodyParameter) -> str:
 
 def classic_row(row: ClassicRow) -> str:
     """The classic formula's value beside the fit's, and why they differ."""
-    told = [f"{one.what} {one.percent:+.2f} %" for one in row.reasons]
     return (
         f"{number(row.Izz_kg_m2, 5)} kg m2 against {number(row.fitted_Izz_kg_m2, 5)} "
-        f"({row.off_percent:+.2f} %; {'; '.join(told)})"
+        f"({row.off_percent:+.2f} %: {classic_why(row)})"
     )
+
+
+def classic_why(row: ClassicRow) -> str:
+    """Shares of what the formula is off by, the largest first; below a hundredth per cent none."""
+    told = sorted(row.reasons, key=lambda one: -abs(one.percent))
+    shares = [f"{one.what} {one.percent:+.2f} %" for one in told if abs(one.percent) >= LEAST_SHARE]
+    return "; ".join(shares) or f"no share of {LEAST_SHARE} % or more"
 
 
 def diagnosis_lines(document: Diagnosis) -> list[str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from freeswing.report.bench_words import HALF_WIDTH_95, changed_objects
+from freeswing.report.bench_words import HALF_WIDTH_95, changed_objects, classic_why
 from freeswing.report.material import Material
 from freeswing.report.words import number
 from freeswing.results.identification import BodyParameter, ChannelGain, ClassicRow
@@ -73,5 +73,5 @@ def _classic(row: ClassicRow) -> dict[str, str]:
         "formula (kg m²)": number(row.Izz_kg_m2, 5),
         "fit (kg m²)": number(row.fitted_Izz_kg_m2, 5),
         "off (%)": f"{row.off_percent:+.2f}",
-        "why": "; ".join(f"{one.what} {one.percent:+.2f} %" for one in row.reasons),
+        "why": classic_why(row),
     }

@@ -6,21 +6,25 @@ I = m g R r T^2 / (4 pi^2 L): equal wires, the centre of mass in their middle, s
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from freeswing.cdpr.robot import Array
-from freeswing.cdpr.simulation.parallel_wires import bending
-from freeswing.ident.bench.modal import SQUARE
 from freeswing.ident.bench.objects import moments
 from freeswing.ident.bench.solve import Solved
 from freeswing.ident.bench.swing import IZZ, BenchSwing
+from freeswing.ident.bench.told.classic_reasons import (
+    BESIDE,
+    CHI,
+    Measured,
+    reasons_of,
+    spread_of,
+)
 
 LEAST_PERIODS = 2.0  # in a record: a sine and a slow drift look alike on fewer
-BESIDE = "centre of mass beside the middle: yaw moves it along"
 LEANING_PERCENT = 1.0  # of Izz: what a bench is asked for
 
 
@@ -73,7 +77,8 @@ def classic_runs(solved: Solved, declared_kg: float | None) -> list[ClassicRun]:
         top, bottom, length = radii(swing)
         gravity = float(np.linalg.norm(swing.model.robot.gravity_m_s2))
         izz = mass * gravity * top * bottom / length * (period / (2.0 * np.pi)) ** 2
-        reasons = _reasons(swing, values, total, mass)
+        measured = Measured(mass, float(izz), period, _simulated(swing, values))
+        reasons = reasons_of(swing, values, measured)
         found.append(ClassicRun(swing.name, period, float(izz), float(total[IZZ]), reasons))
     return found
 
@@ -81,11 +86,8 @@ def classic_runs(solved: Solved, declared_kg: float | None) -> list[ClassicRun]:
 def radii(swing: BenchSwing) -> tuple[float, float, float]:
     """Radii of the wires' upper and lower ends about their middle, and the mean length."""
     robot = swing.model.robot
-    sizes = []
-    for points in (robot.entries_m, robot.attachments_m):
-        off = points - points.mean(axis=0)
-        sizes.append(float(np.sqrt(np.mean(np.sum(off**2, axis=1)))))
-    return sizes[0], sizes[1], float(np.mean(swing.lengths_m))
+    top, bottom = (spread_of(points) for points in (robot.entries_m, robot.attachments_m))
+    return top, bottom, float(np.mean(swing.lengths_m))
 
 
 def period_of(swing: BenchSwing) -> float | None:
@@ -96,6 +98,11 @@ def period_of(swing: BenchSwing) -> float | None:
     if column is None:
         return None
     return sine_period(swing.times_s[column.known], column.values[column.known])
+
+
+def _simulated(swing: BenchSwing, values: Mapping[str, Array]) -> float | None:
+    """Period of yaw in the fitted swing, by the same sine as the samples'."""
+    return sine_period(swing.times_s, swing.simulated(values).at(swing.times_s)[0][:, CHI])
 
 
 def sine_period(times: Array, values: Array) -> float | None:
@@ -118,30 +125,6 @@ def _left(times: Array, values: Array, rate: float) -> float:
     return float(np.sum((values - design @ found) ** 2))
 
 
-def _reasons(
-    swing: BenchSwing,
-    values: dict[str, Array],
-    total: Array,
-    mass: float,
-) -> tuple[tuple[str, float], ...]:
-    """Shares of the difference, each by itself: mass, centre of mass, amplitude, wire lengths."""
-    length = float(np.mean(swing.lengths_m))
-    motion = swing.simulated(values)
-    yaw = motion.at(swing.times_s)[0][:, 5]
-    square = float(values.get(SQUARE, np.ones(1))[0]) * (0.5 * float(np.ptp(yaw))) ** 2
-    top, bottom, _ = radii(swing)
-    bent = bending(top, bottom, length, float(total[IZZ] / total[0]))
-    centre = total[1:3] / total[0] - swing.model.robot.attachments_m.mean(axis=0)[:2]
-    fitted = float(np.mean(swing.lengths(values)))
-    off_centre = float(total[0] * centre @ centre / total[IZZ])
-    return (
-        ("mass that payload runs contradict", 100.0 * (mass / total[0] - 1.0)),
-        (BESIDE, -100.0 * off_centre),
-        ("amplitude: the period changes with it", -200.0 * bent * square),
-        ("wire length", 100.0 * (fitted / length - 1.0)),
-    )
-
-
 def leaning_sentence(classic: Sequence[ClassicRun], sway_seen: bool) -> str:
     """A warning where Izz leans on a centre of mass that no calibrated column has shown.
 
@@ -149,7 +132,7 @@ def leaning_sentence(classic: Sequence[ClassicRun], sway_seen: bool) -> str:
         classic: the runs by the formula.
         sway_seen: whether some run measures x or y itself.
     """
-    shares = [-share for run in classic for what, share in run.reasons if what == BESIDE]
+    shares = [abs(share) for run in classic for what, share in run.reasons if what == BESIDE]
     if sway_seen or not shares or float(np.median(shares)) < LEANING_PERCENT:
         return ""
     return (

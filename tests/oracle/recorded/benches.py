@@ -47,6 +47,8 @@ class Hidden:
         stiffness_ea_n: of the wires, whose told lengths are unstretched; 0: rigid.
         eccentric_m: the first wire's lower end over what is told, platform frame, (3,).
         hold_n_m: a clamp or wires that hold yaw, N m a radian.
+        beside_m: the platform's centre of mass over where it usually is, (3,).
+        wider: twists by hand over the usual ones.
     """
 
     longer_m: float = LONGER_M
@@ -57,6 +59,8 @@ class Hidden:
     stiffness_ea_n: float = 0.0
     eccentric_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     hold_n_m: float = 0.0
+    beside_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    wider: float = 1.0
 
 
 USUAL = Hidden()
@@ -121,7 +125,8 @@ def make_bench(
         place_m = places_m[(k - counts[0] - counts[1]) % len(places_m)]
         world = _world(wires, kind, weight_m, hidden, place_m)
         name = f"{kind}-{k + 1:02d}"
-        _record(folder / "runs" / f"{name}.csv", world, rng, seen, duration_s, rolled_rad_s)
+        motion = _swing(world, rng, duration_s, RATE_HZ, rolled_rad_s, hidden.wider)
+        _record(folder / "runs" / f"{name}.csv", motion, rng, seen)
         lines += ["", "[[runs]]", f'name = "{name}"', 'role = "identify"']
         lines += [f"cable_lengths_m = {[WIRE_M] * wires}", "cable_lengths_std_m = 0.001"]
         lines += [f'trajectory = "runs/{name}.csv"']
@@ -136,7 +141,8 @@ def make_bench(
     (folder / "session.toml").write_text("\n".join([*lines, ""]))
     _write_robot(folder / "robot.toml", wires, ends)
     mass = DECLARED_KG * hidden.heavier
-    izz = PLATFORM_KG_M2[2] + mass * float(np.sum(PLATFORM_COM_M[:2] ** 2))
+    com_m = PLATFORM_COM_M + hidden.beside_m
+    izz = PLATFORM_KG_M2[2] + mass * float(np.sum(com_m[:2] ** 2))
     truth = BenchTruth(folder, mass, izz, float(LOAD_KG_M2[2]), LOAD_COM_M)
     (folder / "truth").mkdir(exist_ok=True)
     numbers = {
@@ -180,7 +186,8 @@ def _world(
         Cable(str(k), end + np.array([0.0, 0.0, WIRE_M]), 0.0, end) for k, end in enumerate(ends)
     )
     robot = Robot("bench", cables, np.array([0.0, 0.0, -GRAVITY]))
-    parts = [_moment(DECLARED_KG * hidden.heavier, PLATFORM_COM_M, PLATFORM_KG_M2)]
+    com_m = PLATFORM_COM_M + hidden.beside_m
+    parts = [_moment(DECLARED_KG * hidden.heavier, com_m, PLATFORM_KG_M2)]
     if kind == "weight":
         parts.append(_moment(WEIGHT_KG, weight_m, np.zeros(3)))
     if kind == "loaded":
@@ -221,11 +228,12 @@ def _swing(
     span_s: float,
     rate_hz: float,
     rolled_rad_s: float = 0.0,
+    wider: float = 1.0,
 ) -> Motion:
     rest = settle(world, np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
     twist = np.zeros(6)
     # A twist by hand: about 8 degrees of yaw, and a centimetre of sway that nobody wanted.
-    twist[5] = rng.choice([-1.0, 1.0]) * rng.uniform(0.5, 0.7)
+    twist[5] = wider * rng.choice([-1.0, 1.0]) * rng.uniform(0.5, 0.7)
     twist[:2] = rng.normal(0.0, 0.02, 2)
     if rolled_rad_s > 0.0:
         twist[3] = rng.choice([-1.0, 1.0]) * rolled_rad_s
@@ -233,15 +241,7 @@ def _swing(
     return simulate(world, *start, rate_hz)
 
 
-def _record(
-    path: Path,
-    world: World,
-    rng: np.random.Generator,
-    seen: str,
-    span_s: float,
-    rolled_rad_s: float = 0.0,
-) -> None:
-    motion = _swing(world, rng, span_s, RATE_HZ, rolled_rad_s)
+def _record(path: Path, motion: Motion, rng: np.random.Generator, seen: str) -> None:
     angles = tait_bryan(motion.quaternions)
     chi = angles[:, 2]
     times = motion.times_s[:, None]

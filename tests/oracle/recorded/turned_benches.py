@@ -24,6 +24,7 @@ from tests.oracle.recorded.benches import (
     WIRE_M,
     _ends,
     _record,
+    _swing,
     _write_robot,
 )
 
@@ -75,7 +76,8 @@ def make_turned_bench(
     lines += [f"com_m = {told.tolist()}", "com_std_m = 0.001"]
     for k, laid in enumerate([None] * each + [one for one in LAID for _ in range(each)]):
         name = f"run-{k + 1:02d}"
-        _record(folder / "runs" / f"{name}.csv", _world(laid), rng, "poses", duration_s)
+        motion = _swing(_world(laid), rng, duration_s, RATE_HZ)
+        _record(folder / "runs" / f"{name}.csv", motion, rng, "poses")
         lines += ["", "[[runs]]", f'name = "{name}"', 'role = "identify"']
         lines += [f"cable_lengths_m = {[WIRE_M] * 2}", "cable_lengths_std_m = 0.001"]
         lines += [f'trajectory = "runs/{name}.csv"']
