@@ -166,7 +166,7 @@ def moved_text(times_s: Array, poses: Array, run: str) -> str | None:
 def _oscillations(times_s: Array, poses: Array) -> Array:
     """Columns that oscillations about a rest are made of, (n, k)."""
     found: list[float] = []
-    apart = 0.6 / float(np.ptp(times_s))
+    apart = 0.1 / float(np.ptp(times_s))  # rates nearer than the search's grid are one
     for series in poses.T:
         left = series - series.mean()
         for _ in range(2):

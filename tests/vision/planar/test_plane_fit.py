@@ -110,3 +110,16 @@ def test_a_camera_that_moved_is_named_with_its_time(step_m: float, named: bool) 
     assert (said is not None) == named, said
     if said is not None:
         assert "at 4.2" in said, said
+
+
+@pytest.mark.parametrize("yaw_hz", [0.47, 0.51, 0.55])
+def test_yaw_that_is_nearly_as_slow_as_sway_is_no_step(yaw_hz: float) -> None:
+    """Two wires: yaw was taken for sway's oscillation, and what was left of it for a knock."""
+    times, true = poses()
+    true[:, 2] = 0.18 * np.cos(2.0 * np.pi * yaw_hz * times + 0.4)
+    seen = true + np.random.default_rng(0).normal(0.0, [5e-5, 5e-5, 3e-4], true.shape)
+    assert moved_text(times, seen, "a") is None
+    seen[times > 4.2, 0] += 0.003
+    said = moved_text(times, seen, "a")
+    assert said is not None
+    assert "at 4.2" in said, said
