@@ -12,6 +12,7 @@ from freeswing.cdpr.model.equations import build_model
 from freeswing.cdpr.robot import POSE_COORDINATES, Array, Robot
 from freeswing.ident.bench.assemble import EFFECTS, assembled
 from freeswing.ident.bench.channels import check_moves
+from freeswing.ident.bench.kinds_doubt import with_kinds_counted
 from freeswing.ident.bench.priors.wire_priors import with_lengths
 from freeswing.ident.bench.runs import Bench, BenchRun, Signal
 from freeswing.ident.bench.solve import Solved, solved
@@ -114,7 +115,7 @@ def identify_bench(bench: Bench, robot: Robot) -> BenchResult:
     bench = replace(bench, runs=tuple(_windowed(run) for run in runs))
     fitted = [run for run in bench.runs if run.role == "identify"]
     try:
-        found = solved(model, bench, assembled(model, bench, fitted))
+        found = with_kinds_counted(solved(model, bench, assembled(model, bench, fitted)))
     except (ValueError, np.linalg.LinAlgError) as error:
         raise DataError(f"the bench's runs cannot be fitted: {error}") from error
     rolled = rolled_sentences(found, fitted)

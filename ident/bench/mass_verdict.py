@@ -75,6 +75,21 @@ def weighed_mass(
     return fit(swings, held, how), verdict
 
 
+def mass_left_free(unknowns: Unknowns, mass: MassVerdict) -> Unknowns:
+    """The unknowns with the platform's mass to be found, and next to nothing believed of it.
+
+    Source:
+        JCGM 100:2008, sec. 4.3.8: an input of which little is known.
+    """
+    block = unknowns.block("platform")
+    wide, mean = np.full(block.size, np.inf), np.array(block.value)
+    if block.prior is not None:
+        wide, mean = np.array(block.prior.std), np.array(block.prior.mean)
+    wide[0] = mass.declared_kg
+    freed = unknowns.estimating("platform", np.arange(block.size) == 0)
+    return freed.known("platform", Gaussian(mean, wide, "next to nothing known of the mass"))
+
+
 def doubt(freed: Solution, mass: MassVerdict | None) -> Array:
     """What deviations count where a declared mass serves: how far payload runs are from it.
 

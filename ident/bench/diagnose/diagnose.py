@@ -18,6 +18,7 @@ from freeswing.ident.bench.diagnose.shown import Shown, shown
 from freeswing.ident.bench.diagnose.weigh import Fit
 from freeswing.ident.bench.held_uncertain import considered
 from freeswing.ident.bench.identify_bench import BenchResult, identify_bench
+from freeswing.ident.bench.kinds_doubt import with_differences, with_kinds_counted
 from freeswing.ident.bench.mass_verdict import CONTRADICTED, MassVerdict
 from freeswing.ident.bench.modal import ModalSwing
 from freeswing.ident.bench.runs import Bench
@@ -148,7 +149,7 @@ def _diagnosed(
     removed = removals(ground, last, identified.bench, only)
     told("before and after", 0.9)
     ladder = _ladder(identified.bench, ground, last, removed)
-    solved = _counted(identified.solved, ladder[-1].fit)
+    solved = _counted(identified.solved, ladder[-1].fit, rounds)
     declared = _counted(identified.solved, ladder[0].fit)
     told("diagnosis", 1.0)
     return BenchDiagnosis(
@@ -168,15 +169,25 @@ def _start(solved: Solved, scattered: bool = False) -> Fit:
     return Fit(solved.swings, fit(solved.swings, zero, FINE))
 
 
-def _counted(solved: Solved, one: Fit) -> Solved:
-    """A fit with the covariance that its held numbers ask for, and what it says of the mass."""
+def _counted(solved: Solved, one: Fit, rounds: Sequence[Round] = ()) -> Solved:
+    """A fit with the covariance that its held numbers ask for, and what it says of the mass.
+
+    What fits with causes that cannot be told apart differ by is counted in full.
+    """
     found = considered(one.swings, one.solution, solved.held)
     mass = solved.mass
     if mass is not None and mass.contradicted:
         value, std = float(found.value("platform")[0]), float(found.std("platform")[0])
         off = abs(value - mass.declared_kg) > CONTRADICTED * std
         mass = MassVerdict(mass.declared_kg, value, std, off)
-    return replace(solved, solution=found, swings=one.swings, mass=mass)
+    pairs = [
+        (step.winner.solution, rival.solution)
+        for step in rounds
+        if step.winner is not None
+        for rival in step.rivals
+    ]
+    counted = with_differences(found, pairs)
+    return with_kinds_counted(replace(solved, solution=counted, swings=one.swings, mass=mass))
 
 
 def _ladder(

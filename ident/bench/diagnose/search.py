@@ -55,10 +55,17 @@ class Word:
 
 @dataclass(frozen=True, slots=True)
 class Round:
-    """One round: what was fitted, what became of it, and the fit that goes on, or None."""
+    """One round.
+
+    Attributes:
+        words: what became of every cause.
+        winner: the fit that goes on, or None.
+        rivals: fits with what left-out runs cannot tell from the winner's, under the same noise.
+    """
 
     words: tuple[Word, ...]
     winner: Fit | None
+    rivals: tuple[Fit, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -240,7 +247,8 @@ def _judged(
         elif not reason and group:
             reason = f"{by_block[group[0]].effect} predicts left-out runs better"
         words[name] = Word(cause, verdict, share, chance[name], bic, others, reason)
-    return Round(tuple(words.values()), weighed[group[0]] if group else None)
+    rivals = tuple(weighed[name] for name in group[1:])
+    return Round(tuple(words.values()), weighed[group[0]] if group else None, rivals)
 
 
 def _complaint(before: Fit, one: Fit, counts: Array) -> str:

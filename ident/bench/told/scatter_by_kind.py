@@ -70,6 +70,7 @@ def scatter_sentence(solved: Solved) -> str:
     return (
         f"runs differ by {size}, and this goes with what they carry, which no chance does: the "
         "model lacks something (a clamp or wires that hold yaw, a radius, a mass or its place). "
-        "Deviations count it as if it were chance, which is too little: DO NOT RELY on Izz. Record "
-        "three runs or more with the known mass at different places, then freeswing diagnose"
+        "Deviations count all that Izz changes by when it is taken for one thing instead, the mass "
+        "left to the runs: DO NOT RELY on more. Record three runs or more with the known mass at "
+        "different places, then freeswing diagnose"
     )
