@@ -88,7 +88,7 @@ def reasons_of(
     total = swing.total(values)
     fitted, stated = swing.lengths(values), float(np.mean(swing.lengths_m))
     mean = float(np.mean(fitted))
-    factors = {MASS: measured.mass_kg / float(total[0]), LENGTH: mean / stated}
+    factors: dict[str, float] = {MASS: measured.mass_kg / float(total[0]), LENGTH: mean / stated}
     with suppress(ValueError, np.linalg.LinAlgError):  # a plainer bench that hangs nowhere
         factors |= _by_steps(swing, fitted, specific(total), measured)
     off = measured.izz_kg_m2 / float(total[6])
@@ -117,7 +117,8 @@ def _by_steps(
     spring = gravity * top * bottom / float(alike[0])  # over the mass
     squares.append(4.0 * np.pi**2 * float(inertia[IZZ_SPECIFIC]) / spring)
     names = (UNEQUAL, BESIDE, ROLLS, LEAN)
-    found = dict(zip(names, np.divide(squares[:-1], squares[1:]).tolist(), strict=True))
+    ratios = np.divide(squares[:-1], squares[1:]).tolist()
+    found: dict[str, float] = dict(zip(names, ratios, strict=True))
     if measured.simulated_s is not None:
         found[AMPLITUDE] = measured.simulated_s**2 / squares[0]
     return found
