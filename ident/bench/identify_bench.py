@@ -12,7 +12,6 @@ from freeswing.cdpr.model.equations import build_model
 from freeswing.cdpr.robot import POSE_COORDINATES, Array, Robot
 from freeswing.ident.bench.assemble import EFFECTS, assembled
 from freeswing.ident.bench.channels import check_moves
-from freeswing.ident.bench.kinds_doubt import with_kinds_counted
 from freeswing.ident.bench.priors.wire_priors import with_lengths
 from freeswing.ident.bench.runs import Bench, BenchRun, Signal
 from freeswing.ident.bench.solve import Solved, solved
@@ -26,6 +25,7 @@ from freeswing.ident.bench.told.classic import (
 from freeswing.ident.bench.told.contradicted import contradictions, exchange_sentence
 from freeswing.ident.bench.told.envelope import Envelope, envelopes, law_chances
 from freeswing.ident.bench.told.held_out import HeldOut, held_out
+from freeswing.ident.bench.told.kinds_doubt import with_kinds_counted
 from freeswing.ident.bench.told.report_objects import (
     channels_document,
     objects_document,

@@ -18,12 +18,12 @@ from freeswing.ident.bench.diagnose.shown import Shown, shown
 from freeswing.ident.bench.diagnose.weigh import Fit
 from freeswing.ident.bench.held_uncertain import considered
 from freeswing.ident.bench.identify_bench import BenchResult, identify_bench
-from freeswing.ident.bench.kinds_doubt import with_differences, with_kinds_counted
 from freeswing.ident.bench.mass_verdict import CONTRADICTED, MassVerdict
 from freeswing.ident.bench.modal import ModalSwing
 from freeswing.ident.bench.runs import Bench
 from freeswing.ident.bench.solve import FINE, Solved
 from freeswing.ident.bench.swing import COMMON
+from freeswing.ident.bench.told.kinds_doubt import with_differences, with_kinds_counted
 from freeswing.ident.bench.told.scatter_by_kind import is_systematic
 from freeswing.ident.likelihood.fit import fit
 
