@@ -43,7 +43,8 @@ from freeswing.calib.verdict.trust import Verdict, judge
 from freeswing.calib.verdict.truth_checks import check_truth, widened
 from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.robot import STANDARD_GRAVITY_M_S2
-from freeswing.cdpr.system.progress import Progress
+
+Progress = Callable[[str, float], None]
 
 DEFAULT_MODEL = "OPENCV"
 KEPT_BOARDS = ".boards"  # below the results

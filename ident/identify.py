@@ -11,7 +11,6 @@ from freeswing.cdpr.effects import Recorded, catalogue
 from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.model.equations import Model, build_model
 from freeswing.cdpr.robot import Robot
-from freeswing.cdpr.system.progress import Progress
 from freeswing.ident.estimate import Estimate
 from freeswing.ident.fidim.fidim_stage import Weighting, fidim_estimates
 from freeswing.ident.inertia_starts import likelihood_starts
@@ -30,6 +29,7 @@ from freeswing.ident.signals.prepare import (
     LARGEST_AMPLIFICATION,
     PreparedRun,
     PreparedRuns,
+    Progress,
     fittable,
     left_out,
     length_differences,

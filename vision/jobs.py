@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from freeswing.cdpr.system.lifeline import tie_to
-from freeswing.cdpr.system.progress import Progress
+
+Progress = Callable[[str, float], None]
 
 _POLL_S = 0.5
 

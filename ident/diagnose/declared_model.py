@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +10,6 @@ import numpy as np
 from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.robot import Array
-from freeswing.cdpr.system.progress import Progress
 from freeswing.ident.diagnose.outstanding_runs import tempered
 from freeswing.ident.diagnose.spectrum import residual_powers
 from freeswing.ident.judge.consistency import is_possible
@@ -24,6 +24,8 @@ from freeswing.ident.likelihood.fit_swings import (
 )
 from freeswing.ident.likelihood.session_estimates import astray, begun
 from freeswing.ident.signals.prepare import PreparedRun
+
+Progress = Callable[[str, float], None]
 
 # One run is left out at a time: two others have to agree.
 LEAST_RUNS = 3

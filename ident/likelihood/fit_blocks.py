@@ -151,7 +151,7 @@ class _Blocks:
 
 
 @dataclass(frozen=True, slots=True)
-class LinearProblem:
+class Linear:
     """A fit's linear problem about some unknowns, run by run, in units of their scales.
 
     Attributes:
@@ -173,7 +173,7 @@ class LinearProblem:
         return np.asarray(moved - own @ np.linalg.lstsq(own, moved, rcond=RANK_LIMIT)[0])
 
 
-def linear_problem(swings: Sequence[Swing], unknowns: Unknowns) -> LinearProblem:
+def linear_problem(swings: Sequence[Swing], unknowns: Unknowns) -> Linear:
     """Linearise a fit about some unknowns.
 
     Raises:
@@ -193,7 +193,7 @@ def linear_problem(swings: Sequence[Swing], unknowns: Unknowns) -> LinearProblem
         parts.append((residuals, own, shared))
         triangles.append(_triangle(rows)[own.shape[1] :, own.shape[1] :][:size])
     priors = _shared_priors(unknowns)[:, np.append(free, True)]
-    return LinearProblem(tuple(parts), np.array(triangles), priors)
+    return Linear(tuple(parts), np.array(triangles), priors)
 
 
 def _simulated(swings: Sequence[Swing], unknowns: Unknowns) -> list[Any]:
@@ -201,10 +201,7 @@ def _simulated(swings: Sequence[Swing], unknowns: Unknowns) -> list[Any]:
 
 
 def _cost(swings: Sequence[Swing], unknowns: Unknowns, made: Sequence[Any]) -> float:
-    alone = unknowns.blocks if unknowns.correlations is None else unknowns.own
-    total = sum(float(np.sum(block.pull(block.value)[0] ** 2)) for block in alone)
-    if unknowns.correlations is not None:
-        total += float(np.sum(_shared_priors(unknowns)[:, -1] ** 2))
+    total = sum(float(np.sum(block.pull(block.value)[0] ** 2)) for block in unknowns.blocks)
     for run, (swing, one) in enumerate(zip(swings, made, strict=True)):
         total += float(np.sum(swing.residuals(unknowns.of_run(run), one) ** 2))
     return total
@@ -240,7 +237,7 @@ def _step(parts: list[Part], unknowns: Unknowns, damping: float) -> _Step:
     n_own = sum(block.size for block in unknowns.own)
     held = np.where(_joined([block.mask for block in unknowns.own]), 0.0, 1.0)
     reduced, triangles = [], []
-    curvature = np.sum(_shared_priors(unknowns)[:, :-1] ** 2, axis=0)
+    curvature = _shared_priors(unknowns)[:, :-1].diagonal() ** 2
     for residuals, own, shared in parts:
         rows = np.column_stack([own, shared, residuals])
         more = np.zeros((2 * n_own, rows.shape[1]))
@@ -286,14 +283,8 @@ def _solved(triangle: Array, right: Array) -> Array:
 
 
 def _shared_priors(unknowns: Unknowns) -> Array:
-    """What is known of the shared unknowns, a row a number, over [scaled unknowns; distance]."""
-    shared = unknowns.shared
-    scales = _joined([block.scale for block in shared])
-    if unknowns.correlations is not None:
-        means, whitened = unknowns.known_of(*(block.name for block in shared))
-        values = _joined([block.value for block in shared])
-        return np.column_stack([whitened * scales, whitened @ (values - means)])
-    pulls = [block.pull(block.value) for block in shared]
+    pulls = [block.pull(block.value) for block in unknowns.shared]
+    scales = _joined([block.scale for block in unknowns.shared])
     slopes = np.diag(_joined([pull[1] for pull in pulls]) * scales)
     return np.column_stack([slopes, _joined([pull[0] for pull in pulls])])
 

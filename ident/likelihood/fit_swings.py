@@ -8,7 +8,7 @@ rough start. Derivatives are exact throughout.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,10 +18,8 @@ from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.robot import Array
 from freeswing.cdpr.simulation.free_swing import Motion
 from freeswing.cdpr.simulation.nearby import obeys
-from freeswing.cdpr.system.progress import Progress
 from freeswing.ident.likelihood.between_runs import jackknife_std
 from freeswing.ident.likelihood.blocks import (
-    as_known,
     effect_values,
     free_of,
     model_unknowns,
@@ -36,6 +34,7 @@ from freeswing.ident.likelihood.run_residuals import Samples, differences, predi
 from freeswing.ident.likelihood.unknowns import Mask, Unknowns
 from freeswing.ident.signals.residual_colour import enlargement, low_band_factor
 
+Progress = Callable[[str, float], None]
 WHOLE = "maximum likelihood: whole runs"
 
 FIRST_STATES_S = 0.4  # short enough that no mode turns round: rough first states become good
@@ -197,16 +196,16 @@ class FreeSwing:
                 simulated, with the reason.
         """
         refuse_others(unknowns, swings.model, swings.loads)
+        free = free_of(unknowns, swings.model)
         state = replace(state_of(unknowns, swings.model, swings.scales), motions=swings.motions)
         if self.grow:
-            state = _grown(swings, state, unknowns, self)
+            state = _grown(swings, state, free, self)
         else:
             self.tell(WHOLE, 0.0)
-        problem = _problem(swings.model, swings.samples, unknowns, self, self.accuracy_m)
+        problem = _problem(swings.model, swings.samples, free, self, self.accuracy_m)
         state, step, taken, stop = minimised(problem, state, self.steps, self.tolerance)
         self.tell("maximum likelihood", 1.0)
-        found = _packed(problem, state, step, taken, stop)
-        return replace(found, unknowns=as_known(found.unknowns, swings.model, unknowns))
+        return _packed(problem, state, step, taken, stop)
 
     def tell(self, label: str, fraction: float) -> None:
         """How far the fit is, to whom it may concern."""
@@ -217,24 +216,24 @@ class FreeSwing:
 ONWARD = FreeSwing(grow=False, own_noise=False)  # from where another fit stands, its noise told
 
 
-def _grown(swings: Swings, state: State, unknowns: Unknowns, how: FreeSwing) -> State:
+def _grown(swings: Swings, state: State, free: Mask, how: FreeSwing) -> State:
     """Near enough to fit whole runs: fitted to growing stretches, lengths let down in stages."""
     model, samples = swings.model, swings.samples
     stages = stretches(samples)
-    total, held = len(stages) + 1, unknowns.all_held()
+    total, none = len(stages) + 1, np.zeros_like(free)
     for index, end_s in enumerate(stages):
         how.tell(f"maximum likelihood: first {end_s:.1f} s", index / total)
         parts = [run.until(run.span_s[0] + end_s).loosened(LOOSE_LENGTH_STD_M) for run in samples]
         if index == 0:
             for first_s in (FIRST_STATES_S, end_s):
                 short = [run.until(run.span_s[0] + first_s) for run in parts]
-                states_alone = _problem(model, short, held, replace(how, consistent=False))
+                states_alone = Problem(model, short, none, how.own_noise)
                 state = minimised(states_alone, state, STEPS, ROUGH_DECREASE)[0]
-        state = minimised(_problem(model, parts, unknowns, how), state, STEPS, ROUGH_DECREASE)[0]
+        state = minimised(_problem(model, parts, free, how), state, STEPS, ROUGH_DECREASE)[0]
     how.tell(WHOLE, (total - 1) / total)
     for std in (LOOSE_LENGTH_STD_M, TIGHTER_LENGTH_STD_M):
         if any(run.lengths_m is not None and run.lengths_std_m < std for run in samples):
-            problem = _problem(model, [run.loosened(std) for run in samples], unknowns, how)
+            problem = _problem(model, [run.loosened(std) for run in samples], free, how)
             state = minimised(problem, state, STEPS, ROUGH_DECREASE)[0]
     return state
 
@@ -242,12 +241,11 @@ def _grown(swings: Swings, state: State, unknowns: Unknowns, how: FreeSwing) -> 
 def _problem(
     model: Model,
     samples: Sequence[Samples],
-    unknowns: Unknowns,
+    free: Mask,
     how: FreeSwing,
     accuracy_m: float = TOLERANCE_M,
 ) -> Problem:
-    free, known = free_of(unknowns, model), unknowns.known_of(*model.effects)
-    return Problem(model, samples, free, how.own_noise, accuracy_m, how.consistent, known)
+    return Problem(model, samples, free, how.own_noise, accuracy_m, how.consistent)
 
 
 def stretches(samples: Sequence[Samples]) -> list[float]:

@@ -68,7 +68,7 @@ class State:
 
 
 @dataclass(frozen=True, slots=True)
-class FirstOrder:
+class Linear:
     """All runs to first order at a state.
 
     Attributes:
@@ -119,8 +119,6 @@ class Problem:
         estimate_scales: whether noise scales follow the residuals.
         tolerance_m: local error of the simulated motions.
         consistent: whether the inertia is held to what a body can have; all nine are then free.
-        known: means (k,) of the effects' values and what whitens distances from them, (k, k); None:
-            as the model knows them.
     """
 
     def __init__(
@@ -131,7 +129,6 @@ class Problem:
         estimate_scales: bool = True,
         tolerance_m: float = TOLERANCE_M,
         consistent: bool = False,
-        known: tuple[Array, Array] | None = None,
     ) -> None:
         parameters = model.parameters
         self.model = model
@@ -149,8 +146,8 @@ class Problem:
         self.consistent = consistent
         self.estimate_scales = estimate_scales
         self.tolerance_m = tolerance_m
-        self.prior_centre, whitened = known or (model.start_values, prior_whitener(model))
-        self.prior_whitener = whitened.copy()
+        self.prior_centre = model.start_values
+        self.prior_whitener = prior_whitener(model)
         self.prior_whitener[model.own_values] = 0.0
         self.unit = np.concatenate([INERTIA_UNIT, [p.scale for p in parameters], self.loads.unit])
         far = [3.0 * INERTIA_UNIT, [(p.high - p.low) / 3.0 for p in parameters], self.loads.unit]
@@ -232,7 +229,7 @@ class Problem:
         """Independent distances of unit deviation from what is known of the values, (k,)."""
         return self.prior_whitener @ (values - self.prior_centre)
 
-    def linear(self, state: State, before: Sequence[Surroundings] = ()) -> FirstOrder:
+    def linear(self, state: State, before: Sequence[Surroundings] = ()) -> Linear:
         """The motions of a state to first order.
 
         Args:
@@ -249,9 +246,9 @@ class Problem:
         runs = len(self.samples)
         found = side_by_side(one, state.motions, self.samples, before or [None] * runs)
         reduced, surroundings = zip(*found, strict=True)
-        return FirstOrder(reduced, surroundings)
+        return Linear(reduced, surroundings)
 
-    def step(self, state: State, linear: FirstOrder, damping: float) -> Step:
+    def step(self, state: State, linear: Linear, damping: float) -> Step:
         """A damped Gauss-Newton step from a state with its motions to first order."""
         reduced = linear.reduced
         maps = [self.shared_map(run, state) for run in range(len(reduced))]

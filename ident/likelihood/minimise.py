@@ -12,7 +12,7 @@ from functools import cached_property
 
 from freeswing.cdpr.descent import Stop, Undamped, Watchdog
 from freeswing.cdpr.simulation.nearby import Surroundings
-from freeswing.ident.likelihood.joint_problem import FirstOrder, Problem, State, Step
+from freeswing.ident.likelihood.joint_problem import Linear, Problem, State, Step
 
 FIRST_DAMPING = 1e-7  # of the largest curvature: below, a damped step is the full one
 LARGEST_DAMPING = 1e2  # a step so damped goes nowhere
@@ -66,7 +66,7 @@ class _Place:
         return self.problem.cost(self.state)
 
     @cached_property
-    def linear(self) -> FirstOrder:
+    def linear(self) -> Linear:
         return self.problem.linear(self.state, self.before)
 
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from freeswing.cdpr.robot import Array
-from freeswing.cdpr.system.progress import Progress
 from freeswing.ident.bench.diagnose.causes import Cause, dressed, wanting
 from freeswing.ident.bench.diagnose.weigh import Fit, chances
 from freeswing.ident.bench.noise import rescaled
@@ -154,7 +153,7 @@ def _cost(rows: Array, columns: Array) -> float:
 
 
 def searched(
-    ground: Ground, start: Fit, causes: Sequence[Cause], told: Progress
+    ground: Ground, start: Fit, causes: Sequence[Cause], told: Callable[[str, float], None]
 ) -> tuple[Fit, list[Round]]:
     """Causes one after the other, until none is accepted.
 
@@ -175,7 +174,9 @@ def searched(
     return current, rounds
 
 
-def _round(ground: Ground, current: Fit, causes: Sequence[Cause], told: Progress) -> Round:
+def _round(
+    ground: Ground, current: Fit, causes: Sequence[Cause], told: Callable[[str, float], None]
+) -> Round:
     if not causes:
         return Round((), None)
     gains = promised(ground, current, causes)
