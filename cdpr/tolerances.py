@@ -8,7 +8,7 @@ creep by a micrometre a second. Whatever is farther off was measured, drawn or m
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 
@@ -30,6 +30,7 @@ class Tolerances:
         creep_m_s: of a cable on a locked winch.
         stretch_s2_m: mass of the platform over EA: steel of 1 mm under 8 kg has 1e-4.
         gross: how many times a tolerance something is off that was measured or mounted wrongly.
+        declared: names of those that robot.toml itself states, though they be the usual ones.
     """
 
     entry_m: float = 1e-3
@@ -43,17 +44,21 @@ class Tolerances:
     creep_m_s: float = 1e-6
     stretch_s2_m: float = 1e-4
     gross: float = 12.0
+    declared: tuple[str, ...] = field(default=(), compare=False)
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
+        for name, value in self.numbers().items():
             if not (np.isfinite(value) and value > 0.0):
+                usual = type(self).__dataclass_fields__[name].default
                 raise ValueError(
-                    f"tolerances: {field.name} is {value}, must be above 0; leave it out for "
-                    f"{field.default:g}"
+                    f"tolerances: {name} is {value}, must be above 0; leave it out for {usual:g}"
                 )
         if not self.gross > 1.0:
             raise ValueError(
                 f"tolerances: gross is {self.gross:g}, must be above 1: an error is larger than "
                 "a tolerance"
             )
+
+    def numbers(self) -> dict[str, float]:
+        """All of them by name."""
+        return {one.name: getattr(self, one.name) for one in fields(self) if one.name != "declared"}

@@ -107,6 +107,7 @@ def fidim_entry(
     notes: tuple[str, ...],
     weighted: WeightedSolution | None = None,
     shares: Sequence[Share] = (),
+    scatter: Array | None = None,
 ) -> Estimate:
     """An estimate from FIDIM's result.
 
@@ -116,6 +117,7 @@ def fidim_entry(
         notes: beside those of `found`.
         weighted: the covariance-weighted form, to be taken in its place.
         shares: what errors beside the scatter add to the covariance.
+        scatter: covariance by the equations' scatter, (9, 9); None for that of the solution.
     """
     solution = found.solution
     values, covariance = solution.values, solution.covariance
@@ -124,15 +126,17 @@ def fidim_entry(
         values, covariance = weighted.values, weighted.covariance
         extra["weighting"] = "covariance"
         extra["noise_ratio"] = weighted.noise_ratio
+    raised = np.ones(9)
+    if scatter is not None:
+        raised, covariance = np.sqrt(np.diag(scatter) / np.diag(covariance)), scatter
+        extra["scatter_std"] = np.sqrt(np.diag(scatter)).tolist()
     names = [name for name, kept in zip(INERTIA_NAMES, found.essential, strict=True) if kept]
     reduced = found.reduced
-    reduced_std = reduced.std
+    reduced_std = reduced.std * raised[found.essential]
     for share in shares:
         covariance = covariance + share.covariance
         reduced_std = np.sqrt(reduced_std**2 + np.diag(share.reduced))
         extra.update(share.document())
-    if shares and weighted is None:
-        extra["published_std"] = solution.std.tolist()
     return Estimate(
         values=values,
         covariance=covariance,

@@ -12,7 +12,7 @@ from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.model.equations import Model, build_model
 from freeswing.cdpr.robot import Robot
 from freeswing.ident.estimate import Estimate
-from freeswing.ident.fidim.fidim_stage import Weighting, fidim_estimates
+from freeswing.ident.fidim.fidim_stage import How, Weighting, fidim_estimates
 from freeswing.ident.inertia_starts import likelihood_starts
 from freeswing.ident.judge.far_samples import far_from_prediction
 from freeswing.ident.judge.free_against_full import ParameterComparison, between_runs, compare
@@ -52,7 +52,7 @@ class IdentifySettings:
         maximum_likelihood: whether the free motions themselves are fitted too.
         predict: whether validation runs are simulated.
         consistent: whether inertias are held to what a body can have.
-        geometry: how well the cables' ends are known, for maximum likelihood.
+        geometry: how well the cables' ends are known; as robot.toml states where it says nothing.
     """
 
     signals: SignalSettings = field(default_factory=SignalSettings)
@@ -137,6 +137,10 @@ def identify(
         raise DataError(
             'no run with role = "identify" and without payload: there is nothing to identify from'
         )
+    try:
+        settings = replace(settings, geometry=settings.geometry.or_declared(robot))
+    except ValueError as error:
+        raise DataError(f"[tolerances] of the robot file, taken for {error}") from error
     model = build_model(robot)
     try:
         prepared = prepare_runs(runs, model, settings.signals, progress)
@@ -205,7 +209,8 @@ def _estimated(
         The runs that serve, FIDIM's estimates, maximum likelihood's, why others are absent, and
         whether it is because no run follows any law.
     """
-    how = settings.weighting, progress, settings.consistent, settings.signals
+    ends = settings.geometry.model(robot) if settings.geometry.stds else None
+    how = How(settings.weighting, settings.signals, ends), progress, settings.consistent
     taut, by_fidim, failures = fidim_estimates(model, prepared, *how)
     if not settings.maximum_likelihood:
         return taut, by_fidim, {}, failures, False

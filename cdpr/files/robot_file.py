@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -92,12 +91,12 @@ def _read_tolerances(reader: Reader | None) -> Tolerances:
     if reader is None:
         return Tolerances()
     given = {
-        one.name: reader.optional_number(one.name, above=1.0 if one.name == "gross" else 0.0)
-        for one in fields(Tolerances)
+        name: reader.optional_number(name, above=1.0 if name == "gross" else 0.0)
+        for name in Tolerances().numbers()
     }
     reader.finish()
     known = {name: value for name, value in given.items() if value is not None}
-    return Tolerances() if reader.problems else Tolerances(**known)
+    return Tolerances() if reader.problems else Tolerances(**known, declared=tuple(known))
 
 
 def _columns(points: list[Points]) -> tuple[tuple[Point, ...], tuple[Point, ...]]:
@@ -144,10 +143,13 @@ def write_robot(path: Path | str, robot: Robot) -> None:
 
 
 def _own_tolerances(known: Tolerances) -> dict[str, float]:
-    """Those that differ from the usual ones."""
-    usual = Tolerances()
-    pairs = {one.name: getattr(known, one.name) for one in fields(Tolerances)}
-    return {name: value for name, value in pairs.items() if value != getattr(usual, name)}
+    """Those that are stated or differ from the usual ones."""
+    usual = Tolerances().numbers()
+    return {
+        name: value
+        for name, value in known.numbers().items()
+        if name in known.declared or value != usual[name]
+    }
 
 
 CableValues = tuple[str, Array, float, Array, Array, Array, Array]

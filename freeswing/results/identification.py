@@ -60,6 +60,8 @@ class Estimate(Entry):
         noise_ratio: of FIDIM's weighted form.
         calibration_std: the cameras' calibration's share of the deviations (FIDIM).
         published_std: deviations as published (FIDIM): the samples' scatter alone.
+        scatter_std: the same, as stretches of the runs say it where that is more (FIDIM).
+        tolerances_std: the share of cable ends known to a stated tolerance (FIDIM).
         lengths_std: the stated cable lengths' share of the deviations (FIDIM).
         noise_bias: foreseen because noise reaches the columns unevenly (FIDIM).
         smoothing_bias: foreseen because smoothing takes some of the swing (FIDIM).
@@ -82,6 +84,8 @@ class Estimate(Entry):
     noise_ratio: float | None = absent(default=None)
     calibration_std: Numbers | None = absent(default=None)
     published_std: Numbers | None = absent(default=None)
+    scatter_std: Numbers | None = absent(default=None)
+    tolerances_std: Numbers | None = absent(default=None)
     lengths_std: Numbers | None = absent(default=None)
     noise_bias: Numbers | None = absent(default=None)
     smoothing_bias: Numbers | None = absent(default=None)

@@ -41,7 +41,7 @@ from freeswing.ident.diagnose.refit import Refit
 from freeswing.ident.diagnose.search import Round, Search
 from freeswing.ident.diagnose.unexplained import Unexplained, unexplained
 from freeswing.ident.diagnose.variants import effect_of
-from freeswing.ident.fidim.fidim_stage import fidim_estimates
+from freeswing.ident.fidim.fidim_stage import How, fidim_estimates
 from freeswing.ident.identify import session_notes
 from freeswing.ident.inertia_starts import likelihood_starts
 from freeswing.ident.judge.prediction import Stage
@@ -157,7 +157,7 @@ def diagnose(
         prepared = prepare_runs(runs, model, SignalSettings(), first_part)
     except ValueError as error:
         raise DataError(str(error)) from error
-    taut, by_fidim, _ = fidim_estimates(model, prepared, "published", first_part)
+    taut, by_fidim, _ = fidim_estimates(model, prepared, How(), first_part)
     # Where most cables seem slack, the declared robot is at fault, not the runs.
     prepared = taut if 2 * len(taut.runs) > len(prepared.runs) else prepared
     full = all(set(run.signals.coordinates) == set(POSE_COORDINATES) for run in prepared.runs)

@@ -19,63 +19,68 @@ from freeswing.cdpr.model.regressor import SwingMotion, regressor
 from freeswing.cdpr.robot import Array
 from freeswing.cdpr.simulation.free_swing import simulate
 from freeswing.ident.fidim.shares import Share, Stack
+from freeswing.ident.fidim.total_least_squares import least_by_noise
 from freeswing.ident.fidim.weighted_least_squares import NoisyRegressor
 from freeswing.ident.signals.derivatives import SignalSettings, signals_of
 from freeswing.ident.signals.motions import free_motion, full_motion
 from freeswing.ident.signals.prepare import PreparedRun, motion_of, signals_used
 
+# A share that moves by less than half a scatter changes the deviation by a tenth.
+SETTLED = 0.5
+_ROUNDS = 4  # each asks one more swing of every run
+
 
 def noise_bias(noisy: Sequence[NoisyRegressor], stack: Stack) -> Share:
-    """The share of the noise's own squares in the normal equations, to first order.
+    """The share of the noise's own squares in the normal equations.
 
     Its shape is what the samples' covariances and the smoother make of it, its size what the
-    solution leaves of the equations.
+    solution leaves of the equations: how far the solution lies from the one that takes columns
+    for as noisy as they are.
 
     Args:
         noisy: the runs' regressors with their answers to the signals.
         stack: the same, and their solution.
 
+    Raises:
+        ValueError: when rank is lost.
+
     Source:
         Van Huffel, Vandewalle 1991, The Total Least Squares Problem, sec. 8.4: errors of unequal
-        covariance; Stewart, Sun 1990, Matrix Perturbation Theory, sec. V.2.
+        covariance.
     """
-    normal, noise = np.zeros((10, 10)), np.zeros((10, 10))
+    noise = np.zeros((10, 10))
     for run in noisy:
-        rows = run.W.reshape(-1, 10)
-        normal += rows.T @ rows
         spread = np.einsum("njk,nkec->njec", run.covariances, run.answers, optimize=True)
         noise += np.einsum("njec,njed->cd", run.answers, spread, optimize=True)
-    kept = np.flatnonzero(stack.kept)
-    alone = np.ix_(kept, kept)
-    moved = [
-        _pulled(normal, noise, stack.values[:9]),
-        _pulled(normal[alone], noise[alone], stack.values[9:]),
-    ]
+    moved = np.zeros(len(stack.values))
+    if noise.any():  # samples that state no noise have no share
+        rows = np.concatenate(stack.factors)
+        whole, _ = least_by_noise(rows, noise)
+        reduced, _ = least_by_noise(rows[:, stack.kept], noise[np.ix_(stack.kept, stack.kept)])
+        moved = stack.values - np.concatenate([whole, reduced])
     return Share(
         'noise that the regressor\'s columns do not share alike (weighting = "covariance" takes '
         "it off)",
         "noise_bias",
-        np.concatenate(moved)[None],
+        moved[None],
         is_bias=True,
     )
 
 
-def _pulled(normal: Array, noise: Array, values: Array) -> Array:
-    """Values (p,) less those without the noise, whose normal equations' share is `noise`."""
-    chi = np.append(1.0, values)
-    left, size = chi @ normal @ chi, chi @ noise @ chi
-    if not size > 0.0:  # samples that state no noise
-        return np.zeros(len(values))
-    even = left / (chi @ chi) * np.eye(len(chi))
-    # Rank is whole, or there were no values: what total least squares leaves is positive definite.
-    score = (normal - left / size * noise) @ chi
-    return np.linalg.solve((normal - even)[1:, 1:], score[1:])
-
-
 def smoothing_bias(
-    model: Model, runs: Sequence[PreparedRun], full: bool, settings: SignalSettings, stack: Stack
+    model: Model,
+    runs: Sequence[PreparedRun],
+    full: bool,
+    settings: SignalSettings,
+    stack: Stack,
+    scatter: Array,
+    noise: Array | None = None,
 ) -> Share:
-    """The share of smoothing: the estimate's own swings, without noise, smoothed and solved alike.
+    """The share of smoothing: swings without noise, smoothed and solved alike.
+
+    The swings are those of the estimate less what noise moves it by. Where smoothing's share is
+    larger than the scatter they are not quite the platform's: those of the estimate less that share
+    too are nearer, and are asked in turn.
 
     Args:
         model: the robot.
@@ -83,28 +88,80 @@ def smoothing_bias(
         full: by full poses, or by free coordinates alone.
         settings: how samples became signals.
         stack: the runs' regressors.
+        scatter: standard deviations of the nine values without it, (9,).
+        noise: what noise moves the nine values by, (9,); None where it is taken off.
 
     Raises:
         ValueError: when the estimate has no free swing that begins as a run does, with the reason.
 
     Source:
         Efron, Tibshirani 1993, An Introduction to the Bootstrap, sec. 10.2: the bias of the
-        parametric bootstrap, here of its noise-free draw.
+        parametric bootstrap, here of its noise-free draw; Gourieroux, Monfort, Renault 1993,
+        Indirect Inference, sec. 2: the values whose draws give the estimate.
     """
-    followed, why = [], ""
-    for run in runs:
+    estimate = stack.values[:9] - (0.0 if noise is None else noise)
+    inertia = estimate
+    change = _smoothed_away(model, runs, full, settings, stack, inertia)
+    before = None
+    for _ in range(_ROUNDS):
+        size = change[:9] if before is None else change[:9] - before[1][:9]
+        if np.abs(size / scatter).max() < SETTLED:
+            break
+        following = _nearer(estimate, inertia, change[:9], before, scatter)
+        before = inertia, change
         try:
-            followed.append(_own_swing(model, run, full, settings, stack.values[:9]))
+            change = _smoothed_away(model, runs, full, settings, stack, following)
+        except ValueError:  # no body any more: what was found before is told
+            break
+        inertia = following
+    return Share("smoothing", "smoothing_bias", change[None], is_bias=True)
+
+
+def _nearer(
+    estimate: Array,
+    inertia: Array,
+    change: Array,
+    before: tuple[Array, Array] | None,
+    scatter: Array,
+) -> Array:
+    """An inertia of which the estimate is nearer to what smoothing leaves, (9,).
+
+    Source:
+        Anderson 1965, Iterative Procedures for Nonlinear Integral Equations, sec. 4, of depth 1.
+    """
+    step = estimate - change - inertia
+    if before is None:
+        return inertia + step
+    last = estimate - before[1][:9] - before[0]
+    turn = (step - last) / scatter
+    share = float((step / scatter) @ turn / max(float(turn @ turn), 1e-300))
+    return inertia + step - share * (inertia + step - before[0] - last)
+
+
+def _smoothed_away(
+    model: Model,
+    runs: Sequence[PreparedRun],
+    full: bool,
+    settings: SignalSettings,
+    stack: Stack,
+    inertia: Array,
+) -> Array:
+    """What smoothing changes an inertia by, all nine and the essential ones, (9 + e,)."""
+    followed, why = {}, ""
+    for k, run in enumerate(runs):
+        try:
+            motion = _own_swing(model, run, full, settings, inertia)
         except (ValueError, np.linalg.LinAlgError) as error:
             why = str(error)
+        else:
+            followed[k] = regressor(model, motion)
     try:
-        change = stack.alone([regressor(model, motion) for motion in followed])
+        return stack.alone(followed) - stack.values - stack.apart(inertia)
     except ValueError as error:
         raise ValueError(
             f"no free swings of its inertia begin as the runs do ({why or error}): it is none of "
             "this platform; record larger swings, or more of them"
         ) from error
-    return Share("smoothing", "smoothing_bias", change[None], is_bias=True)
 
 
 def _own_swing(

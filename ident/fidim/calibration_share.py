@@ -40,11 +40,11 @@ def calibration_share(
         return None
     shifts = [_shifts(run, full, max(counts)) for run in runs]
     changes = [
-        stack.alone(
-            [
-                regressor(model, _moved(model, run, full, own[:, :, mode]))
-                for run, own in zip(runs, shifts, strict=True)
-            ]
+        stack.change(
+            {
+                k: regressor(model, _moved(model, run, full, own[:, :, mode]))
+                for k, (run, own) in enumerate(zip(runs, shifts, strict=True))
+            }
         )
         for mode in range(max(counts))
     ]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -13,14 +13,17 @@ from freeswing.cdpr.robot import Array
 from freeswing.ident.estimate import Estimate, fidim_entry
 from freeswing.ident.fidim.bias import noise_bias, smoothing_bias
 from freeswing.ident.fidim.calibration_share import calibration_share
+from freeswing.ident.fidim.ends_share import ends_share
 from freeswing.ident.fidim.fidim import FidimEstimate, fidim
 from freeswing.ident.fidim.length_share import length_share
 from freeswing.ident.fidim.payload_mass import LoadedCentre, MassEstimate, mass_from_payloads
+from freeswing.ident.fidim.scatter import scattered
 from freeswing.ident.fidim.shares import Share, Stack, shares_sentence
 from freeswing.ident.fidim.slack_runs import slack_runs, within_reach
 from freeswing.ident.fidim.weighted_least_squares import (
     NoisyRegressor,
     noisy_regressor,
+    weighing,
     weighted_fidim,
 )
 from freeswing.ident.judge.consistency import nearest_possible
@@ -42,19 +45,33 @@ from freeswing.ident.signals.prepare import (
 Weighting = Literal["published", "covariance"]
 
 
+@dataclass(frozen=True, slots=True)
+class How:
+    """How FIDIM is done and what its deviations hold beside the equations' scatter.
+
+    Attributes:
+        weighting: `published`, or `covariance`.
+        settings: what made the signals; None: deviations hold the scatter and the calibration
+            alone, which is enough where values to start from are wanted.
+        ends: the robot with cable ends of known spread
+            (`ident.likelihood.cable_ends.GeometryPriors.model`); None where they are exact.
+    """
+
+    weighting: Weighting = "published"
+    settings: SignalSettings | None = None
+    ends: Model | None = None
+
+
 def fidim_estimates(
     model: Model,
     prepared: PreparedRuns,
-    weighting: Weighting,
+    how: How,
     progress: Progress | None,
     consistent: bool = False,
-    settings: SignalSettings | None = None,
 ) -> tuple[PreparedRuns, dict[str, Estimate], dict[str, str]]:
     """FIDIM by full poses and by free coordinates; slack runs found with its result leave.
 
     With `consistent` an inertia that no body can have is replaced by the nearest possible one.
-    `settings` made the signals; without them deviations hold the scatter and the calibration
-    alone, which is enough where values to start from are wanted.
 
     Returns:
         The runs without the slack ones, `fidim_full` and `fidim_free` as far as they exist, and
@@ -78,8 +95,7 @@ def fidim_estimates(
                 prepared = without(prepared, slack)
                 equations = _equations(model, usable(prepared, full, None), full)
                 raw = fidim(equations)
-            stack = Stack(equations, raw.essential)
-            entry = _completed(model, prepared, raw, stack, full, weighting, settings)
+            entry = _completed(model, prepared, raw, Stack(equations, raw.essential), full, how)
             found[name] = _consistent(entry, consistent)
         except (ValueError, np.linalg.LinAlgError) as error:
             failures[name] = str(error)
@@ -95,29 +111,47 @@ def _completed(
     raw: FidimEstimate,
     stack: Stack,
     full: bool,
-    weighting: Weighting,
-    settings: SignalSettings | None,
+    how: How,
 ) -> Estimate:
     """The entry of one FIDIM solution: weighting, what moves it beside the scatter, mass."""
+    entry = _with_deviations(model, usable(prepared, full, None), raw, stack, full, how)
+    mass, why = _mass(model, prepared, entry, full, how)
+    return replace(entry, mass=mass, notes=(*entry.notes, *why), dropped=left_out(prepared, full))
+
+
+def _with_deviations(
+    model: Model,
+    runs: list[PreparedRun],
+    raw: FidimEstimate,
+    stack: Stack,
+    full: bool,
+    how: How,
+) -> Estimate:
+    """The entry of a solution of these runs with all that moves it, weighted where asked for."""
     notes: list[str] = []
-    unloaded, weighted = usable(prepared, full, None), None
-    noisy = _noisy(model, unloaded, full) if weighting == "covariance" or settings else []
-    if weighting == "covariance":
+    weighted = None
+    noisy = _noisy(model, runs, full) if how.weighting == "covariance" or how.settings else []
+    if how.weighting == "covariance":
         try:
             weighted = weighted_fidim(noisy, raw.values)
+            stack = Stack([run.W for run in noisy], raw.essential, weighing(noisy, weighted.values))
         except (ValueError, np.linalg.LinAlgError) as error:
             notes.append(f"as published: the weighted form cannot be had ({error})")
+    own = raw.solution.covariance if weighted is None else weighted.covariance
+    scatter = scattered(own, stack, [motion_of(run, full).times_s for run in runs])
+    std = np.sqrt(np.diag(scatter))
     uneven = noisy if weighted is None else []
-    shares = _shares(model, unloaded, stack, full, settings, uneven)
-    scatter = raw.solution.covariance if weighted is None else weighted.covariance
-    if said := shares_sentence(shares, np.sqrt(np.diag(scatter))):
+    shares = _shares(model, runs, stack, full, how, uneven, std)
+    if said := shares_sentence(shares, std):
         notes.append(said)
-    entry = fidim_entry(raw, left_out(prepared, full), tuple(notes), weighted, shares)
-    entry = entry if weighted is not None else _as_runs_say(entry, raw)
-    mass, why = _mass(model, prepared, entry, full, settings)
-    names = [run.name for run in unloaded]
-    without_run = dict(zip(names, raw.without_run, strict=True)) if weighted is None else {}
-    return replace(entry, mass=mass, notes=(*entry.notes, *why), without_run=without_run)
+    entry = fidim_entry(raw, (), tuple(notes), weighted, shares, scatter)
+    without = raw.without_run if weighted is None else stack.without_each(stack.rows)
+    entry = _as_runs_say(entry, own, without)
+    if weighted is None:
+        extra = {**entry.extra, "published_std": raw.std.tolist()}
+        entry = replace(entry, extra=extra)
+    names = [run.name for run in runs]
+    return replace(entry, without_run=dict(zip(names, without, strict=True)))
 
 
 def _equations(model: Model, runs: list[PreparedRun], full: bool) -> list[Array]:
@@ -133,28 +167,37 @@ def _shares(
     runs: list[PreparedRun],
     stack: Stack,
     full: bool,
-    settings: SignalSettings | None,
+    how: How,
     noisy: list[NoisyRegressor],
+    scatter: Array,
 ) -> list[Share]:
     """What moves a solution beside its equations' scatter; `noisy` where columns count alike."""
     found = [calibration_share(model, runs, full, stack)]
-    if settings is not None:
+    if how.ends is not None:
+        found.append(ends_share(how.ends, runs, full, stack))
+    if how.settings is not None:
         found.append(None if full else length_share(model, runs, stack))
-        found.append(noise_bias(noisy, stack) if noisy else None)
-        found.append(smoothing_bias(model, runs, full, settings, stack))
+        uneven = noise_bias(noisy, stack) if noisy else None
+        noise = None if uneven is None else uneven.changes[0, :9]
+        smoothing = smoothing_bias(model, runs, full, how.settings, stack, scatter, noise)
+        found += [uneven, smoothing]
     return [share for share in found if share is not None]
 
 
-def _as_runs_say(entry: Estimate, raw: FidimEstimate) -> Estimate:
+def _as_runs_say(entry: Estimate, scatter: Array, without: Array) -> Estimate:
     """The entry with deviations of what runs say apart, where chance does not make them so large.
 
     Total least squares takes what is left for noise. Where a model's errors make it, they repeat
     with the swings, and its deviations (FIDIM 2022, eq. 33) are too small by several times. What
     the entry's own deviations hold beside the scatter may explain it, and is not counted again.
+
+    Args:
+        entry: of a solution.
+        scatter: its covariance by its equations' scatter, (9, 9).
+        without: the solution without each run, (r, 9).
     """
-    between = between_runs(raw.without_run)
-    scatter = widened(raw.solution.covariance, between, len(raw.without_run))
-    factors = np.maximum(1.0, np.sqrt(np.diag(scatter) / np.diag(entry.covariance)))
+    between = widened(scatter, between_runs(without), len(without))
+    factors = np.maximum(1.0, np.sqrt(np.diag(between) / np.diag(entry.covariance)))
     wider = float(factors.max())
     if not wider > 1.0:
         return entry
@@ -163,8 +206,7 @@ def _as_runs_say(entry: Estimate, raw: FidimEstimate) -> Estimate:
         f"runs say apart up to {wider:.1f} times what the samples' scatter lets expect (FIDIM "
         "2022, eq. 33): standard deviations are those of leaving out one run at a time"
     )
-    extra = {**entry.extra, "published_std": raw.std.tolist()}
-    return replace(entry, covariance=covariance, notes=(*entry.notes, note), extra=extra)
+    return replace(entry, covariance=covariance, notes=(*entry.notes, note))
 
 
 def _consistent(entry: Estimate, enforced: bool) -> Estimate:
@@ -183,7 +225,7 @@ def _mass(
     prepared: PreparedRuns,
     unloaded: Estimate,
     full: bool,
-    settings: SignalSettings | None,
+    how: How,
 ) -> tuple[MassEstimate | None, list[str]]:
     """Mass from payload runs, each payload identified by itself (eqs. 23, 24), and why not."""
     payloads = {
@@ -193,18 +235,17 @@ def _mass(
     }
     loaded: list[LoadedCentre] = []
     notes: list[str] = []
+    alike = replace(how, weighting="published")
     for payload in payloads.values():
         runs = usable(prepared, full, payload)
         try:
             equations = _equations(model, runs, full)
             one = fidim(equations)
-            noisy = _noisy(model, runs, full) if settings else []
             stack = Stack(equations, one.essential)
-            shares = _shares(model, runs, stack, full, settings, noisy)
+            entry = _with_deviations(model, runs, one, stack, full, alike)
         except (ValueError, np.linalg.LinAlgError) as error:
             notes.append(f"payload of {payload.mass_kg:g} kg not used: {error}")
             continue
-        entry = _as_runs_say(fidim_entry(one, (), (), None, shares), one)
         loaded.append(LoadedCentre(payload, one.values[:3], entry.covariance[:3, :3]))
     if not loaded:
         return None, notes

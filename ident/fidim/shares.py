@@ -8,6 +8,7 @@ each kind is carried through to the solution here, and adds its squares to the c
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 
 from freeswing.cdpr.frozen import freeze
 from freeswing.cdpr.robot import INERTIA_NAMES, Array
-from freeswing.ident.fidim.total_least_squares import values_alone
+from freeswing.ident.fidim.total_least_squares import least_by_noise, values_alone
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,35 +56,87 @@ class Share:
         return {self.key: sizes.tolist()}
 
 
+@dataclass(frozen=True, slots=True)
+class Weighing:
+    """How the covariance-weighted form counts equations.
+
+    Attributes:
+        roots: of each sample's weights, a run each: weights = root^T root, (n, e, e).
+        noise: expectation of the weighted regressors' noise, squared and summed, (10, 10).
+    """
+
+    roots: tuple[Array, ...]
+    noise: Array
+
+
 class Stack:
     """Runs' regressors one below the other, each of which can be exchanged and all solved again.
 
     Args:
         regressors: a run each, (n, 6 - n_cables, 10).
         essential: which parameters the reduced problem keeps, (9,).
+        weighing: of the covariance-weighted form, held as it is; None for the published one.
     """
 
-    def __init__(self, regressors: Sequence[Array], essential: NDArray[np.bool_]) -> None:
-        self.factors = [_factor(one) for one in regressors]
+    def __init__(
+        self,
+        regressors: Sequence[Array],
+        essential: NDArray[np.bool_],
+        weighing: Weighing | None = None,
+    ) -> None:
+        self.weighing = weighing
+        self.rows = [self._weighed(k, one) for k, one in enumerate(regressors)]
+        self.factors = [_factor(one) for one in self.rows]
         self.kept = np.append(True, essential)
         self.values = self._solved(self.factors)
 
     def change(self, instead: dict[int, Array]) -> Array:
         """What other regressors of some runs, by place, change the solution by, (9 + e,)."""
-        others = dict(enumerate(self.factors)) | {k: _factor(W) for k, W in instead.items()}
-        return self._solved(list(others.values())) - self.values
+        moved = {k: _factor(self._weighed(k, W)) for k, W in instead.items()}
+        return self._solved(list((dict(enumerate(self.factors)) | moved).values())) - self.values
 
-    def alone(self, regressors: Sequence[Array]) -> Array:
-        """How far from its solution that of other runs lies, (9 + e,)."""
-        return self._solved([_factor(one) for one in regressors]) - self.values
+    def alone(self, regressors: dict[int, Array]) -> Array:
+        """What regressors of some of the runs, by place, give by themselves, (9 + e,)."""
+        return self._solved([_factor(self._weighed(k, W)) for k, W in regressors.items()])
+
+    def without_each(self, parts: Sequence[Array]) -> Array:
+        """The solution without each part of the rows, (p, 9); NaN where the others do not do."""
+        factors = [_factor(part) for part in parts]
+        found = np.full((len(parts), 9), np.nan)
+        for k in range(len(parts)):
+            # What rank is lost without has the weight of all others together: no number for it.
+            with suppress(ValueError, np.linalg.LinAlgError):
+                found[k] = self._values(np.concatenate(factors[:k] + factors[k + 1 :]))
+        return found
+
+    def apart(self, inertia: Array) -> Array:
+        """An inertia, (9,), less the solution: all nine, and the essential ones, (9 + e,)."""
+        off = inertia - self.values[:9]
+        return np.concatenate([off, off[self.kept[1:]]])
+
+    def _weighed(self, k: int, W: Array) -> Array:
+        """Rows of a run's regressor as they count, (n e, 10)."""
+        if self.weighing is None:
+            return W.reshape(-1, W.shape[-1])
+        roots = self.weighing.roots[k]
+        # A swing of the same run may lack a sample at its ends.
+        near = np.round(np.linspace(0, len(roots) - 1, len(W))).astype(int)
+        return (roots[near] @ W).reshape(-1, W.shape[-1])
 
     def _solved(self, factors: list[Array]) -> Array:
         rows = np.concatenate(factors)
-        return np.concatenate([values_alone(rows), values_alone(rows[:, self.kept])])
+        return np.concatenate([self._values(rows), self._values(rows, self.kept)])
+
+    def _values(self, rows: Array, kept: NDArray[np.bool_] | None = None) -> Array:
+        chosen = np.ones(10, dtype=bool) if kept is None else kept
+        if self.weighing is None:
+            return values_alone(rows[:, chosen])
+        return least_by_noise(rows[:, chosen], self.weighing.noise[np.ix_(chosen, chosen)])[0]
 
 
-def _factor(W: Array) -> Array:
-    return np.asarray(np.linalg.qr(W.reshape(-1, W.shape[-1]), mode="r"))
+def _factor(rows: Array) -> Array:
+    """Triangular factor of rows, (min(n, 10), 10)."""
+    return np.asarray(np.linalg.qr(rows, mode="r"))
 
 
 def shares_sentence(shares: Sequence[Share], scatter: Array) -> str:

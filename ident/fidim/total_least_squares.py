@@ -106,6 +106,36 @@ def values_alone(W: Array) -> Array:
     return _decomposed(W)[0]
 
 
+def least_by_noise(rows: Array, noise: Array) -> tuple[Array, float]:
+    """The values of which the squares are fewest times those that noise makes, and how many times.
+
+    Args:
+        rows: W, or runs' triangular factors one below the other, (m, p + 1) with m > p.
+        noise: what W^T W owes to noise, to a common factor, (p + 1, p + 1).
+
+    Returns:
+        The values, (p,), and the factor.
+
+    Raises:
+        ValueError: when rank is lost.
+
+    Source:
+        Van Huffel, Vandewalle 1991, The Total Least Squares Problem, sec. 8.4: errors of unequal
+        covariance; the generalised eigenproblem.
+    """
+    factor = np.linalg.qr(rows, mode="r")
+    scale = 1.0 / np.maximum(np.linalg.norm(factor, axis=0), 1e-300)
+    try:
+        inverse = np.linalg.inv(factor * scale)
+    except np.linalg.LinAlgError as error:
+        raise ValueError("the equations lose rank") from error
+    sizes, vectors = np.linalg.eigh(inverse.T @ (noise * scale[:, None] * scale) @ inverse)
+    chi = scale * (inverse @ vectors[:, -1])
+    if not sizes[-1] > 0.0 or abs(chi[0]) < 1e-12 * np.abs(chi).max():
+        raise ValueError("the noise explains nothing of the equations: rank is lost")
+    return chi[1:] / chi[0], float(1.0 / sizes[-1])
+
+
 def _decomposed(W: Array) -> tuple[Array, Array, Array]:
     """Values (p,), singular values and right vectors of W, by its triangular factor."""
     _, sizes, right = np.linalg.svd(np.linalg.qr(W, mode="r"))

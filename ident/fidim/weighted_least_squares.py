@@ -19,12 +19,13 @@ from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.model.free_motion import coordinate_indices, free_basis
 from freeswing.cdpr.model.regressor import SwingMotion, regressor
 from freeswing.cdpr.robot import Array, frozen_array
+from freeswing.ident.fidim.scatter import CORRELATED_S
+from freeswing.ident.fidim.shares import Weighing
+from freeswing.ident.fidim.total_least_squares import least_by_noise
 from freeswing.ident.signals.derivatives import Signals
 from freeswing.ident.signals.motions import free_motion
 
 _SWEEPS = 12
-# About the period of a swing: errors of the model come back with it.
-_CORRELATED_S = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,13 +130,8 @@ def weighted_fidim(runs: list[NoisyRegressor], start: Array) -> WeightedSolution
     size = 1.0
     for _ in range(_SWEEPS):
         signal, noise = _sums(runs, chi)
-        # Smallest lambda of signal chi = lambda noise chi; signal is the better conditioned one.
-        root = np.linalg.inv(np.linalg.cholesky(signal))
-        sizes, vectors = np.linalg.eigh(root @ noise @ root.T)
-        found = root.T @ vectors[:, -1]
-        if sizes[-1] <= 0.0 or abs(found[0]) < 1e-12 * np.abs(found).max():
-            raise ValueError("the weighted problem loses rank: the noise explains nothing of it")
-        before, chi, size = chi, found / found[0], 1.0 / sizes[-1]
+        values, size = least_by_noise(np.linalg.cholesky(signal).T, noise)
+        before, chi = chi, np.append(1.0, values)
         if np.abs(chi - before).max() < 1e-10 * np.abs(chi).max():
             break
     signal, noise = _sums(runs, chi)
@@ -147,6 +143,18 @@ def weighted_fidim(runs: list[NoisyRegressor], start: Array) -> WeightedSolution
         covariance=frozen_array(0.5 * (covariance + covariance.T), (9, 9), "covariance"),
         noise_ratio=float(np.sqrt(size)),
     )
+
+
+def weighing(runs: list[NoisyRegressor], values: Array) -> Weighing:
+    """How a solution's equations count, for others of the same runs.
+
+    Args:
+        runs: noisy regressors.
+        values: the nine parameters that the weights belong to, (9,).
+    """
+    chi = np.append(1.0, values)
+    roots = (np.swapaxes(np.linalg.cholesky(_weights(run, chi)), 1, 2) for run in runs)
+    return Weighing(tuple(roots), _sums(runs, chi)[1])
 
 
 def _weights(run: NoisyRegressor, chi: Array) -> Array:
@@ -178,7 +186,7 @@ def _score_spread(runs: list[NoisyRegressor], chi: Array, bias: Array) -> Array:
         scores = np.einsum("nea,nef,nf->na", run.W, weights, run.W @ chi, optimize=True)
         scores = (scores / n_equations - (bias @ chi) * run.W.shape[1] / n_equations)[:, 1:]
         total += scores.T @ scores
-        lags = min(len(scores) - 1, round(_CORRELATED_S / run.period_s))
+        lags = min(len(scores) - 1, round(CORRELATED_S / run.period_s))
         for lag in range(1, lags + 1):
             pair = scores[lag:].T @ scores[:-lag]
             total += (1.0 - lag / (lags + 1.0)) * (pair + pair.T)

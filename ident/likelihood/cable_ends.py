@@ -20,6 +20,7 @@ from freeswing.ident.likelihood.fit import fit
 from freeswing.ident.likelihood.fit_swings import ONWARD, LikelihoodFit
 
 _ENTRY, _ATTACHMENT = "anchor_offset", "attachment_offset"
+_DECLARED = {"entry_std_m": "entry_m", "attachment_std_m": "attachment_m"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +43,15 @@ class GeometryPriors:
                     f"{name} is {value}, must be above 0 and at most 0.1 m; leave it out where the "
                     "places are exact"
                 )
+
+    def or_declared(self, robot: Robot) -> GeometryPriors:
+        """The same with what robot.toml states of cable ends where nothing is said here."""
+        told = {
+            name: getattr(robot.tolerances, tolerance)
+            for name, tolerance in _DECLARED.items()
+            if getattr(self, name) is None and tolerance in robot.tolerances.declared
+        }
+        return replace(self, **told)
 
     @property
     def stds(self) -> dict[str, float]:

@@ -10,11 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from freeswing.cdpr.files.documents import dump_toml
+from freeswing.cdpr.files.documents import DataError, dump_toml
 from freeswing.cdpr.files.robot_file import write_robot
 from freeswing.cdpr.files.trajectory_csv import write_csv
 from freeswing.cdpr.model.equations import build_model
 from freeswing.cdpr.robot import POSE_COORDINATES, Robot
+from freeswing.cdpr.tolerances import Tolerances
 from freeswing.ident.estimate import Estimate
 from freeswing.ident.identify import Identification, IdentifySettings, identify
 from freeswing.ident.likelihood.cable_ends import GeometryPriors, corrected
@@ -82,6 +83,43 @@ def test_deviations_are_honest_where_the_geometry_is_let_free():
 
 
 @pytest.mark.slow
+def test_fidims_deviations_hold_cable_ends_of_known_spread():
+    exact = identified(GeometryPriors()).estimates
+    free = identified(GeometryPriors(STD_M, STD_M)).estimates
+    for name in ("fidim_full", "fidim_free"):
+        assert (free[name].values == exact[name].values).all(), "the published solution stays"
+        z = z_scores(free[name])
+        assert np.abs(z).max() < 3.0, f"{name}: z-scores {np.round(z, 1)}"
+
+
+def test_tolerances_that_robot_toml_states_reach_fidim():
+    """In proportion to what is stated; what is not stated is taken as exact."""
+
+    def share(robot: Robot, priors: GeometryPriors | None = None) -> np.ndarray:
+        settings = IdentifySettings(
+            maximum_likelihood=False, predict=False, geometry=priors or GeometryPriors()
+        )
+        found = identify(list(swings()[:3]), robot, settings).estimates["fidim_full"]
+        stds = found.extra.get("tolerances_std", np.zeros(9))
+        assert (np.array(stds) <= found.std).all()
+        return np.array(stds)
+
+    known = replace(ROBOT, tolerances=Tolerances(attachment_m=2e-4))
+    assert (share(known) == 0.0).all(), "not stated"
+    known = replace(ROBOT, tolerances=Tolerances(attachment_m=2e-4, declared=("attachment_m",)))
+    stated = share(known)
+    assert (stated > 0.0).all(), f"{stated}"
+    option = share(known, GeometryPriors(None, 4e-4))
+    assert option == pytest.approx(2.0 * stated, rel=0.02), "an option comes first"
+
+
+def test_a_stated_tolerance_that_cannot_be_is_named():
+    robot = replace(ROBOT, tolerances=Tolerances(entry_m=0.2, declared=("entry_m",)))
+    with pytest.raises(DataError, match=r"\[tolerances\].*entry_std_m is 0.2"):
+        identify(list(swings()[:3]), robot)
+
+
+@pytest.mark.slow
 def test_held_out_runs_are_predicted_by_the_corrected_robot():
     exact, free = (
         np.array([run.prediction_rmse_m for run in identified(priors).validation], dtype=float)
@@ -120,7 +158,9 @@ def test_options_reach_the_fit_from_the_command_line(tmp_path: Path):
     dump_toml(tmp_path / "session.toml", {**head, "runs": rows})
     assert main(["identify", str(tmp_path), "--attachment-std-m", "0.001", "--quiet"]) == 0
     text = (tmp_path / "results" / "identification.json").read_text(encoding="utf-8")
-    names = {row["name"] for row in json.loads(text)["estimates"]["ml_full"]["geometry"]}
+    estimates = json.loads(text)["estimates"]
+    assert min(estimates["fidim_full"]["tolerances_std"]) > 0.0
+    names = {row["name"] for row in estimates["ml_full"]["geometry"]}
     assert len(names) == 12, f"{names}"
     assert "attachment_offset.offset_1_x_m" in names, f"{names}"
 
