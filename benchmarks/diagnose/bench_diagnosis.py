@@ -19,7 +19,13 @@ from typing import Any
 
 from benchmarks.harness import Row, publish
 from freeswing.main import main as freeswing
-from tests.oracle.recorded.benches import DECLARED_KG, PLATFORM_COM_M, Hidden, make_bench
+from tests.oracle.recorded.benches import (
+    DECLARED_KG,
+    GRAVITY,
+    PLATFORM_COM_M,
+    Hidden,
+    make_bench,
+)
 
 SEED = 3
 COUNTS = (2, 1, 2)
@@ -45,6 +51,7 @@ class Case:
 
 ECCENTRIC_M = (0.003, -0.004, 0.0)
 HOLD_N_M = 0.02
+YIELDS_N_M, ONE_YIELDS_N_M = 2000.0, 500.0  # sideways: wires seem longer by tension over it
 CASES = {
     "nothing": Case(Hidden(0.0, 1.0, 0.0, 0.0)),
     "drag": Case(Hidden(0.0, 1.0, 2e-3, 0.02), "rotational_drag", "rate_m2_s", 2e-3 / DECLARED_KG),
@@ -68,6 +75,15 @@ CASES = {
         "torsion_spring",
         "stiffness_m2_s2",
         HOLD_N_M / DECLARED_KG,
+    ),
+    "yielding hooks": Case(
+        Hidden(0.0, 1.0, 0.0, 0.0, yields_n_m=YIELDS_N_M),
+        "cable_length_bias",
+        "bias_m",
+        DECLARED_KG * GRAVITY / 3.0 / YIELDS_N_M,
+    ),
+    "one yielding hook": Case(
+        Hidden(0.0, 1.0, 0.0, 0.0, yields_n_m=ONE_YIELDS_N_M, yielding=1),
     ),
 }
 

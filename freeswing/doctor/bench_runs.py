@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from freeswing.cdpr.robot import Robot
+from freeswing.doctor.exchanged_by_lean import refuse_exchanged_by_lean
 from freeswing.doctor.quaternions import refuse_mistaken_quaternions
 from freeswing.ident.bench.runs import Bench
 from freeswing.session.exchanged_lengths import BENCH_DIFFERENCE_M, refuse_exchanged_lengths
@@ -20,3 +21,4 @@ def refuse_wrong_bench_runs(bench: Bench, robot: Robot) -> None:
     refuse_repeated(swings)
     refuse_mistaken_quaternions(swings, robot)
     refuse_exchanged_lengths(swings, robot, BENCH_DIFFERENCE_M)
+    refuse_exchanged_by_lean(bench, robot)

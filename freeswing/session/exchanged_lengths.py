@@ -97,7 +97,7 @@ def exchanged_sentence(
     if not len(moved) or worst < least_m or left.max() > LEFT_OVER * worst:
         return ""
     return (
-        f"{_named(robot, moved)} are exchanged: by the poses they are "
+        f"{named_cables(robot, moved)} are exchanged: by the poses they are "
         f"{1e3 * worst:.0f} mm off as stated, {1e3 * left.max():.1f} mm in each other's place"
     )
 
@@ -145,13 +145,14 @@ def exchanged_at_rest(
                 else f"{1e3 * as_stated:.0f} mm from where it was measured"
             )
             return np.array(best), (
-                f"{_named(robot, moved)}, up to {1e3 * wrong:.0f} mm apart, are exchanged: as "
-                f"stated the platform rests {rests}, in each other's place {1e3 * left:.1f} mm"
+                f"{named_cables(robot, moved)}, up to {1e3 * wrong:.0f} mm apart, are exchanged: "
+                f"as stated the platform rests {rests}, in each other's place {1e3 * left:.1f} mm"
             )
     return before, ""
 
 
-def _named(robot: Robot, cables: Array) -> str:
+def named_cables(robot: Robot, cables: Array) -> str:
+    """Whose lengths are meant, in words; cables by their places, (k,)."""
     names = " and ".join(robot.cables[k].name for k in cables)
     return f"cable_lengths_m: the lengths of cables {names}"
 

@@ -16,6 +16,7 @@ from freeswing.ident.likelihood.fit_blocks import Dense
 from freeswing.ident.likelihood.unknowns import Gaussian, Unknowns
 
 CONTRADICTED = 3.0  # standard deviations between what runs say and what is stated
+GIVES_WAY = 0.01  # of the mass: stretch, or hooks that yield, by a hundredth of the wires' length
 CHECKING = 0.05  # of the mass: payload runs that tell it as well check it, and what they say counts
 
 
@@ -34,6 +35,14 @@ class MassVerdict:
     fitted_kg: float
     fitted_std_kg: float
     contradicted: bool
+
+    @property
+    def is_small(self) -> bool:
+        """Whether wires that stretch, or hooks that yield, could make runs want the other mass.
+
+        Both make wires seem longer the more hangs on them; by a hundredth an eye sees it.
+        """
+        return abs(self.fitted_kg / self.declared_kg - 1.0) <= GIVES_WAY
 
 
 def weighed_mass(
@@ -91,7 +100,10 @@ def mass_left_free(unknowns: Unknowns, mass: MassVerdict) -> Unknowns:
 
 
 def doubt(freed: Solution, mass: MassVerdict | None) -> Array:
-    """What deviations count where a declared mass serves: how far payload runs are from it.
+    """By how much all shared unknowns would differ, were it the other one of the two masses, (p,).
+
+    Zero where that is no doubt: runs that tell next to nothing of the mass, or that contradict the
+    declared one by more than wires and hooks that give way under a load could make of it.
 
     Args:
         freed: the fit with the mass free.
@@ -101,14 +113,17 @@ def doubt(freed: Solution, mass: MassVerdict | None) -> Array:
         JCGM 100:2008, Guide to the Expression of Uncertainty in Measurement, sec. F.2.4.5: a
         correction that is not applied counts in full.
     """
-    nothing = np.zeros_like(freed.covariance)
-    if mass is None or mass.contradicted or mass.fitted_std_kg > CHECKING * mass.declared_kg:
+    nothing = np.zeros(len(freed.covariance))
+    if mass is None:
+        return nothing
+    checked = mass.fitted_std_kg <= CHECKING * mass.declared_kg
+    if not (mass.is_small if mass.contradicted else checked):
         return nothing
     place = int(freed.unknowns.columns("platform")[0])
     shift = mass.declared_kg - mass.fitted_kg
     change = freed.covariance[:, place] / freed.covariance[place, place] * shift
-    change[place] = 0.0
-    return np.asarray(np.outer(change, change))
+    change[place] = shift if mass.contradicted else 0.0
+    return np.asarray(change)
 
 
 def without_prior(

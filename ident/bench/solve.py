@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -59,6 +60,7 @@ class Solved:
         wires: what sway says of the wires, or None where no column shows sway.
         held: what no run tells, by block.
         fastest_hz: highest frequency of the first run's small oscillations.
+        doubts: what each shared block would change by, were it the other mass.
     """
 
     solution: Solution
@@ -69,6 +71,7 @@ class Solved:
     wires: WiresVerdict | None = None
     held: Held = field(default_factory=dict)
     fastest_hz: float = 1.0
+    doubts: Mapping[str, Array] = field(default_factory=dict)
 
 
 def solved(model: Model, bench: Bench, start: Assembled) -> Solved:
@@ -104,10 +107,13 @@ def solved(model: Model, bench: Bench, start: Assembled) -> Solved:
         found = fit(swings, _pinned(found.unknowns, COMMON), FINE)
     freed = found
     found, mass = weighed_mass(bench, model, swings, found, start, FINE)
-    right = _who_is_right(found, wires) + doubt(freed, mass)
+    change = doubt(freed, mass)
+    right = _who_is_right(found, wires) + np.outer(change, change)
     found = considered(swings, found, held)
     found = replace(found, covariance=found.covariance + right)
-    return Solved(found, swings, start.unknowns, tau, mass, wires, held, fastest_hz)
+    names = (block.name for block in freed.unknowns.shared)
+    doubts = {name: change[freed.unknowns.columns(name)] for name in names}
+    return Solved(found, swings, start.unknowns, tau, mass, wires, held, fastest_hz, doubts)
 
 
 def _wires(found: Solution, start: Assembled) -> WiresVerdict:

@@ -270,3 +270,19 @@ def test_heavy_cable_swings_at_its_textbook_rate() -> None:
     expected = start[0] * np.cos(rate * motion.times_s)
     off = float(np.max(np.abs(motion.positions_m[:, 0] - expected))) / start[0]
     assert off < 1e-5, f"{off:.1e} of the amplitude"
+
+
+def test_a_hook_that_yields_makes_a_pendulum_longer() -> None:
+    """By tension over what holds it sideways: a spring of k and a wire's m g / L in a row."""
+    length, mass, angle, hook, stiff = 1.2, 0.4, 2e-3, 400.0, 2e5
+    robot = Robot("one", (Cable("1", np.zeros(3), 0.0, np.zeros(3)),))
+    body = Body(mass, np.zeros(3), np.array([1e-3, 1e-3, 1e-3, 0.0, 0.0, 0.0]))
+    pull = mass * 9.80665
+    world = plain_world(robot, body, np.array([length]))
+    world = world._replace(stiffness_ea=stiff, relaxation=1e-3, hook=np.array([hook]))
+    hangs = length * (1.0 + pull / stiff) + pull / hook
+    start = np.array([hangs * math.sin(angle), 0.0, -length * (1.0 + pull / stiff)])
+    motion = simulate(world, start, np.eye(4)[0], 4.0)
+    expected = start[0] * np.cos(math.sqrt(9.80665 / hangs) * motion.times_s)
+    off = float(np.max(np.abs(motion.positions_m[:, 0] - expected))) / start[0]
+    assert off < 1e-3, f"{off:.1e} of the amplitude"  # 9.8 mm left out would be 3e-2

@@ -30,11 +30,7 @@ from freeswing.ident.bench.diagnose.search import Ground
 from freeswing.ident.bench.diagnose.weigh import Fit
 from freeswing.ident.bench.identify_bench import BenchResult
 from freeswing.ident.bench.solve import WiresVerdict
-from freeswing.ident.bench.told.contradicted import (
-    contradictions,
-    payload_reasons,
-    surely_contradicted,
-)
+from freeswing.ident.bench.told.contradicted import contradictions
 from freeswing.ident.bench.told.held_out import HeldOut
 
 CHANNELS_ONLY = (
@@ -73,9 +69,8 @@ def channels_document(found: ByChannels) -> dict[str, Any]:
     solved = found.identified.solved
     rows = [removed_entry(one) for one in found.removed]
     accepted = [granted_entry(one) for one in found.removed if one.accepted]
-    if payload_reasons(solved):
-        rows.append(mass_candidate(solved))
-        accepted += [mass_found(solved)] if surely_contradicted(solved) else []
+    rows += mass_candidate(solved)
+    accepted += mass_found(solved)
     if solved.wires is not None:
         rows.append(_wires_row(solved.wires))
         accepted += [_wires_found(solved.wires)] if solved.wires.contradicted else []
@@ -99,7 +94,7 @@ def _wires_row(wires: WiresVerdict) -> dict[str, Any]:
     reason = (
         f"all wires together are as stated, by sway: {told}; what each is by itself is not told"
     )
-    return told_entry(LENGTHS, "rejected", reason)
+    return told_entry(LENGTHS, "not_identifiable", reason)
 
 
 def _wires_found(wires: WiresVerdict) -> dict[str, Any]:

@@ -23,7 +23,11 @@ from freeswing.ident.bench.modal import ModalSwing
 from freeswing.ident.bench.runs import Bench
 from freeswing.ident.bench.solve import FINE, Solved
 from freeswing.ident.bench.swing import COMMON
-from freeswing.ident.bench.told.kinds_doubt import with_differences, with_kinds_counted
+from freeswing.ident.bench.told.kinds_doubt import (
+    with_change,
+    with_differences,
+    with_kinds_counted,
+)
 from freeswing.ident.bench.told.scatter_by_kind import is_systematic
 from freeswing.ident.likelihood.fit import fit
 
@@ -177,9 +181,11 @@ def _counted(solved: Solved, one: Fit, rounds: Sequence[Round] = ()) -> Solved:
     found = considered(one.swings, one.solution, solved.held)
     mass = solved.mass
     if mass is not None and mass.contradicted:
-        value, std = float(found.value("platform")[0]), float(found.std("platform")[0])
+        value, std = float(found.value("platform")[0]), float(one.solution.std("platform")[0])
         off = abs(value - mass.declared_kg) > CONTRADICTED * std
         mass = MassVerdict(mass.declared_kg, value, std, off)
+    if not one.causes:  # with a cause the runs no longer want what they wanted without
+        found = with_change(found, solved.doubts)
     pairs = [
         (step.winner.solution, rival.solution)
         for step in rounds

@@ -59,9 +59,9 @@ def bench_document(found: BenchDiagnosis | ByChannels | CannotTell) -> dict[str,
     mass = group_sentence(last)
     entries = [_accepted(found, cause) for cause in found.accepted]
     entries += [granted_entry(one) for one in found.removed if one.accepted]
-    entries += [mass_found(last)] if mass else []
+    entries += mass_found(last)
     notes = [mass] if mass else []
-    candidates = _candidates(found, bool(mass))
+    candidates = _candidates(found)
     notes += [*_unshown(candidates), _basis(found)]
     return {
         "format": FORMAT,
@@ -115,7 +115,7 @@ def _basis(found: BenchDiagnosis) -> str:
     return "no run has role validate: before and after are of each run left out in turn"
 
 
-def _candidates(found: BenchDiagnosis, mass: bool) -> list[dict[str, Any]]:
+def _candidates(found: BenchDiagnosis) -> list[dict[str, Any]]:
     """The last word on every effect, and on the declared mass."""
     told: dict[str, dict[str, Any]] = {}
     for words in (one.words for one in found.rounds):
@@ -133,9 +133,7 @@ def _candidates(found: BenchDiagnosis, mass: bool) -> list[dict[str, Any]]:
     rows += [
         told_entry(n, "not_identifiable", NOT_ON_BENCHES) for n in catalogue() if n not in told
     ]
-    if mass:
-        rows.append(mass_candidate(found.solved))
-    return rows
+    return rows + mass_candidate(found.solved)
 
 
 def _with_sight(row: dict[str, Any], shown: Sequence[Shown]) -> dict[str, Any]:

@@ -9,8 +9,9 @@ import numpy as np
 
 from freeswing.ident.bench.diagnose.causes import LENGTHS, SAME
 from freeswing.ident.bench.diagnose.removal import Removed
+from freeswing.ident.bench.mass_verdict import CHECKING
 from freeswing.ident.bench.solve import Solved
-from freeswing.ident.bench.told.contradicted import payload_reasons
+from freeswing.ident.bench.told.contradicted import payload_reasons, surely_contradicted
 
 FORMAT = "freeswing-diagnosis/1"
 NOTHING_LEFT = {"present": False, "signature": "", "evidence": {}}
@@ -85,17 +86,37 @@ def mass_group(solved: Solved) -> tuple[str, ...]:
     )
 
 
-def mass_candidate(solved: Solved) -> dict[str, Any]:
-    """The declared mass among what was looked for, where payload runs contradict it."""
-    reason = "runs with a known mass contradict the declared one"
-    return told_entry(MASS, "confounded", reason, **group_entry(mass_group(solved), WEIGH))
+def mass_candidate(solved: Solved) -> list[dict[str, Any]]:
+    """The declared mass among what was looked for, where runs carry a known one; else no row.
+
+    It is found only where runs exclude it with all counted that may be off: a centre of mass that
+    no run shows, or wires that give way. Where they do not, nothing has been found, whichever
+    number serves: other readings of the same runs leave the files right.
+    """
+    mass = solved.mass
+    if mass is None:
+        return []
+    group = group_entry(mass_group(solved), WEIGH)
+    if surely_contradicted(solved):
+        reason = "runs with a known mass contradict the declared one"
+        return [told_entry(MASS, "confounded", reason, **group)]
+    told = f"runs with a known mass give {mass.fitted_kg:.4g} +- {mass.fitted_std_kg:.2g} kg"
+    if mass.contradicted:
+        std = float(solved.solution.std("platform")[0])
+        reason = f"{told}, +- {std:.2g} kg with all that may be off: the declared one may be right"
+        return [told_entry(MASS, "not_identifiable", reason, **group)]
+    if mass.fitted_std_kg > CHECKING * mass.declared_kg:
+        return [told_entry(MASS, "not_identifiable", f"{told}: they do not check the declared one")]
+    return [told_entry(MASS, "rejected", f"{told}, as declared")]
 
 
-def mass_found(solved: Solved) -> dict[str, Any]:
-    """The platform's mass as runs have it, as a row of `accepted`."""
+def mass_found(solved: Solved) -> list[dict[str, Any]]:
+    """The platform's mass as runs have it, as a row of `accepted` where they exclude the other."""
+    if not surely_contradicted(solved):
+        return []
     solution = solved.solution
     value, std = solution.value("platform")[:1], solution.std("platform")[:1]
-    return found_entry(MASS, "", ["mass_kg"], value.tolist(), std.tolist(), mass_group(solved))
+    return [found_entry(MASS, "", ["mass_kg"], value.tolist(), std.tolist(), mass_group(solved))]
 
 
 def found_entry(

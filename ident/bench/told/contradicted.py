@@ -22,6 +22,7 @@ WEIGH = (
 OPPOSITE = (
     "Hang the known mass on opposite sides of the middle in turn: then no centre of mass can be it"
 )
+SHORTER = "under a weight they become longer, and the runs want the contrary"
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +74,10 @@ def payload_reasons(solved: Solved) -> tuple[Reason, ...]:
         Reason("payload_mass", f"the payloads' masses ({-percent:+.1f} %)"),
         Reason("torsion_spring", f"wires or a clamp that hold yaw by {1e3 * spring:+.2g} mN m/rad"),
     ]
+    if mass.is_small:
+        way = 1e3 * share * length
+        says = f"wires that stretch, or hooks that yield, by {way:.2g} mm under the platform"
+        found.append(Reason("yielding_clamp", says, "" if share > 0.0 else SHORTER))
     centre = _centre(solved)
     if centre:
         found.append(Reason("centre_of_mass", centre))
@@ -137,6 +142,7 @@ def exchange_sentence(runs: Sequence[BenchRun]) -> str:
         for run in runs
         if run.lengths_m is not None
         and run.coordinates != POSE_COORDINATES
+        and not {"phi", "theta"} <= set(run.coordinates)
         and np.ptp(run.lengths_m) > (run.lengths_std_m or UNSTATED_LENGTH_STD_M)
     ]
     if not blind or len(blind) < len(runs):

@@ -9,7 +9,7 @@ How far apart the two are is what is not known.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -19,7 +19,6 @@ from freeswing.ident.bench.mass_verdict import mass_left_free
 from freeswing.ident.bench.solve import FINE, Solved
 from freeswing.ident.bench.told.scatter_by_kind import is_systematic
 from freeswing.ident.likelihood.fit import Solution, fit
-from freeswing.ident.likelihood.unknowns import Unknowns
 
 
 def with_kinds_counted(solved: Solved) -> Solved:
@@ -49,16 +48,16 @@ def with_differences(found: Solution, pairs: Sequence[tuple[Solution, Solution]]
         found: the fit.
         pairs: of fits that the runs cannot tell apart; blocks that either lacks do not count.
     """
-    covariance = np.array(found.covariance)
     for one, other in pairs:
-        change = _difference(found.unknowns, one, other)
-        covariance += np.outer(change, change)
-    return replace(found, covariance=covariance)
+        both = [name for name in one.unknowns.names if name in other.unknowns]
+        found = with_change(found, {name: other.value(name) - one.value(name) for name in both})
+    return found
 
 
-def _difference(unknowns: Unknowns, one: Solution, other: Solution) -> Array:
-    parts = []
-    for block in unknowns.shared:
-        both = block.name in one.unknowns and block.name in other.unknowns
-        parts.append(other.value(block.name) - one.value(block.name) if both else 0.0 * block.value)
-    return np.concatenate([np.ravel(part) for part in parts])
+def with_change(found: Solution, changes: Mapping[str, Array]) -> Solution:
+    """A fit whose covariance counts a change of its shared blocks, by name, in full."""
+    parts = [
+        np.ravel(changes.get(block.name, np.zeros(block.size))) for block in found.unknowns.shared
+    ]
+    change = np.concatenate(parts)
+    return replace(found, covariance=found.covariance + np.outer(change, change))

@@ -16,6 +16,7 @@ from freeswing.cdpr.files.trajectory_csv import write_csv
 from freeswing.cdpr.measured.trajectory import Trajectory
 from freeswing.cdpr.robot import POSE_COORDINATES, Cable, Robot
 from freeswing.doctor.bench_runs import refuse_wrong_bench_runs
+from freeswing.doctor.exchanged_by_lean import exchanged_by_lean, leans_shown
 from freeswing.ident.bench.runs import Bench, BenchRun, Signal
 from freeswing.ident.runs import SwingRun
 from freeswing.main import main
@@ -198,3 +199,34 @@ def test_a_benchs_recording_given_twice() -> None:
         refuse_wrong_bench_runs(Bench((run, again)), ROBOT)
     dots = tuple(replace(one, signals=(Signal("dot_px", yaw),)) for one in (run, again))
     refuse_wrong_bench_runs(Bench(dots), ROBOT)
+
+
+@pytest.mark.parametrize("columns", [("phi", "theta", "chi"), ("phi", "theta")])
+@pytest.mark.parametrize(
+    ("longer_mm", "told_mm", "named"),
+    [
+        ((20.0, 0.0, 0.0), (0.0, 20.0, 0.0), "cables 1 and 2"),
+        ((20.0, 10.0, 0.0), (0.0, 20.0, 10.0), "cables 1 and 2 and 3"),
+        ((20.0, 0.0, 0.0), (20.0, 0.0, 0.0), ""),
+        ((20.0, 0.0, 0.0), (5.0, 0.0, 0.0), ""),
+        ((4.6, 0.0, 0.0), (0.0, 4.6, 0.0), ""),
+    ],
+)
+def test_wires_in_each_others_place_by_how_the_platform_leans(
+    columns, longer_mm, told_mm, named
+) -> None:
+    """Neither x, y nor z measured: three heights make the plane that phi and theta see."""
+    ring = np.array([[0.25, 0.0, 0.0], [-0.1, 0.2, 0.0], [-0.1, -0.2, 0.0]])
+    up = np.array([0.0, 0.0, 1.2])
+    cables = tuple(Cable(str(k + 1), end + up, 0.0, end) for k, end in enumerate(ring))
+    along_x, along_y, _ = np.linalg.solve(
+        np.column_stack([ring[:, :2], np.ones(3)]), -1e-3 * np.array(longer_mm)
+    )
+    lean = {"phi": along_y, "theta": -along_x, "chi": 0.0}
+    times = np.arange(100) / 50.0
+    signals = tuple(Signal(name, np.full(100, lean[name])) for name in columns)
+    run = BenchRun("a", "identify", times, signals, 1.2 + 1e-3 * np.array(told_mm), 1e-3)
+    robot = Robot("plate", cables, free_coordinates=("x", "y", "chi"))
+    assert named in exchanged_by_lean(run, robot)
+    assert bool(exchanged_by_lean(run, robot)) == bool(named)
+    assert not leans_shown(run, replace(robot, free_coordinates=("phi", "theta", "chi")))

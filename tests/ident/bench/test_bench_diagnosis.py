@@ -132,3 +132,69 @@ def test_yaw_alone_says_what_it_would_not_show(tmp_path: Path) -> None:
     assert any("cannot tell whether these are there" in note for note in told["notes"])
     body = {row["name"]: row for row in told["objects_after"][1]["parameters"]}["Izz_kg_m2"]
     assert abs(body["value"] - truth.load_izz) < 3.0 * body["std"], body
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seen", ["poses", "plane"])
+@pytest.mark.parametrize(
+    "hidden",
+    [
+        Hidden(0.0, 1.0, 0.0, 0.0, yields_n_m=2000.0),
+        Hidden(0.0, 1.0, 0.0, 0.0, yields_n_m=500.0, yielding=1),
+    ],
+    ids=["all hooks", "one hook"],
+)
+def test_hooks_that_yield_sideways_are_never_wrong_and_sure(
+    tmp_path: Path, seen: str, hidden: Hidden
+) -> None:
+    """Wires seem longer by tension over stiffness, without sagging: 2 mm, 8 mm of one of them.
+
+    Nothing is named that is not there, and what Izz may be off by is claimed.
+    """
+    truth = make_bench(tmp_path, 3, 3, seen, 6.0, (2, 1, 2), hidden)
+    out = tmp_path / "out"
+    assert main(["diagnose", str(tmp_path), "--results", str(out), "--quiet"]) == 0
+    told = result(out, "diagnosis")
+    assert told["accepted"] == [], told["accepted"]
+    platform, load = (
+        {row["name"]: row for row in one["parameters"]} for one in told["objects_after"]
+    )
+    izz, own = platform["Izz_P_kg_m2"], load["Izz_kg_m2"]
+    assert abs(izz["value"] - truth.platform_izz_p) < 3.0 * izz["std"], izz
+    assert abs(own["value"] - truth.load_izz) < 3.0 * own["std"], own
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("wires", [2, 3])
+@pytest.mark.parametrize("seen", ["chi", "plane"])
+def test_clean_benches_without_poses_raise_no_alarm(tmp_path: Path, seen: str, wires: int) -> None:
+    """Yaw alone, and yaw with x and y: nothing found, nothing unexplained, Izz as claimed."""
+    truth = make_bench(tmp_path, 3, wires, seen, 6.0, (2, 1, 2), CLEAN)
+    out = tmp_path / "out"
+    assert main(["diagnose", str(tmp_path), "--results", str(out), "--quiet"]) == 0
+    told = result(out, "diagnosis")
+    assert told["accepted"] == [], told["accepted"]
+    assert not told["unexplained"]["present"], told["unexplained"]
+    for one, true in zip(
+        told["objects_after"], (truth.platform_izz_p, truth.load_izz), strict=True
+    ):
+        rows = {row["name"]: row for row in one["parameters"]}
+        izz = rows["Izz_P_kg_m2" if one["name"] == "platform" else "Izz_kg_m2"]
+        assert abs(izz["value"] - true) < 3.0 * izz["std"], izz
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", ["identify", "diagnose"])
+def test_wires_in_each_others_place_seen_by_angles_alone(
+    tmp_path: Path, command: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The first wire is 30 mm long, the second is told to be: phi and theta show it."""
+    make_bench(tmp_path, 3, 3, "angles", 6.0, (2, 1, 2), Hidden(0.03, 1.0, 0.0, 0.0))
+    path = tmp_path / "session.toml"
+    stated = path.read_text(encoding="utf-8")
+    path.write_text(stated.replace("[1.2, 1.2, 1.2]", "[1.2, 1.23, 1.2]"), encoding="utf-8")
+    assert main([command, str(tmp_path)]) == 1
+    said = capsys.readouterr().err
+    assert "run tare-01: cable_lengths_m: the lengths of cables 1 and 2, up to 30 mm" in said
+    path.write_text(stated.replace("[1.2, 1.2, 1.2]", "[1.23, 1.2, 1.2]"), encoding="utf-8")
+    assert main([command, str(tmp_path)]) == 0

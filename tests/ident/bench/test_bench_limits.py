@@ -78,8 +78,20 @@ def test_payload_runs_that_check_a_declared_mass(share, counts) -> None:
     freed = SimpleNamespace(covariance=covariance, unknowns=free.unknowns)
     verdict = mass_verdict.MassVerdict(5.0, 4.9, 5.0 * share, contradicted=False)
     counted = mass_verdict.doubt(freed, verdict)
-    assert counted[6, 6] == pytest.approx(0.04 if counts else 0.0)
-    assert counted[0, 0] == 0.0
+    assert counted[6] == pytest.approx(0.2 if counts else 0.0)
+    assert counted[0] == 0.0
+
+
+@pytest.mark.parametrize(("fitted_kg", "counts"), [(5.048, True), (5.052, False), (4.952, True)])
+def test_a_contradiction_as_small_as_wires_that_give_way(fitted_kg, counts) -> None:
+    """Up to a hundredth either mass may be right, and both are counted; beyond, the fitted one."""
+    covariance = 1e-4 * np.eye(10)
+    covariance[6, 0] = covariance[0, 6] = 2e-4
+    freed = SimpleNamespace(covariance=covariance, unknowns=body(0.1).unknowns)
+    verdict = mass_verdict.MassVerdict(5.0, fitted_kg, 0.001, contradicted=True)
+    counted = mass_verdict.doubt(freed, verdict)
+    shift = 5.0 - fitted_kg if counts else 0.0
+    assert counted[[0, 6]] == pytest.approx([shift, 2.0 * shift])
 
 
 @pytest.mark.parametrize(("shift_mm", "contradicted"), [(2.9, False), (3.1, True)])

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from freeswing.ident.bench.diagnose.channels_only import ByChannels, channels_document
+from freeswing.ident.bench.diagnose.entries import mass_candidate, mass_found
 from freeswing.ident.bench.mass_verdict import MassVerdict
 from freeswing.ident.bench.runs import BenchRun, Signal
 from freeswing.ident.bench.solve import WiresVerdict
@@ -122,8 +123,42 @@ def test_wires_that_sway_confirms() -> None:
     identified: Any = SimpleNamespace(solved=solved, validation=())
     rows = channels_document(ByChannels(identified, ()))["candidates"]
     (row,) = [one for one in rows if one["effect"] == "cable_length_bias"]
-    assert row["verdict"] == "rejected", row
+    assert row["verdict"] == "not_identifiable", row
     assert "as stated, by sway" in row["reason"], row
+
+
+@pytest.mark.parametrize(
+    ("fitted_kg", "std_kg", "all_kg", "verdict", "found"),
+    [
+        (1.236, 0.001, 0.011, "confounded", 1),
+        (1.236, 0.001, 0.013, "not_identifiable", 0),
+        (1.201, 0.059, 0.059, "rejected", 0),
+        (1.201, 0.061, 0.061, "not_identifiable", 0),
+    ],
+)
+def test_the_declared_mass_is_found_wrong_only_where_it_is_excluded(
+    fitted_kg, std_kg, all_kg, verdict, found
+) -> None:
+    """The same for poses and for channels: what runs only speak against may be right."""
+    solved = solved_of(std_kg=all_kg)
+    solved.mass = MassVerdict(1.2, fitted_kg, std_kg, fitted_kg > 1.21)
+    (row,) = mass_candidate(solved)
+    assert (row["verdict"], len(mass_found(solved))) == (verdict, found), row
+    solved.mass = None
+    assert not mass_candidate(solved)
+    assert not mass_found(solved)
+
+
+@pytest.mark.parametrize(
+    ("fitted_kg", "may_be", "cannot"),
+    [(1.211, True, False), (1.189, False, True), (1.213, False, False)],
+)
+def test_wires_that_give_way_may_be_it_where_little_is_off(fitted_kg, may_be, cannot) -> None:
+    """Up to a hundredth, and only if they become longer under what hangs on them."""
+    solved = solved_of()
+    solved.mass = MassVerdict(1.2, fitted_kg, 0.001, True)
+    assert ("yielding_clamp" in names(solved, excluded=False)) == may_be
+    assert ("yielding_clamp" in names(solved, excluded=True)) == cannot
 
 
 def test_nothing_looked_for_is_not_nothing_missing() -> None:

@@ -122,9 +122,8 @@ def constraint_rows(p, R, v, omega, world):
     for i in range(count):
         arm = rotate(R, world.attach[i])
         t, n, w = frames[i, 0], frames[i, 1], frames[i, 2]
-        length, rho, psi, s = cable(
-            world.entry[i], world.radius[i], world.swivel[i], add(p, arm), t, n, w
-        )
+        entry = _yielded(i, add(p, arm), world, t, n, w)
+        length, rho, psi, s = cable(entry, world.radius[i], world.swivel[i], add(p, arm), t, n, w)
         velocity = add(v, cross(omega, arm))
         gamma[i] = length_acceleration(world.radius[i], t, n, w, rho, psi, s, velocity)
         gamma[i] += dot(t, cross(omega, cross(omega, arm)))
@@ -133,6 +132,20 @@ def constraint_rows(p, R, v, omega, world):
             J[i, k], J[i, 3 + k], arms[i, k] = t[k], moment[k], arm[k]
         scalars[i, 0], scalars[i, 1], scalars[i, 2], scalars[i, 3] = length, rho, psi, s
     return J, gamma, arms, frames, scalars
+
+
+@njit(cache=True)
+def _yielded(i, point, world, t, n, w):
+    """Where a hook without mass is that its elastic cable pulls sideways against a spring, (3,)."""
+    entry = world.entry[i].copy()
+    if world.hook[i] <= 0.0:
+        return entry
+    for _ in range(25):
+        length, _, _, _ = cable(entry, world.radius[i], world.swivel[i], point, t, n, w)
+        pull = max(0.0, world.stiffness_ea * (length / world.length[i] - 1.0))
+        for k in range(2):
+            entry[k] = world.entry[i, k] + pull * t[k] / world.hook[i]
+    return entry
 
 
 @njit(cache=True)

@@ -66,6 +66,7 @@ class World(NamedTuple):
     hunting_hz: float
     hunting_phase: float
     stiffness_ea: float  # N; 0 = rigid cables
+    hook: Array  # (n,) N/m against moving sideways, of elastic cables' entries; 0 = fixed
     relaxation: float  # s, material damping: T = EA (e + relaxation de/dt)
     density: float  # kg/m
     drag: float  # N s/m
@@ -115,6 +116,7 @@ def plain_world(robot: Robot, body: Body, lengths_m: Array | None = None) -> Wor
         hunting_hz=0.0,
         hunting_phase=0.0,
         stiffness_ea=0.0,
+        hook=np.zeros(n),
         relaxation=0.0,
         density=0.0,
         drag=0.0,

@@ -32,6 +32,7 @@ BOTH_SIDES_M = (WEIGHT_M, WEIGHT_M * [-1.0, 1.0, 1.0], WEIGHT_M * [0.0, 1.0, 1.0
 _BESIDE_KG_M = DECLARED_KG * HEAVIER * PLATFORM_COM_M + LOAD_KG * LOAD_COM_M
 LEVEL_M = np.array([0.0, -_BESIDE_KG_M[1] / LOAD_KG, 0.0])  # there two wires hang it level
 RATE_HZ = 50.0
+STIFF_EA_N = 1e5  # stretches a wire by 0.05 mm
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +49,8 @@ class Hidden:
         eccentric_m: the first wire's lower end over what is told, platform frame, (3,).
         hold_n_m: a clamp or wires that hold yaw, N m a radian.
         beside_m: the platform's centre of mass over where it usually is, (3,).
+        yields_n_m: what holds the first `yielding` hooks sideways, N/m; 0: they do not yield.
+        yielding: how many hooks do.
         wider: twists by hand over the usual ones.
     """
 
@@ -60,6 +63,8 @@ class Hidden:
     eccentric_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     hold_n_m: float = 0.0
     beside_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    yields_n_m: float = 0.0
+    yielding: int = 3
     wider: float = 1.0
 
 
@@ -96,7 +101,8 @@ def make_bench(
         folder: made when not there.
         seed: of noise and releases.
         wires: 2 or 3.
-        seen: `poses`, `plane` (x, y, chi), `chi`, or `track`: one curved track of a laser dot.
+        seen: `poses`, `plane` (x, y, chi), `angles`, `chi`, or `track`: one curved track of a
+            laser dot.
         duration_s: of each run.
         counts: tare, known-weight and loaded runs.
         hidden: what the files do not say.
@@ -204,12 +210,15 @@ def _world(
     clamped[0] += hidden.eccentric_m
     ahead, aside = hidden.tilt_rad
     down = np.array([-np.sin(aside), np.sin(ahead), -np.cos(np.hypot(ahead, aside))])
+    hooks = np.where(np.arange(wires) < hidden.yielding, hidden.yields_n_m, 0.0)
+    stiff = STIFF_EA_N if hidden.yields_n_m > 0.0 else 0.0  # hooks yield to elastic wires alone
     return world._replace(
+        hook=hooks,
         attach=clamped,
         drag_angular=hidden.drag_n_m_s,
         drag_quadratic=hidden.quadratic,
         gravity=GRAVITY * down,
-        stiffness_ea=hidden.stiffness_ea_n,
+        stiffness_ea=hidden.stiffness_ea_n or stiff,
         torsion=hidden.hold_n_m,
         relaxation=1e-3,
     )
@@ -256,6 +265,9 @@ def _record(path: Path, motion: Motion, rng: np.random.Generator, seen: str) -> 
         place = motion.positions_m[:, :2] + rng.normal(0.0, 1e-4, (len(chi), 2))
         columns = np.hstack([times, place, turned[:, None]])
         write_samples(path, ("x_m", "y_m", "chi_rad"), columns)
+    elif seen == "angles":
+        turned = angles + rng.normal(0.0, 5e-4, angles.shape)
+        write_samples(path, ("phi_rad", "theta_rad", "chi_rad"), np.hstack([times, turned]))
     elif seen == "chi":
         noisy = chi + rng.normal(0.0, 5e-4, len(chi))
         write_samples(path, ("chi_rad",), np.hstack([times, noisy[:, None]]))
