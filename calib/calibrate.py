@@ -24,11 +24,15 @@ from freeswing.calib.remarks import (
     rig_warnings,
 )
 from freeswing.calib.rig.coarse_clocks import board_moves, coarse_clocks
+from freeswing.calib.rig.reprojection_kernels import WARP
 from freeswing.calib.rig.rig_start import BaseTie, base_tie, board_groups
 from freeswing.calib.rig.solve_rig import Rig, solve_rig, start_cameras, tie_to_base
 from freeswing.calib.rig.swing_tie import Joined, SwingFilms, joined
 from freeswing.calib.rig.views import Views
-from freeswing.calib.tags.base_tags import SURVEY_STD_M, SurveyedTag, find_base_tags
+from freeswing.calib.scene.marks import Click, read_clicks
+from freeswing.calib.scene.source import SurveyedPoint
+from freeswing.calib.scene.survey import Survey
+from freeswing.calib.tags.base_tags import CORNER_NAMES, SURVEY_STD_M, SurveyedTag
 from freeswing.calib.tags.tag_bend import straightened
 from freeswing.calib.verdict.calibration_result import (
     FORMAT,
@@ -41,7 +45,7 @@ from freeswing.calib.verdict.plumb_line_file import read_plumb_line
 from freeswing.calib.verdict.survey_check import SurveyCheck, check_survey
 from freeswing.calib.verdict.trust import Verdict, judge
 from freeswing.calib.verdict.truth_checks import check_truth, widened
-from freeswing.cdpr.files.documents import DataError
+from freeswing.cdpr.files.documents import DataError, InputError
 from freeswing.cdpr.robot import STANDARD_GRAVITY_M_S2
 
 Progress = Callable[[str, float], None]
@@ -88,10 +92,14 @@ class Aids:
     Attributes:
         plumb_line: hanging strings, or None.
         swings: gives recordings of the platform, asked for where no board joins the cameras.
+        surveyed: points whose places in the base frame were measured.
+        points: table in which these are marked, columns camera, point, u_px, v_px (std_px).
     """
 
     plumb_line: PlumbLine | None = None
     swings: Callable[[], SwingFilms | None] | None = None
+    surveyed: tuple[SurveyedPoint, ...] = ()
+    points: Path | None = None
 
 
 def calibrate_session(
@@ -108,12 +116,7 @@ def calibrate_session(
 ) -> CalibrationResult:
     """Calibrate cameras, clocks and base frame from recordings of a board.
 
-    From the command line, with a `Session` and its `calibration`::
-
-        calibrate_session(
-            calibration.recordings, calibration.board, calibration.base_tags,
-            frame_rate_hz=session.frame_rate_hz, progress=progress,
-        )
+    As `freeswing.commands.session.calibrate` calls it.
 
     Args:
         recordings: folder with `<camera>.mkv` (+ `<camera>.csv`) or `<camera>/*.png`.
@@ -124,8 +127,9 @@ def calibrate_session(
         kept_boards: folder that keeps the boards found so far, from where a call that was killed
             goes on; None for none.
         model: lens model of every camera.
-        survey_std_m: standard deviation of a surveyed coordinate; measured from the fit when None.
-        beside: hanging strings and swings, where there are any.
+        survey_std_m: standard deviation of coordinates of tags that state none; measured from the
+            fit when None.
+        beside: hanging strings, swings and surveyed points, where there are any.
         progress: told a label and the fraction done.
 
     Raises:
@@ -134,11 +138,14 @@ def calibrate_session(
             returned as `refused`.
     """
     told, beside = progress or _silent, beside or Aids()
-    plumb_line = beside.plumb_line
     board = board if isinstance(board, Board) else board_from(board)
     told("finding the board", 0.0)
     found = find_recordings(recordings)
-    strings = _strings(plumb_line, [recording.name for recording in found])
+    names = [recording.name for recording in found]
+    strings = _strings(beside.plumb_line, names)
+    clicks = _clicks(beside, names)
+    std = SURVEY_STD_M if survey_std_m is None else survey_std_m
+    given = Survey(tuple(base_tags), std, beside.surveyed, clicks)
     sightings = see_boards(
         found,
         board,
@@ -149,15 +156,12 @@ def calibrate_session(
     )
     told("adjusting", 0.7)
     board, said = settled_board(board, np.concatenate([s.pixels for s in sightings]))
-    std = SURVEY_STD_M if survey_std_m is None else survey_std_m
-    rig, alone_px = rig_from_sightings(
-        sightings, board, frame_rate_hz, model, base_tags, std, beside.swings
-    )
+    rig, alone_px = rig_from_sightings(sightings, board, frame_rate_hz, model, given, beside.swings)
     warnings = [text for text in (said, marker_said(board, rig)) if text is not None]
     survey: SurveyCheck | None = None
-    if base_tags:
-        told("base tags", 0.8)
-        rig, survey, moved = _tied(rig, sightings, base_tags, std, measured=survey_std_m is None)
+    if given:
+        told("base frame", 0.8)
+        rig, survey, moved = _tied(rig, sightings, given, measured=survey_std_m is None)
         warnings += moved
     else:
         warnings.append(no_base_warning(rig.cameras[rig.reference].name))
@@ -167,7 +171,7 @@ def calibrate_session(
     lenses = weigh_lenses(rig)
     warnings += [*rig_warnings(rig, truth.spread), *lens_warnings(rig.cameras, lenses)]
     verdict = replace(verdict, warnings=(*warnings, *verdict.warnings))
-    verdict, vertical = _with_vertical(verdict, rig, strings, plumb_line)
+    verdict, vertical = _with_vertical(verdict, rig, strings, beside.plumb_line)
     document = {**_document(rig, board, sightings, verdict), **vertical}
     for entry, choice in zip(document["cameras"], lenses, strict=True):
         entry["lens_models_held_out_px"] = choice.held_out_px
@@ -179,18 +183,28 @@ def calibrate_session(
 def _tied(
     rig: Rig,
     sightings: tuple[Sightings, ...],
-    base_tags: Sequence[SurveyedTag],
-    std_m: float,
+    given: Survey,
     *,
     measured: bool,
 ) -> tuple[Rig, SurveyCheck, list[str]]:
-    """The rig in the base tags' frame where their survey makes sense; and who moved."""
-    stills = [camera.still_frames for camera in sightings]
-    seen = find_base_tags(rig.cameras, stills, base_tags, rig.adjustment.sigma_px, std_m)
+    """The rig in the survey's frame where that makes sense; and who moved."""
+    seen = given.seen(rig.cameras, sightings, rig.adjustment.sigma_px)
     survey = check_survey(rig.cameras, seen.fixed)
     if not survey.reasons:
-        rig = tie_to_base(rig, seen.fixed, estimate_survey=measured)
+        rig = tie_to_base(rig, seen.fixed, given.unstated(measured))
     return rig, survey, moved_warnings(seen.moved)
+
+
+def _clicks(beside: Aids, cameras: list[str]) -> tuple[Click, ...]:
+    names = [point.name for point in beside.surveyed]
+    if beside.points is not None:
+        return read_clicks(beside.points, cameras, names, "camera")
+    if names:
+        raise InputError(
+            f"[[calibration.surveyed]]: {', '.join(names[:6])}: nothing says where the cameras see "
+            "them: mark them in points.csv beside the recordings (camera,point,u_px,v_px)"
+        )
+    return ()
 
 
 def _strings(plumb_line: PlumbLine | None, names: Sequence[str]) -> tuple[StringView, ...]:
@@ -216,14 +230,13 @@ def rig_from_sightings(
     board: Board,
     frame_rate_hz: float | None,
     model: str = DEFAULT_MODEL,
-    base_tags: Sequence[SurveyedTag] = (),
-    survey_std_m: float = SURVEY_STD_M,
+    survey: Survey | None = None,
     swings: Callable[[], SwingFilms | None] | None = None,
 ) -> tuple[Rig, Array]:
     """The rig in a frame of its own, and what each camera reached alone, px.
 
-    Where cameras share no board the platform in the swings takes part, and base tags, which then
-    give the frame.
+    Where cameras share no board the platform in the swings takes part, and what was surveyed, which
+    then gives the frame.
 
     Raises:
         DataError: when a camera never sees the board or the sightings make no rig.
@@ -249,7 +262,7 @@ def rig_from_sightings(
         line = None
     alone = np.array([start.rms_px for start in starts])
     borders = [camera.border_cells for camera in sightings]
-    tie = _tie(sightings, starts, seen.views, base_tags, survey_std_m)
+    tie = _tie(sightings, starts, seen.views, survey or Survey())
     films = swings() if swings and board_groups(len(starts), seen.views).any() else None
     all_seen = Joined(board.points_m, starts, offsets, line, unknown)
     if films is not None:
@@ -262,6 +275,7 @@ def rig_from_sightings(
         all_seen.line,
         lambda scene, views: straightened(scene, views, board, borders, tags),
         tie,
+        all_seen.layout_std_m,
     )
     guessed = tuple(sightings[k].name for k in all_seen.unknown)
     return replace(rig, guessed_clocks=guessed), alone
@@ -271,17 +285,14 @@ def _tie(
     sightings: tuple[Sightings, ...],
     starts: tuple[CameraStart, ...],
     views: Views,
-    base_tags: Sequence[SurveyedTag],
-    survey_std_m: float,
+    survey: Survey,
 ) -> BaseTie | None:
-    """The surveyed tags as each camera sees them, where boards alone do not join the cameras."""
-    if not base_tags or not board_groups(len(starts), views).any():
+    """What was surveyed as each camera sees it, where boards alone do not join the cameras."""
+    if not survey or not board_groups(len(starts), views).any():
         return None
     cameras = tuple(start.camera for start in starts)
-    stills = [camera.still_frames for camera in sightings]
     noise = np.array([start.rms_px for start in starts])
-    seen = find_base_tags(cameras, stills, base_tags, noise, survey_std_m)
-    return base_tie(cameras, seen.fixed)
+    return base_tie(cameras, survey.seen(cameras, sightings, noise).fixed)
 
 
 def _starts(
@@ -317,7 +328,7 @@ def _document(
         "board": {
             "kind": board.kind,
             "points": len(board.points_m),
-            "warp_m": rig.adjustment.scene.warp_m.tolist(),
+            "warp_m": rig.adjustment.scene.warp_m[:WARP].tolist(),
         },
         "dropped_views": [str(drop) for drop in rig.dropped],
         "trimmed_corners": rig.n_trimmed,
@@ -339,10 +350,11 @@ def _base_frame(rig: Rig) -> dict[str, Any]:
         return {"source": f"camera {rig.cameras[rig.reference].name}"}
     tags = list(dict.fromkeys(name.rpartition(" ")[0] for name in fixed.names))
     residuals = rig.adjustment.fixed_residuals_px
+    tagged = any(name.endswith(CORNER_NAMES) for name in fixed.names)
     return {
-        "source": "base tags",
+        "source": "base tags" if tagged else "survey",
         "tags": tags,
-        "survey_std_m": float(fixed.std_m[0]),
+        "survey_std_m": float(np.sqrt(np.mean(fixed.std_m**2))),
         "reprojection_px": float(np.sqrt(np.mean(residuals**2))),
     }
 

@@ -63,8 +63,9 @@ def group_warnings(rig: Rig) -> list[str]:
             "tags are then as good as the cameras' distances"
         ]
     return [
-        f"{apart}. The base tags do; clocks are measured within each group alone, between groups "
-        "`track` finds them from the swing"
+        f"{apart}. The base tags and points do: best where those of a camera are not in one plane, "
+        "one tag a third nearer than the other; clocks are measured within each group alone, "
+        "between groups `track` finds them from the swing"
     ]
 
 

@@ -20,6 +20,7 @@ from freeswing.calib.board.detection import (
     tag_detector,
 )
 from freeswing.calib.camera.lens_models import Array
+from freeswing.calib.tags.base_tags import SURVEY_STD_M
 from freeswing.calib.tags.corners import rimmed_cells
 from freeswing.calib.tags.tag_patterns import cut_dictionary
 from freeswing.cdpr.measured.target import Target
@@ -35,10 +36,12 @@ class PlatformTags:
     Attributes:
         names: family and id of each tag.
         corners_m: TL TR BR BL of each, platform frame, row by row, (n_tags, 12).
+        std_m: how far each may be from there, each axis, one standard deviation, (n_tags,).
     """
 
     names: tuple[tuple[str, int], ...]
     corners_m: tuple[tuple[float, ...], ...]
+    std_m: tuple[float, ...] = field(repr=False)  # what is kept of detections goes by the others
 
     @property
     def points_m(self) -> Array:
@@ -53,6 +56,7 @@ def platform_tags(target: Target) -> PlatformTags | None:
     return PlatformTags(
         tuple((tag.family, tag.id) for tag in target.tags),
         tuple(tuple(np.ravel(tag.corners_platform_m).tolist()) for tag in target.tags),
+        tuple(SURVEY_STD_M if tag.std_m is None else tag.std_m for tag in target.tags),
     )
 
 

@@ -93,13 +93,14 @@ def _held_out(rig: Rig, camera: Camera, model: str, views: Views) -> Array:
     lens = Camera(camera.name, camera.size_px, model, params, np.eye(4))
     alone = replace(views, camera=0 * rows, moment=rows, piece=rows)
     sigma = rig.adjustment.sigma_px[views.camera[:1]]
+    held, known = np.zeros(len(scene.warp_m), dtype=bool), np.full(len(scene.warp_m), np.inf)
     result = np.zeros(len(views))
     for parity in (0, 1):
         found = lens
         for half, learn in ((rows % 2 != parity, True), (rows % 2 == parity, False)):
-            free = free_unknowns((found,), held_pose=0, held_lenses=not learn)
+            free = free_unknowns((found,), held_pose=0, held_lenses=not learn, warp=held)
             kept, _ = alone.select(half).compacted()
-            problem = Problem(rig.problem.board_points_m, kept, None, free)
+            problem = Problem(rig.problem.board_points_m, kept, None, free, known)
             start = Scene((found,), poses[half], scene.warp_m, np.zeros((0, 3)))
             fit = adjust(start, problem, sigma, rounds=1, converged=ROUGHLY_CONVERGED)
             found = fit.scene.cameras[0]

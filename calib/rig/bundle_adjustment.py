@@ -227,5 +227,8 @@ def named(scene: Scene) -> list[str]:
         own = [*PARAMETER_NAMES[camera.model], "tx_m", "ty_m", "tz_m", "rx_rad", "ry_rad", "rz_rad"]
         names += [f"{camera.name}.{name}" for name in (*own, "clock_offset_s", "line_time_s")]
     names += ["board.sag_x_m", "board.sag_y_m", "board.tag_growth_m"]
+    kinds = ("x_m", "y_m", "z_m", "about_x_m", "about_y_m", "about_z_m")
+    tags = range((len(scene.warp_m) - 3) // len(kinds))
+    names += [f"platform_tag_{index}.{kind}" for index in tags for kind in kinds]
     points = range(len(scene.base_points_m))
     return names + [f"base_point_{index}.{axis}_m" for index in points for axis in "xyz"]

@@ -47,7 +47,7 @@ class Boards(NamedTuple):
 
 
 class Shape(NamedTuple):
-    """Board points (n_points, 3), and their derivatives by the warp (n_points, 3, 3)."""
+    """Board points (n_points, 3), and their derivatives by the shape (n_points, 3, n)."""
 
     points: Array
     modes: Array

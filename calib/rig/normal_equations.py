@@ -20,6 +20,7 @@ from freeswing.calib.rig.reprojection import (
     fixed_jacobians,
     kernel_estimate,
     kernel_views,
+    shape_count,
 )
 from freeswing.calib.rig.view_equations import Normal, view_equations
 from freeswing.calib.rig.views import FixedPoints, Views
@@ -40,7 +41,7 @@ class Problem:
         fixed: surveyed points, None without.
         free: which shared unknowns may move, in the order of `calib.rig.reprojection`, bool (p,).
         warp_std_m: how far the board's shape may be from its drawing, one standard deviation of
-            each of `warp_m`, infinite where nothing is known beforehand, (3,).
+            each of `warp_m`, infinite where nothing is known beforehand, (3 + 6 n_tags,).
         equal: unknowns that are one: each of the first row is that of the second, and is not
             free: images of one camera have one lens, (2, k); None without.
     """
@@ -75,8 +76,18 @@ def length_with_share(share: float, size: int) -> float:
 
 
 def normal_equations(scene: Scene, problem: Problem, sigma: Array) -> Normal:
-    """Normal equations at `scene`, robust weights included; `sigma` is each camera's noise, px."""
+    """Normal equations at `scene`, robust weights included; `sigma` is each camera's noise, px.
+
+    Raises:
+        ValueError: when scene and problem count unknowns differently, which the kernels would not
+            notice.
+    """
     end = camera_slices(scene.cameras)[-1].stop
+    shape = {len(scene.warp_m), len(problem.warp_std_m), shape_count(problem.board_points_m)}
+    if len(shape) > 1 or len(problem.free) != end + len(scene.warp_m) + scene.base_points_m.size:
+        raise ValueError(
+            f"shapes of {shape} numbers, {len(problem.free)} unknowns: not one problem"
+        )
     views = problem.views
     found = view_equations(
         kernel_views(views),
@@ -113,7 +124,7 @@ def _gathered(found: Normal, equal: np.ndarray) -> Normal:
 def _with_shape(found: Normal, scene: Scene, std_m: Array, first: int) -> Normal:
     """The equations with what is known of the board's shape beforehand added."""
     shared, slope = found.shared.copy(), found.shared_slope.copy()
-    rows = first + np.arange(WARP)
+    rows = first + np.arange(len(std_m))
     shared[rows, rows] += 1.0 / std_m**2
     slope[rows] -= scene.warp_m / std_m**2
     cost = found.cost + 0.5 * float(np.sum((scene.warp_m / std_m) ** 2))
@@ -124,7 +135,7 @@ def _with_fixed(found: Normal, scene: Scene, fixed: FixedPoints, sigma: Array) -
     """The equations with the fixed points' sightings and their survey added to what is shared."""
     shared, slope = found.shared.copy(), found.shared_slope.copy()
     slices = camera_slices(scene.cameras)
-    first = slices[-1].stop + WARP
+    first = slices[-1].stop + len(scene.warp_m)
     knee = length_with_share(WITHIN_KNEE, 2)
     cost = 0.0
     for index, own in enumerate(slices):

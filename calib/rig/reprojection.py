@@ -1,10 +1,11 @@
 """Unknowns of a camera rig and their reprojection residuals.
 
 Unknowns of camera c, in this order: lens parameters (k), pose (dt, dr as in
-`calib.camera.camera.Camera`), clock offset, line time. After the cameras come three numbers of the
-board's shape (`shape_modes`) and the base points. Every piece of a recording has a board motion of
-its own (`calib.rig.reprojection_kernels`): the pose at its middle, tangent (dt, dr) in the base
-frame: t + dt, exp(dr) R, then the motion's coefficients.
+`calib.camera.camera.Camera`), clock offset, line time. After the cameras come the numbers of the
+shapes (`shape_modes`): three of the board's, six of each tag of the platform; then the base points.
+Every piece of a recording has a board motion of its own (`calib.rig.reprojection_kernels`): the
+pose at its middle, tangent (dt, dr) in the base frame: t + dt, exp(dr) R, then the motion's
+coefficients.
 """
 
 from __future__ import annotations
@@ -29,7 +30,8 @@ class Scene:
     Attributes:
         cameras: the rig.
         T_base_boards: board poses at the middles of the pieces, (n_pieces, 4, 4).
-        warp_m: the board's sag along x and along y at its middle, and its tags' growth, (3,).
+        warp_m: the board's sag along x and along y at its middle, its tags' growth, and where the
+            platform's tags are beside their drawing, (3 + 6 n_tags,).
         base_points_m: the fixed points, (n, 3).
         motion: shift and turn by the powers of time over `motion_scale_s`, from the first,
             (n_pieces, degree, 6); a board at rest when left out.
@@ -72,12 +74,13 @@ def board_size(points_m: Array) -> int:
 
 
 def shape_modes(board_points_m: Array) -> Array:
-    """How a board differs from its drawing: derivative of its points by `warp_m`, (n, 3, 3).
+    """How shapes differ from their drawing: derivative of points by `warp_m`, (n, 3, 3 + 6 n_tags).
 
     Two are a paraboloid, zero on the middles of the edges: z changes by 1 - u^2 with u from -1 to 1
     (mrcal's model). The third moves every tag's corners away from its middle, half of it along each
-    side: ink that spread, or a marker of another size than stated. It is zero without tags. Points
-    of another body (`board_size`) keep their shape.
+    side: ink that spread, or a marker of another size than stated. It is zero without tags. Of
+    another body (`board_size`) every tag, four points, shifts along three axes and turns about
+    them by what moves its corners so far in the mean.
     """
     return _shape_modes(np.ascontiguousarray(board_points_m, dtype=np.float64).tobytes())
 
@@ -88,7 +91,12 @@ def _shape_modes(points: bytes) -> Array:
     plane = everything[: board_size(everything), :2]
     low, high = plane.min(axis=0), plane.max(axis=0)
     half = np.maximum(0.5 * (high - low), 1e-12)
-    modes = np.zeros((len(everything), 3, WARP))
+    body = everything[len(plane) :]
+    first = len(plane) + int(np.isnan(body[:, 0]).sum())
+    tags_of_body = everything[first:].reshape(-1, 4, 3)
+    modes = np.zeros((len(everything), 3, WARP + 6 * len(tags_of_body)))
+    for k, corners in enumerate(tags_of_body):
+        modes[first + 4 * k : first + 4 * k + 4, :, WARP + 6 * k :][..., :6] = _tag_modes(corners)
     modes[: len(plane), 2, :2] = 1.0 - ((plane - 0.5 * (low + high)) / half) ** 2
     if len(plane) % 4 == 0:
         tags = plane.reshape(-1, 4, 2)
@@ -98,6 +106,20 @@ def _shape_modes(points: bytes) -> Array:
             modes[: len(plane), :2, 2] = (arms / (np.sqrt(2.0) * reach)).reshape(-1, 2)
     modes.flags.writeable = False
     return modes
+
+
+def _tag_modes(corners: Array) -> Array:
+    """How a tag's corners go with shifts and turns of it, (4, 3, 6)."""
+    arms = corners - corners.mean(axis=0)
+    turns = np.cross(np.eye(3)[None], arms[:, None])  # (corner, axis of the turn, coordinate)
+    reach = np.linalg.norm(arms, axis=-1).mean()
+    shifts = np.broadcast_to(np.eye(3), (4, 3, 3))
+    return np.concatenate([shifts, np.swapaxes(turns, 1, 2) / reach], axis=2)
+
+
+def shape_count(board_points_m: Array) -> int:
+    """How many numbers `warp_m` has."""
+    return shape_modes(board_points_m).shape[2]
 
 
 def warped(board_points_m: Array, warp_m: Array) -> Array:
@@ -188,12 +210,13 @@ def moved(scene: Scene, shared: Array, boards: Array) -> Scene:
             )
         )
     end = slices[-1].stop
+    after = end + len(scene.warp_m)
     return replace(
         scene,
         cameras=tuple(cameras),
         T_base_boards=_moved_pose(scene.T_base_boards, boards[:, :6]),
-        warp_m=scene.warp_m + shared[end : end + WARP],
-        base_points_m=scene.base_points_m + shared[end + WARP :].reshape(-1, 3),
+        warp_m=scene.warp_m + shared[end:after],
+        base_points_m=scene.base_points_m + shared[after:].reshape(-1, 3),
         motion=scene.motion + boards[:, 6:].reshape(scene.motion.shape),
     )
 

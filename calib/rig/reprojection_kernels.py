@@ -206,9 +206,10 @@ def _fill_row(
     b1 = g0 * R[0, 1] + g1 * R[1, 1] + g2 * R[2, 1]
     b2 = g0 * R[0, 2] + g1 * R[1, 2] + g2 * R[2, 2]
     first = k + POSE + CLOCK
-    for j in range(WARP):
+    n_shape = modes.shape[2]
+    for j in range(n_shape):
         row[first + j] = b0 * modes[p, 0, j] + b1 * modes[p, 1, j] + b2 * modes[p, 2, j]
-    first += WARP
+    first += n_shape
     row[first], row[first + 1], row[first + 2] = g0, g1, g2
     for i in range(3):
         row[first + 3 + i] = m0 * at.turn[0, i] + m1 * at.turn[1, i] + m2 * at.turn[2, i]
@@ -229,8 +230,9 @@ def view_rows(
 ) -> tuple[Array, Array]:
     """Minus the derivatives (2 n_points, n_local) and residuals (2 n_points,), in arrays given.
 
-    Local columns are lens (k), pose (6), clock (2), warp (3), board (6 (degree + 1)). Corners that
-    are not finite are skipped; rows are filled where `with_rows` says so.
+    Local columns are lens (k), pose (6), clock (2), shape (as many as modes), board
+    (6 (degree + 1)). Corners that are not finite are skipped; rows are filled where `with_rows`
+    says so.
 
     Source:
         Hartley, Zisserman 2004, Multiple View Geometry in Computer Vision, appendix 6:
@@ -285,7 +287,9 @@ def local_rows(views: ViewArrays, estimate: Estimate, v: int) -> Array:
         bundle adjustment.
     """
     view = view_of(views, estimate, v)
-    columns = view.n_lens + POSE + CLOCK + WARP + 6 * (1 + view.motion.shape[0])
+    columns = (
+        view.n_lens + POSE + CLOCK + view.shape.modes.shape[2] + 6 * (1 + view.motion.shape[0])
+    )
     n = 2 * views.pixels.shape[1]
     return view_rows(view, WITH_SLOPES, np.zeros((n, columns)), np.zeros(n), new_spare())[0]
 

@@ -8,8 +8,7 @@ import numpy as np
 
 from freeswing.calib.camera.camera import Camera
 from freeswing.calib.camera.lens_models import Array
-from freeswing.calib.rig.reprojection import Scene
-from freeswing.calib.rig.reprojection_kernels import WARP
+from freeswing.calib.rig.reprojection import Scene, shape_count
 from freeswing.calib.rig.views import FixedPoints, Views
 from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.rotation import invert
@@ -37,7 +36,7 @@ class RigStart:
 
 @dataclass(frozen=True, slots=True)
 class BaseTie:
-    """Cameras that share no board, each held by the surveyed tags that it sees.
+    """Cameras that share no board, each held by the surveyed tags and points that it sees.
 
     Attributes:
         fixed: the survey and its sightings.
@@ -67,7 +66,7 @@ def start_rig(
 ) -> RigStart:
     """Chain the cameras from the one that shares most with the others.
 
-    What shares no board with them is reached through the surveyed tags, where `tie` has them.
+    What shares no board with them is reached through the survey, where `tie` has it.
 
     Args:
         cameras: their lenses; poses are ignored.
@@ -88,7 +87,7 @@ def start_rig(
         if counts.max() < LEAST_SHARED:
             T_tied = _through_base(tie, placed, outside)
             if T_tied is None:
-                raise DataError(_apart(cameras, inside, outside))
+                raise DataError(_apart(cameras, inside, outside, tie))
             placed |= T_tied
             continue
         row, column = np.unravel_index(int(np.argmax(counts)), counts.shape)
@@ -99,7 +98,8 @@ def start_rig(
         replace(camera, T_camera_base=placed[index]) for index, camera in enumerate(cameras)
     )
     boards = _board_poses(rig, board_points_m, views, T_camera_boards)
-    return RigStart(Scene(rig, boards, np.zeros(WARP), np.zeros((0, 3))), reference, shared)
+    shape = np.zeros(shape_count(board_points_m))
+    return RigStart(Scene(rig, boards, shape, np.zeros((0, 3))), reference, shared)
 
 
 def _through_base(
@@ -208,8 +208,8 @@ def place_in_base(scene: Scene, fixed: FixedPoints) -> Scene:
             candidates.append(invert(camera.T_camera_base) @ T_camera_base)
     if not candidates:
         raise DataError(
-            "no camera sees a base tag well enough to find itself; film the base tags too, sharp "
-            "and at least 20 pixels across"
+            "no camera sees a base tag or four surveyed points well enough to find itself; film "
+            "the base tags too, sharp and at least 20 pixels across, or mark more points"
         )
     costs = [_fixed_cost(scene, fixed, candidate) for candidate in candidates]
     T_rig_base = candidates[int(np.argmin(costs))]
@@ -271,13 +271,22 @@ def pose_from_points(camera: Camera, points_m: Array, pixels: Array) -> Array | 
     return best
 
 
-def _apart(cameras: tuple[Camera, ...], inside: list[int], outside: list[int]) -> str:
+def _apart(
+    cameras: tuple[Camera, ...], inside: list[int], outside: list[int], tie: BaseTie | None
+) -> str:
     here = ", ".join(cameras[i].name for i in inside)
     there = ", ".join(cameras[i].name for i in outside)
+    surveyed = ""
+    if tie is not None:
+        counts = np.bincount(tie.fixed.camera, minlength=len(cameras))
+        seen = ", ".join(f"{camera.name} {n}" for camera, n in zip(cameras, counts, strict=True))
+        surveyed = f" (corners and points of the survey seen now: {seen}; four are the least)"
     return (
         f"cameras {there} and cameras {here} share at most {LEAST_SHARED - 1} moments with the "
         f"board or the swinging platform in both, need {LEAST_SHARED}; film the board where one of "
         f"{here} and one of {there} see it at once, or record a swing in which each of these "
         "cameras sees two of the platform's tags (target.toml, a run with video and stamps of one "
-        "clock), or survey base tags so that each of these cameras sees two"
+        "clock), or survey base tags so that each of these cameras sees two, one a third nearer "
+        f"than the other, or six points that are marked in points.csv{surveyed}, or let the "
+        "laboratory's looks tie them (calibrate --scene)"
     )

@@ -91,6 +91,7 @@ def solve_rig(
     line: Timeline | None = None,
     straighten: Callable[[Scene, Views], Views] | None = None,
     tie: BaseTie | None = None,
+    layout_std_m: Array | None = None,
 ) -> Rig:
     """All cameras and board poses at once, in the frame of the reference camera.
 
@@ -103,7 +104,9 @@ def solve_rig(
         line: times and pieces of the moments when the board moves: clocks are then estimated, and
             time is the first camera's; None for a board that rests at each moment.
         straighten: puts the corners right once the rig is nearly known (`calib.tags.tag_bend`).
-        tie: surveyed tags, needed where cameras share no board.
+        tie: surveyed tags and points, needed where cameras share no board.
+        layout_std_m: how far each tag of the platform may be from its drawing, (n_tags,); none
+            takes part when None.
 
     Raises:
         DataError: when the cameras do not share enough views.
@@ -123,16 +126,18 @@ def solve_rig(
         scene = place_in_base(scene, fixed)
     if line is not None:
         scene, views = in_pieces(scene, views, Timeline(line.times_s[moments], line.piece[moments]))
+    layout = np.zeros(0) if layout_std_m is None else layout_std_m
+    shape_std = np.concatenate([shape_std_m(board_points_m), np.repeat(layout, 6)])
     free = free_unknowns(
         cameras,
         held_pose=start.reference if fixed is None else None,
         n_fixed=0 if fixed is None else len(fixed.points_base_m),
-        warp=np.isfinite(shape_std_m(board_points_m)),
+        warp=np.isfinite(shape_std),
         clocks=clocks,
         held_clocks=frozenset(board_groups(len(cameras), views).tolist()),
     )
     dropped = tuple(drop for camera in starts for drop in camera.dropped)
-    problem = Problem(board_points_m, views, fixed, free, shape_std_m(board_points_m))
+    problem = Problem(board_points_m, views, fixed, free, shape_std)
     rig = refine(scene, problem, start.reference, dropped, roughly=straighten is not None)
     if clocks:
         rig = _without_idle_lines(rig)
@@ -171,19 +176,20 @@ def free_unknowns(
     clocks: bool = False,
     held_clocks: frozenset[int] = frozenset({0}),
 ) -> np.ndarray:
-    """Which shared unknowns move: lenses, poses but one, base points, and warp if asked.
+    """Which shared unknowns move: lenses, poses but one, base points, and shapes if asked.
 
     With `clocks` every line time is free, and every clock offset but those of `held_clocks`: the
     first camera's of each group that shares boards.
     """
     slices = camera_slices(cameras)
-    free = np.ones(slices[-1].stop + WARP + 3 * n_fixed, dtype=bool)
+    shape = np.broadcast_to(warp, WARP) if isinstance(warp, bool) else warp
+    free = np.ones(slices[-1].stop + len(shape) + 3 * n_fixed, dtype=bool)
     for index, (camera, own) in enumerate(zip(cameras, slices, strict=True)):
         k = len(camera.params)
         free[own.start : own.start + k] = not held_lenses
         free[own.start + k : own.start + k + POSE] = index != held_pose
         free[own.stop - CLOCK : own.stop] = (clocks and index not in held_clocks, clocks)
-    free[slices[-1].stop : slices[-1].stop + WARP] = warp
+    free[slices[-1].stop : slices[-1].stop + len(shape)] = shape
     return free
 
 
@@ -228,16 +234,19 @@ def refine(
     return Rig(result, problem, reference, dropped, n_trimmed)
 
 
-def tie_to_base(rig: Rig, fixed: FixedPoints, *, estimate_survey: bool = True) -> Rig:
+def tie_to_base(rig: Rig, fixed: FixedPoints, unstated: NDArray[np.bool_] | None = None) -> Rig:
     """The rig in the base frame, surveyed points adjusted with everything else.
 
     Args:
         rig: solved in its own frame.
         fixed: surveyed points and their sightings.
-        estimate_survey: measure the survey's noise from how it fits, instead of taking it as given.
+        unstated: points whose survey's noise is measured from how it fits, instead of taken as
+            given, (n,); all when None.
     """
+    if unstated is None:
+        unstated = np.ones(len(fixed.std_m), dtype=bool)
     scene = place_in_base(rig.adjustment.scene, fixed)
-    shared = camera_slices(scene.cameras)[-1].stop + WARP
+    shared = camera_slices(scene.cameras)[-1].stop + len(scene.warp_m)
     tied = np.ones(3 * len(fixed.points_base_m), dtype=bool)
     free = np.concatenate([rig.problem.free[:shared], tied])
     held = scene.cameras[rig.reference]
@@ -245,10 +254,10 @@ def tie_to_base(rig: Rig, fixed: FixedPoints, *, estimate_survey: bool = True) -
     free[first : first + POSE] = True
     problem = replace(rig.problem, fixed=fixed, free=free)
     result = adjust(scene, problem, rig.adjustment.sigma_px, rounds=1)
-    for _ in range(_SURVEY_ROUNDS if estimate_survey else 1):
-        if estimate_survey:
-            std = survey_std(result, fixed)
-            fixed = replace(fixed, std_m=np.full(len(fixed.std_m), std))
+    for _ in range(_SURVEY_ROUNDS if unstated.any() else 1):
+        if unstated.any():
+            std = survey_std(result, fixed, unstated)
+            fixed = replace(fixed, std_m=np.where(unstated, std, fixed.std_m))
             problem = replace(problem, fixed=fixed)
         result = adjust(result.scene, problem, result.sigma_px, rounds=1)
     return replace(rig, adjustment=result, problem=problem)

@@ -1,6 +1,7 @@
 """Cameras that share no view of the board, tied by the platform that all of them see swing.
 
-The platform's tags are one rigid body, its layout that of target.toml. Frames of the swings are
+The platform's tags are one rigid body, its layout that of target.toml to the tags' deviations:
+where each tag really sits is an unknown beside the cameras. Frames of the swings are
 views as the board's are: they join the same moments, pieces of smooth motion, clocks and lenses,
 and one adjustment weighs everything. In the points of that adjustment the platform's corners come
 after the board's, with rows of NaN between (`calib.rig.normal_equations.Problem`).
@@ -83,6 +84,7 @@ class Joined:
         offsets_s: clock offsets to start from, (n_c,).
         line: times and pieces of all moments, None where nothing moves by known times.
         unknown: cameras whose start only their stamps tell, by index.
+        layout_std_m: of each tag of the platform, where it takes part, (n_tags,).
     """
 
     points_m: Array
@@ -90,6 +92,7 @@ class Joined:
     offsets_s: Array
     line: Timeline | None
     unknown: tuple[int, ...]
+    layout_std_m: Array | None = None
 
 
 def joined(
@@ -143,8 +146,9 @@ def joined(
         for start, views, T in zip(starts, parts, poses, strict=True)
     )
     moves = bool((piece >= 0).any())
+    known = Timeline(times, piece) if moves else None
     return Joined(
-        points, both, offsets, Timeline(times, piece) if moves else None, tuple(sorted(unknown))
+        points, both, offsets, known, tuple(sorted(unknown)), np.array(body.std_m, dtype=float)
     )
 
 

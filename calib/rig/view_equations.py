@@ -15,7 +15,6 @@ from freeswing.calib.rig.kernel_inputs import Array, Estimate, Ints, ViewArrays
 from freeswing.calib.rig.reprojection_kernels import (
     CLOCK,
     POSE,
-    WARP,
     new_spare,
     view_of,
     view_rows,
@@ -100,13 +99,13 @@ def _weighted(
 
 
 @kernel(forceinline=True)
-def _targets(first: int, own: int, warp_at: int) -> Ints:
+def _targets(first: int, own: int, shape_at: int, n_shape: int) -> Ints:
     """Where a view's columns before the board's stand among the shared unknowns."""
-    target = np.empty(own + WARP, dtype=np.int64)
+    target = np.empty(own + n_shape, dtype=np.int64)
     for j in range(own):
         target[j] = first + j
-    for j in range(WARP):
-        target[own + j] = warp_at + j
+    for j in range(n_shape):
+        target[own + j] = shape_at + j
     return target
 
 
@@ -130,7 +129,7 @@ def _add_gram(gram: Array, target: Ints, piece: int, into: Normal) -> None:
 
 @kernel
 def view_equations(
-    views: ViewArrays, estimate: Estimate, sigma: Array, knee: float, warp_at: int, unknowns: int
+    views: ViewArrays, estimate: Estimate, sigma: Array, knee: float, shape_at: int, unknowns: int
 ) -> Normal:
     """Normal equations of all views, their cost infinite where one cannot be seen.
 
@@ -139,7 +138,7 @@ def view_equations(
         estimate: where everything is believed to be.
         sigma: each camera's noise, px, (n_c,).
         knee: of Huber's loss, for the length of a group's whitened residual over sigma.
-        warp_at: first column of the warp among the shared unknowns.
+        shape_at: first column of the shape among the shared unknowns.
         unknowns: p, how many shared ones there are.
     """
     n, width = len(estimate.boards.poses), 6 * (1 + estimate.boards.motions.shape[1])
@@ -149,11 +148,12 @@ def view_equations(
     found = Normal(shared, cross, boards, slope, np.zeros((n, width)), 0.0)
     residuals = np.zeros(2 * n_points)
     rows, spare, scratch = np.zeros((1, 1)), np.zeros(1), new_spare()
+    n_shape = estimate.shape.modes.shape[2]
     cost = 0.0
     for v in range(len(views.camera)):
         c = views.camera[v]
         own = int(estimate.lenses.counts[c]) + POSE + CLOCK
-        wide = own + WARP + width + 1
+        wide = own + n_shape + width + 1
         if wide != rows.shape[1]:
             rows, spare = np.zeros((2 * n_points, wide)), np.zeros(wide)
         view_rows(view_of(views, estimate, v), WITH_SLOPES, rows, residuals, scratch)
@@ -163,6 +163,6 @@ def view_equations(
         if not math.isfinite(cost):
             break
         some = rows[:used]
-        target = _targets(int(estimate.lenses.first[c]), own, warp_at)
+        target = _targets(int(estimate.lenses.first[c]), own, shape_at, n_shape)
         _add_gram(np.dot(some.T, some), target, views.piece[v], found)
     return Normal(shared, cross, boards, slope, found.board_slopes, cost)

@@ -19,7 +19,7 @@ from freeswing.cdpr.files.documents import InputError, read_text
 from freeswing.cdpr.files.number_table import comma_separated
 
 CLICK_STD_PX = 0.5  # a point clicked by hand
-_COLUMNS = ("image", "point", "u_px", "v_px")
+_COLUMNS = ("point", "u_px", "v_px")
 _MOST_BYTES = 1 << 24
 
 
@@ -33,34 +33,38 @@ class Click:
     std_px: float
 
 
-def read_clicks(path: Path, images: Sequence[str], points: Sequence[str]) -> tuple[Click, ...]:
+def read_clicks(
+    path: Path, images: Sequence[str], points: Sequence[str], image: str = "image"
+) -> tuple[Click, ...]:
     """Marked points: columns image, point, u_px, v_px and optionally std_px.
 
     Args:
         path: the table.
         images: names that an image may have.
         points: names that a point may have.
+        image: what the column of images is called.
 
     Raises:
         InputError: not such a table, or a name that is not known.
     """
     lines = comma_separated(read_text(path, _MOST_BYTES)).splitlines()
     table = csv.DictReader(lines, skipinitialspace=True)
-    missing = [name for name in _COLUMNS if name not in (table.fieldnames or ())]
+    columns = (image, *_COLUMNS)
+    missing = [name for name in columns if name not in (table.fieldnames or ())]
     if missing:
         raise InputError(f"{path}: line 1: no column {', '.join(missing)}")
     found = []
     for row in table:
         where = f"{path}: line {table.line_num}"
-        image, point = row["image"] or "", row["point"] or ""
-        if image not in images:
-            few = ", ".join([*images][:12])
-            raise InputError(f"{where}: image {image[:60]!r} is none of the scene's: {few} ...")
+        name, point = row[image] or "", row["point"] or ""
+        if name not in images:
+            few = ", ".join([*images][:12]) + (" ..." if len(images) > 12 else "")
+            raise InputError(f"{where}: {image} {name[:60]!r} is none of them: {few}")
         if point not in points:
             known = ", ".join(points) or "none"
             raise InputError(
-                f"{where}: point {point[:60]!r} is in no surveyed point and no distance of "
-                f"[calibration.scene] ({known})"
+                f"{where}: point {point[:60]!r} is in no surveyed point and no distance of the "
+                f"session ({known})"
             )
         try:
             pixel = np.array([float(row[key] or "") for key in ("u_px", "v_px")])
@@ -69,7 +73,7 @@ def read_clicks(path: Path, images: Sequence[str], points: Sequence[str]) -> tup
             raise InputError(f"{where}: u_px, v_px or std_px is not a number") from error
         if not (np.abs(pixel) < 1e6).all() or not 1e-3 <= deviation <= 1e2:
             raise InputError(f"{where}: u_px, v_px must be pixels, std_px from 0.001 to 100")
-        found.append(Click(image, point, pixel, deviation))
+        found.append(Click(name, point, pixel, deviation))
     return tuple(found)
 
 

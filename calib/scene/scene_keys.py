@@ -25,16 +25,22 @@ def read_scene(
         return None
     frames, walk = path_of(reader, "frames"), path_of(reader, "walk")
     clicks = path_of(reader, "clicks")
-    surveyed = [_point(entry) for entry in reader.children("surveyed", required=False)]
+    surveyed = read_surveyed(reader)
     distances = [_distance(entry) for entry in reader.children("distances", required=False)]
     reader.finish()
-    names = [point.name for point in surveyed]
-    for name in sorted({name for name in names if names.count(name) > 1}):
-        reader.add("surveyed", f"two points are named {name!r}")
     if frames is None:
         reader.add("frames", "missing: the folder with a recording of each camera at rest")
         return None
-    return SceneSource(frames, walk, clicks, tuple(surveyed), tuple(distances))
+    return SceneSource(frames, walk, clicks, surveyed, tuple(distances))
+
+
+def read_surveyed(reader: Reader) -> tuple[SurveyedPoint, ...]:
+    """The points of `[[surveyed]]` in a table; names that stand twice are among its problems."""
+    points = [_point(entry) for entry in reader.children("surveyed", required=False)]
+    names = [point.name for point in points]
+    for name in sorted({name for name in names if names.count(name) > 1}):
+        reader.add("surveyed", f"two points are named {name!r}")
+    return tuple(points)
 
 
 def _std(reader: Reader) -> float:

@@ -9,7 +9,7 @@ from typing import Protocol
 import cv2
 import numpy as np
 
-from freeswing.calib.board.detection import Image
+from freeswing.calib.board.detection import LEAST_STD_PX, Image
 from freeswing.calib.camera.camera import Camera
 from freeswing.calib.camera.lens_models import Array
 from freeswing.calib.rig.views import FixedPoints
@@ -18,13 +18,15 @@ from freeswing.calib.tags.tag_patterns import cut_dictionary
 
 SURVEY_STD_M = 0.0003  # of a coordinate by total station, where the user states none
 CORNER_NAMES = ("TL", "TR", "BR", "BL")
-_FLOOR_PX = 0.01  # of a corner, however many stills: print and lens are no better
 _SAME_PLACE_PX = 1.0  # tens of deviations of a corner: beyond it something has moved
 _MARGIN = 0.4  # of a tag; the fit reads 0.19 to 0.25 beyond it
 
 
 class SurveyedTag(Protocol):
-    """What a surveyed tag has to have: family, id and corners TL TR BR BL, (4, 3)."""
+    """What a surveyed tag has to have: family, id and corners TL TR BR BL, (4, 3).
+
+    `std_m` is the stated deviation of its coordinates, None where none is.
+    """
 
     @property
     def family(self) -> str: ...  # noqa: D102
@@ -32,6 +34,8 @@ class SurveyedTag(Protocol):
     def id(self) -> int: ...  # noqa: D102
     @property
     def corners_base_m(self) -> Array: ...  # noqa: D102
+    @property
+    def std_m(self) -> float | None: ...  # noqa: D102
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +65,7 @@ def find_base_tags(
         stills: frames of every camera, during which camera and tags stood still.
         tags: the survey.
         sigma_px: noise of one board corner in each camera.
-        survey_std_m: standard deviation of a surveyed coordinate.
+        survey_std_m: standard deviation of a surveyed coordinate where the tag states none.
     """
     camera_rows, point_rows, pixels, scales, moved = [], [], [], [], []
     for index, camera in enumerate(cameras):
@@ -75,7 +79,7 @@ def find_base_tags(
             if not near.any():
                 continue
             noise = np.mean([noise for (_, noise), ok in zip(fits, near, strict=True) if ok])
-            std = np.hypot(noise / np.sqrt(near.sum()), _FLOOR_PX)
+            std = np.hypot(noise / np.sqrt(near.sum()), LEAST_STD_PX)
             camera_rows += [index] * 4
             point_rows += range(4 * number, 4 * number + 4)
             pixels.append(corners[near].mean(axis=0))
@@ -86,7 +90,7 @@ def find_base_tags(
     fixed = FixedPoints(
         tuple(names),
         np.concatenate([np.asarray(tag.corners_base_m, dtype=float) for tag in tags]),
-        np.full(4 * len(tags), survey_std_m),
+        np.repeat([survey_std_m if tag.std_m is None else tag.std_m for tag in tags], 4),
         np.array(camera_rows, dtype=int),
         np.array(point_rows, dtype=int),
         np.concatenate(pixels) if pixels else np.zeros((0, 2)),

@@ -39,12 +39,14 @@ class Tag:
         id: number in the family.
         size_m: side of the black border.
         T_platform_tag: tag to platform coordinates, (4, 4).
+        std_m: how far it may be from there, each axis, one standard deviation; None: as a survey.
     """
 
     family: str
     id: int
     size_m: float
     T_platform_tag: Array
+    std_m: float | None = None
 
     def __post_init__(self) -> None:
         what = f"tag {self.family} {self.id}: T_platform_tag"
@@ -137,8 +139,8 @@ def read_target(path: Path | str) -> Target:
     problems.raise_if_any(path)
     return Target(
         tuple(
-            Tag(family, number, size, transform(matrix_from_quaternion(q), t))
-            for family, number, size, q, t in tags
+            Tag(family, number, size, transform(matrix_from_quaternion(q), t), std)
+            for family, number, size, q, t, std in tags
         ),
         tuple(Marker(*values) for values in markers),
         untagged,
@@ -179,6 +181,7 @@ def write_target(path: Path | str, target: Target) -> None:
             "size_m": tag.size_m,
             "q_platform_tag": quaternion_from_matrix(tag.T_platform_tag[:3, :3]),
             "t_platform_tag_m": tag.centre_m,
+            **({} if tag.std_m is None else {"std_m": tag.std_m}),
         }
         for tag in target.tags
     ]
@@ -190,13 +193,14 @@ def write_target(path: Path | str, target: Target) -> None:
     dump_toml(path, table)
 
 
-def _read_tag_values(reader: Reader) -> tuple[str, int, float, Array, Array]:
+def _read_tag_values(reader: Reader) -> tuple[str, int, float, Array, Array, float | None]:
     values = (
         reader.string("family"),
         reader.integer("id", minimum=0),
         reader.number("size_m", above=0.0),
         reader.unit_vector("q_platform_tag", 4, QUATERNION_TOLERANCE),
         reader.vector("t_platform_tag_m", 3),
+        reader.optional_number("std_m", above=0.0),
     )
     _question_size(reader, "size_m", values[2], LARGEST_TAG_M)
     reader.finish()

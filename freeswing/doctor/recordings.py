@@ -40,7 +40,7 @@ def calibration_findings(session: Session) -> Iterator[Finding]:
         if not camera_names(source.recordings):
             text = f"{source.recordings} holds no <camera>.mkv and no <camera>/*.png"
             yield Finding("error", "calibration", text, "correct calibration.recordings")
-        if not source.base_tags:
+        if not source.base_tags and not source.surveyed:
             text = "no base_tags: nothing ties the cameras to the base frame"
             yield Finding("warning", "calibration", text, "survey a tag on the frame")
     if session.target is None:

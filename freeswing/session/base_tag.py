@@ -22,11 +22,15 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class BaseTag:
-    """A surveyed tag fixed to the frame; corners TL TR BR BL in the base frame, (4, 3)."""
+    """A surveyed tag fixed to the frame; corners TL TR BR BL in the base frame, (4, 3).
+
+    `std_m` is the stated deviation of its coordinates, None where none is.
+    """
 
     family: str
     id: int
     corners_base_m: Array
+    std_m: float | None = None
 
     def __post_init__(self) -> None:
         corners = frozen_array(self.corners_base_m, (4, 3), "corners_base_m")
@@ -41,8 +45,9 @@ def read_base_tag(reader: Reader) -> BaseTag | None:
     family = reader.string("family")
     number = reader.integer("id", minimum=0)
     points = _by_corners(reader) if "corners_base_m" in reader else _by_centre(reader)
+    std = reader.optional_number("std_m", above=0.0)
     reader.finish()
-    return None if points is None else BaseTag(family, number, points)
+    return None if points is None else BaseTag(family, number, points, std)
 
 
 def _by_centre(reader: Reader) -> Array | None:

@@ -10,8 +10,8 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from freeswing.calib.scene.scene_keys import read_scene
-from freeswing.calib.scene.source import SceneSource
+from freeswing.calib.scene.scene_keys import read_scene, read_surveyed
+from freeswing.calib.scene.source import SceneSource, SurveyedPoint
 from freeswing.cdpr.files.documents import InputError, Problems, Reader, inside, load_toml
 from freeswing.cdpr.robot import frozen_array
 from freeswing.cdpr.system.confine import results_folder
@@ -53,6 +53,7 @@ class CalibrationSource:
         recordings: folder with `<camera>.mkv` or `<camera>/*.png`, or None.
         board: the board's `kind` and its numbers as in the file, or None.
         base_tags: surveyed tags that tie the cameras to the base frame.
+        surveyed: surveyed points that do, marked in `points.csv` beside the recordings.
         scene: images of the laboratory at rest, or None.
     """
 
@@ -60,11 +61,20 @@ class CalibrationSource:
     board: Mapping[str, object] | None = None
     base_tags: tuple[BaseTag, ...] = ()
     scene: SceneSource | None = None
+    surveyed: tuple[SurveyedPoint, ...] = ()
 
     @property
     def plumb_line(self) -> Path | None:
         """`plumb_line.csv` beside the recordings, None where there is none."""
-        path = None if self.recordings is None else self.recordings / "plumb_line.csv"
+        return self._beside("plumb_line.csv")
+
+    @property
+    def points(self) -> Path | None:
+        """`points.csv` beside the recordings, None where there is none."""
+        return self._beside("points.csv")
+
+    def _beside(self, name: str) -> Path | None:
+        path = None if self.recordings is None else self.recordings / name
         return path if path is not None and path.is_file() else None
 
 
@@ -234,12 +244,13 @@ def _read_calibration(reader: Reader, paths: _Paths) -> CalibrationSource:
     table = reader.child("board", required=False)
     board = None if table is None else _read_board(table)
     tags = [read_base_tag(entry) for entry in reader.children("base_tags", required=False)]
+    surveyed = read_surveyed(reader)
     scene = read_scene(reader.child("scene", required=False), paths.optional)
     reader.finish()
     if (recordings is None) != (board is None):
         reader.add("recordings, board", "give both or neither: footage of a board and the board")
     known = tuple(tag for tag in tags if tag is not None)
-    return CalibrationSource(recordings, board, known, scene)
+    return CalibrationSource(recordings, board, known, scene, surveyed)
 
 
 def _read_board(reader: Reader) -> Mapping[str, object]:

@@ -443,7 +443,7 @@ HELD = (
     Held("calib/tags/accept_tag.py", ("_TOO_CROWDED",), f"{TAGS}::test_cells_that_blend"),
     Held(
         "calib/tags/base_tags.py",
-        ("SURVEY_STD_M", "_FLOOR_PX"),
+        ("SURVEY_STD_M",),
         f"{TAGS}::test_corners_of_many_stills_and_their_survey",
     ),
     Held(

@@ -7,7 +7,7 @@ import numpy as np
 from freeswing.calib.camera.camera import Camera
 from freeswing.cdpr.measured.target import Tag
 from freeswing.cdpr.rotation import exp_rotation
-from freeswing.vision.render.patterns import Patch, tag_patch
+from freeswing.vision.render.patterns import Parent, Patch, tag_patch
 from freeswing.vision.render.render_scene import Scene
 
 OPENCV_PARAMS = [900.0, 905.0, 359.5, 287.5, -0.12, 0.05, 0.001, -0.0005]
@@ -50,7 +50,7 @@ def facing(position=(0.0, 0.0, 0.0), yaw=0.0, roll=0.0) -> np.ndarray:
     return pose
 
 
-def tag(tag_id=0, size_m=0.13, parent="platform", family="tag36h11", **where) -> Patch:
+def tag(tag_id=0, size_m=0.13, parent: Parent = "platform", family="tag36h11", **where) -> Patch:
     """A tag that faces the camera."""
     return tag_patch(family, tag_id, size_m, facing(**where), parent)
 
@@ -104,3 +104,4 @@ class SurveyedTag:
 
     def __init__(self, tag: Tag) -> None:
         self.family, self.id, self.corners_base_m = tag.family, tag.id, tag.corners_platform_m
+        self.std_m: float | None = None

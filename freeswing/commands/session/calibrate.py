@@ -64,7 +64,7 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
         frame_rate_hz=session.frame_rate_hz,
         kept_boards=session.results / KEPT_BOARDS,
         model=settings["model"],
-        beside=Aids(plumb_line, partial(_swings, session)),
+        beside=Aids(plumb_line, partial(_swings, session), source.surveyed, source.points),
         progress=console.progress,
     )
     checked = settings.get("check_with") and found.refused is None

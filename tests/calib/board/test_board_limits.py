@@ -101,7 +101,7 @@ def test_no_corner_is_better_than_three_thousandths_of_a_pixel(monkeypatch) -> N
 
 @pytest.mark.parametrize(("tags", "known"), [(1, False), (2, True)])
 def test_one_tag_tells_no_pose(tags, known) -> None:
-    tag = SimpleNamespace(family="tag36h11", id=1, corners_platform_m=np.zeros((4, 3)))
+    tag = SimpleNamespace(family="tag36h11", id=1, corners_platform_m=np.zeros((4, 3)), std_m=None)
     target = SimpleNamespace(tags=(tag,) * tags)
     assert (platform_tags(target) is not None) == known
 

@@ -87,9 +87,8 @@ def survey_std(given_m: float, correction_m: float, known: bool) -> float:
         scene=SimpleNamespace(base_points_m=surveyed + correction_m),
         covariance=np.eye(12) * (0.0 if known else given_m**2),
     )
-    return survey_noise.survey_std(
-        result, SimpleNamespace(points_base_m=surveyed, std_m=np.full(4, given_m))
-    )
+    fixed = SimpleNamespace(points_base_m=surveyed, std_m=np.full(4, given_m))
+    return survey_noise.survey_std(result, fixed, np.ones(4, dtype=bool))
 
 
 @pytest.mark.parametrize(

@@ -67,6 +67,7 @@ class Tag:
     family: str
     id: int
     corners_base_m: np.ndarray
+    std_m: float | None = None
 
 
 def film(folder, cameras, count, seed=3):

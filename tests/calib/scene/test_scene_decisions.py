@@ -210,7 +210,7 @@ def test_few_points_warn_and_very_few_refuse(made, points, refuses) -> None:
     ("text", "said"),
     [
         ("image,u_px\n", "line 1: no column point, v_px"),
-        ("image,point,u_px,v_px\ncam9,A,1,2\n", "line 2: image 'cam9' is none of the scene's"),
+        ("image,point,u_px,v_px\ncam9,A,1,2\n", "line 2: image 'cam9' is none of them: cam0"),
         ("image,point,u_px,v_px\ncam0,Z,1,2\n", "line 2: point 'Z' is in no surveyed point"),
         ("image,point,u_px,v_px\ncam0,A,x,2\n", "line 2: u_px, v_px or std_px is not a number"),
         ("image,point,u_px,v_px,std_px\ncam0,A,1,2,0\n", "line 2: u_px, v_px must be pixels"),

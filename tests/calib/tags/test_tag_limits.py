@@ -108,7 +108,7 @@ def base_tag(monkeypatch, shift_px: float = 0.0, noise_px: float = 0.0):
     corners = 50.0 * np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
     seen = {0: [(corners, noise_px), (corners + np.array([shift_px, 0.0]), noise_px)]}
     monkeypatch.setattr(base_tags, "_tags_of_camera", lambda *_: seen)
-    tag = SimpleNamespace(family="tag36h11", id=1, corners_base_m=np.zeros((4, 3)))
+    tag = SimpleNamespace(family="tag36h11", id=1, corners_base_m=np.zeros((4, 3)), std_m=None)
     return base_tags.find_base_tags((VIEW,), [[]], [tag], np.array([0.5]))
 
 
@@ -119,5 +119,5 @@ def test_a_surveyed_tag_that_moved(monkeypatch, shift_px, moved) -> None:
 
 def test_corners_of_many_stills_and_their_survey(monkeypatch) -> None:
     fixed = base_tag(monkeypatch).fixed
-    np.testing.assert_allclose(fixed.std_scale, 0.01 / 0.5, rtol=0.1)
+    np.testing.assert_allclose(fixed.std_scale, 0.003 / 0.5, rtol=0.1)
     np.testing.assert_allclose(fixed.std_m, 3e-4, rtol=0.1)
