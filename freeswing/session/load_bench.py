@@ -143,6 +143,7 @@ def _load_run(
         window_s=run.window_s,
         payloads=run.payloads,
         loads=run.loads,
+        level_std_rad=run.level_std_rad,
     )
 
 

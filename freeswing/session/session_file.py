@@ -92,6 +92,7 @@ class Run:
         window_s: start and end of the free motion, or None: found by the program.
         payloads: known masses on the platform.
         loads: objects to be measured, as they lie on it.
+        level_std_rad: how well a level on the platform showed it to hang level, on two wires.
     """
 
     name: str
@@ -103,6 +104,7 @@ class Run:
     window_s: tuple[float, float] | None = None
     payloads: tuple[KnownBody, ...] = ()
     loads: tuple[Placed, ...] = ()
+    level_std_rad: float | None = None
 
     def __post_init__(self) -> None:
         if self.cable_lengths_m is not None:
@@ -298,6 +300,7 @@ def _read_run(reader: Reader, paths: _Paths) -> Run:
     lengths_std = reader.optional_number("cable_lengths_std_m", above=0.0)
     window = reader.optional_vector("window_s", 2)
     payloads, loads = read_payloads(reader), read_placed(reader)
+    level = reader.optional_number("level_std_rad", above=0.0)
     reader.finish()
     if name and not _is_file_stem(name):
         why = ": letters, digits, . _ - only"
@@ -323,6 +326,7 @@ def _read_run(reader: Reader, paths: _Paths) -> Run:
         None if window is None else (float(window[0]), float(window[1])),
         payloads,
         loads,
+        level,
     )
 
 

@@ -28,6 +28,7 @@ from freeswing.ident.bench.priors.body_priors import extent, load_block, platfor
 from freeswing.ident.bench.priors.channel_priors import channel_blocks
 from freeswing.ident.bench.priors.motion_priors import (
     amplitude_block,
+    creep_block,
     loose_coordinates,
     starts_block,
 )
@@ -243,6 +244,7 @@ def _swing(
         riding=tuple(riding),
         known=known,
         loose=loose_coordinates(columns, _lengths(run)),
+        level_std_rad=run.level_std_rad,
     )
 
 
@@ -274,6 +276,8 @@ def _unknowns(
             named = named_sway(bench, runs, place)
             blocks += channel_blocks(channel, swings, glimpses, gains[channel.name], named)
     blocks += zero_blocks(_places(swings), len(runs))
+    if any(isinstance(swing, ModalSwing) for swing in swings):
+        blocks.append(creep_block(len(runs)))
     scaled = reference(bench, runs)
     if scaled is not None:
         blocks.append(amplitude_block(scaled))

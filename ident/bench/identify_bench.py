@@ -148,6 +148,11 @@ def _check(bench: Bench, robot: Robot) -> None:
                 f"run {run.name}: it measures {', '.join(run.coordinates) or 'channels'} alone and "
                 "cable_lengths_m is not given: give the wires' lengths"
             )
+        if run.level_std_rad is not None and robot.n_cables != 2:
+            raise DataError(
+                f"run {run.name}: level_std_rad says how a platform rolls on two wires, and this "
+                f"one hangs on {robot.n_cables}: leave it out"
+            )
         for signal in run.signals:
             if not signal.is_coordinate:
                 check_moves(run.name, signal.column, signal.values)

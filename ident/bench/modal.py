@@ -24,6 +24,7 @@ from freeswing.ident.bench.swing import BenchSwing, Responses
 CHI = 5  # of the pose
 IZZ_SPECIFIC = 5  # of the nine specific numbers
 SQUARE = "amplitude"  # block: true amplitudes squared over those of the assumed gains, (1,)
+CREEP = "creep"  # block of each run: see `SmallMotion`, (1,)
 STEP = 1e-6  # m, m2, ..: a slope is then right to 1e-4 over a hundred radians of phase
 
 
@@ -58,6 +59,9 @@ class SmallMotion:
         rest: about which it oscillates, (6,).
         start: free coordinates and their rates at the first sample, (2 m,).
         start_s: time of it.
+        lasts_s: from there to the last sample.
+        creep: what the frequency changes by at the run's end beside what decay makes of it, in
+            units of what it changed by with amplitude at the start.
     """
 
     small: Small
@@ -65,6 +69,8 @@ class SmallMotion:
     rest: Array
     start: Array
     start_s: float
+    lasts_s: float = 1.0
+    creep: float = 0.0
 
     @property
     def zetas(self) -> Array:
@@ -89,17 +95,19 @@ class SmallMotion:
         return (self.rest + (falls * waves) @ small.shapes.T @ self.free.T,)
 
     def _early(self, since: Array, places: Array, rates: Array) -> Array:
-        """By how much yaw is early: its frequency's change at the run's mean squared amplitude.
+        """By how much yaw is early, s: its frequency goes with the square of what is left of it.
 
-        Within a run the frequency is held constant: it creeps by more than decay explains (sway
-        that comes and goes, air), and a gain that followed it would be set by that.
+        It creeps by more than decay explains (sway that comes and goes, other laws of drag): by how
+        much is each run's own, or the gain would be set by that.
         """
         small = self.small
         turn = (self.free @ small.shapes[:, small.yaw])[CHI]
         square = places[small.yaw] ** 2 + (rates[small.yaw] / small.omegas[small.yaw]) ** 2
-        lasts = 2.0 * small.decays[small.yaw] * float(since.max(initial=0.0))
-        left = 1.0 if abs(lasts) < 1e-9 else -np.expm1(-lasts) / lasts
-        return np.asarray(small.bent * turn**2 * square * left * since)
+        twice = 2.0 * small.decays[small.yaw]
+        flat = abs(twice) * self.lasts_s < 1e-9
+        spent = since if flat else -np.expm1(-twice * since) / twice
+        crept = self.creep * since * (since - self.lasts_s) / self.lasts_s
+        return np.asarray(small.bent * turn**2 * square * (spent + crept))
 
 
 def small_oscillations(
@@ -174,7 +182,7 @@ class ModalSwing(BenchSwing):
             small = self._small(specific(total), self.lengths(values), values["effects"])
         except (ValueError, np.linalg.LinAlgError) as error:
             raise ValueError(f"run {self.name}: {error}") from error
-        return self._motion(_rescaled(small, values), values["start"])
+        return self._motion(_rescaled(small, values), values["start"], _creep(values))
 
     def _changes(  # type: ignore[override]
         self, motion: SmallMotion, values: Mapping[str, Array]
@@ -190,13 +198,20 @@ class ModalSwing(BenchSwing):
 
             state[SQUARE] = np.zeros((12, 1))
             pose[SQUARE] = _slopes(poses, values[SQUARE])
+        if CREEP in values:
+            state[CREEP] = np.zeros((12, 1))
+            pose[CREEP] = _slopes(
+                lambda one: replace(motion, creep=float(one[0])).at(self.times_s)[0], values[CREEP]
+            )
         return state, pose
 
     def _small(self, inertia: Array, lengths_m: Array, drag: Array) -> Small:
         return small_oscillations(self.model, self.rest, self.chart.free, lengths_m, inertia, drag)
 
-    def _motion(self, small: Small, start: Array) -> SmallMotion:
-        return SmallMotion(small, self.chart.free, self.rest, start, self.span_s[0])
+    def _motion(self, small: Small, start: Array, creep: float) -> SmallMotion:
+        first_s, last_s = self.span_s
+        asked = self.chart.free, self.rest, start, first_s, last_s - first_s
+        return SmallMotion(small, *asked, creep)
 
     def _responses(  # type: ignore[override]
         self, motion: SmallMotion, values: Mapping[str, Array]
@@ -206,10 +221,10 @@ class ModalSwing(BenchSwing):
 
         def poses(inertia: Array, lengths_m: Array, drag: Array, start: Array) -> Array:
             small = _rescaled(self._small(inertia, lengths_m, drag), values)
-            return self._motion(small, start).at(self.times_s)[0]
+            return self._motion(small, start, motion.creep).at(self.times_s)[0]
 
         def poses_of_start(numbers: Array) -> Array:
-            return self._motion(motion.small, numbers).at(self.times_s)[0]
+            return replace(motion, start=numbers).at(self.times_s)[0]
 
         by_pose = Responses(
             _slopes(poses_of_start, start),
@@ -229,6 +244,10 @@ def _rescaled(small: Small, values: Mapping[str, Array]) -> Small:
     if SQUARE not in values:
         return small
     return replace(small, bent=small.bent * float(values[SQUARE][0]))
+
+
+def _creep(values: Mapping[str, Array]) -> float:
+    return float(values[CREEP][0]) if CREEP in values else 0.0
 
 
 def _slopes(poses: Callable[[Array], Array], about: Array, flat: int = 0) -> Array:

@@ -98,6 +98,7 @@ class BenchRun:
         window_s: the free motion, or None: all of it, or as found.
         payloads: known bodies on the platform.
         loads: objects to be measured on it.
+        level_std_rad: how well it was seen to hang level at rest, on two wires, or None.
     """
 
     name: str
@@ -109,6 +110,7 @@ class BenchRun:
     window_s: tuple[float, float] | None = None
     payloads: tuple[KnownBody, ...] = ()
     loads: tuple[Placed, ...] = ()
+    level_std_rad: float | None = None
 
     @property
     def coordinates(self) -> tuple[str, ...]:

@@ -19,6 +19,7 @@ from freeswing.ident.bench.priors.wire_priors import UNSTATED_LENGTH_STD_M
 from freeswing.ident.bench.runs import Bench
 from freeswing.ident.bench.scatter import WIDE_SCATTER, scatter_block, scatter_std
 from freeswing.ident.bench.swing import COMMON, IZZ, BenchSwing
+from freeswing.ident.bench.two_wires.free_roll import freed, rolls_unseen
 from freeswing.ident.likelihood.fit import Solution, fit
 from freeswing.ident.likelihood.fit_blocks import Dense
 from freeswing.ident.likelihood.unknowns import Unknowns
@@ -96,6 +97,16 @@ def solved(model: Model, bench: Bench, start: Assembled) -> Solved:
     swings = rescaled(swings, found, fastest_hz, coloured=True)
     found = fit(swings, found.unknowns, FINE)
     swings = rescaled(swings, found, fastest_hz, coloured=True)
+    first, more = start.unknowns, None
+    if rolls_unseen(model, held):
+        more = freed(model, swings, _without_scatter(found.unknowns), held, first)
+    if more is not None:
+        held, first = {}, more.first
+        swings = rescaled(swings, more.solution, fastest_hz, coloured=True)
+        known = more.solution.unknowns
+        if scattering:
+            known = known.joined(scatter_block(len(swings), izz, WIDE_SCATTER * izz))
+        found = fit(swings, known, FINE)
     tau, kept = 0.0, found.unknowns
     if scattering:
         tau = scatter_std(found)
@@ -105,15 +116,28 @@ def solved(model: Model, bench: Bench, start: Assembled) -> Solved:
     wires = _wires(found, start) if sway else None
     if wires is not None and not wires.contradicted:
         found = fit(swings, _pinned(found.unknowns, COMMON), FINE)
-    freed = found
+    unweighed = found
     found, mass = weighed_mass(bench, model, swings, found, start, FINE)
-    change = doubt(freed, mass)
+    change = doubt(unweighed, mass)
     right = _who_is_right(found, wires) + np.outer(change, change)
     found = considered(swings, found, held)
+    if more is not None:
+        right = right + _padded(more.between, len(right))
     found = replace(found, covariance=found.covariance + right)
-    names = (block.name for block in freed.unknowns.shared)
-    doubts = {name: change[freed.unknowns.columns(name)] for name in names}
-    return Solved(found, swings, start.unknowns, tau, mass, wires, held, fastest_hz, doubts)
+    names = (block.name for block in unweighed.unknowns.shared)
+    doubts = {name: change[unweighed.unknowns.columns(name)] for name in names}
+    return Solved(found, swings, first, tau, mass, wires, held, fastest_hz, doubts)
+
+
+def _without_scatter(unknowns: Unknowns) -> Unknowns:
+    return unknowns.without("scatter") if "scatter" in unknowns else unknowns
+
+
+def _padded(covariance: Array, size: int) -> Array:
+    """A covariance of the first unknowns as one of all: scatter stands last."""
+    found = np.zeros((size, size))
+    found[: len(covariance), : len(covariance)] = covariance
+    return found
 
 
 def _wires(found: Solution, start: Assembled) -> WiresVerdict:

@@ -19,6 +19,7 @@ from freeswing.ident.bench.channels import Channel
 from freeswing.ident.bench.chart import Chart
 from freeswing.ident.bench.from_rest import from_rest, from_rest_slope
 from freeswing.ident.bench.objects import moments, moments_slope, specific, specific_slope
+from freeswing.ident.bench.two_wires.level import lean
 
 TOLERANCE_M = 1e-7  # a thousandth of the best tracks' noise
 IZZ = 6  # of the ten moments
@@ -115,6 +116,7 @@ class BenchSwing:
         loose: how far from rest each coordinate may start, (6,); infinite where it is measured.
         place: of the run among those of the fit.
         acting: effects beside drag, in a model that has them.
+        level_std_rad: how well it was seen to hang level, on two wires; None: nobody looked.
     """
 
     name: str
@@ -130,6 +132,7 @@ class BenchSwing:
     loose: Array
     place: int = 0
     acting: tuple[Acting, ...] = ()
+    level_std_rad: float | None = None
 
     @property
     def span_s(self) -> tuple[float, float]:
@@ -184,7 +187,7 @@ class BenchSwing:
         """Whitened prediction minus measurement of all known samples, (m,)."""
         moved = motion.at(self.times_s)[0]
         off = [self._off(column, moved, values) for column in self.columns]
-        return np.concatenate([*off, self._astray(motion)])
+        return np.concatenate([*off, self._astray(motion), self._leaning(values)[0]])
 
     def linearised(
         self, values: Mapping[str, Array], motion: Motion
@@ -208,6 +211,9 @@ class BenchSwing:
         off.append(self._astray(motion))
         _, places, spread = self._reach()
         rows.append({name: part[places] / spread[:, None] for name, part in state.items()})
+        leaning, by_total = self._leaning(values)
+        off.append(leaning)
+        rows.append(self._by_body(by_total, values))
         names = {name for row in rows for name in row}
         stacked = {
             name: np.vstack(
@@ -233,6 +239,13 @@ class BenchSwing:
         state = np.concatenate([motion.zetas[0], motion.rates[0]])
         rest, places, spread = self._reach()
         return np.asarray((state[places] - rest) / spread)
+
+    def _leaning(self, values: Mapping[str, Array]) -> tuple[Array, Array]:
+        """Roll at rest where a level showed none, whitened, (1,); its slope by moments, (1, 10)."""
+        if self.level_std_rad is None:
+            return np.zeros(0), np.zeros((0, 10))
+        off, slope = lean(self.total(values), self.model.robot)
+        return np.array([off]) / self.level_std_rad, slope[None] / self.level_std_rad
 
     def predicted(self, column: Column, zetas: Array, values: Mapping[str, Array]) -> Array:
         """What a column would read along poses (n, 6), (n,)."""
@@ -306,11 +319,16 @@ class BenchSwing:
         if "wires_each" in values:
             found["wires_each"] = answer.lengths
         total = answer.inertia @ specific_slope(self.total(values))
+        return found | self._by_body(total, values)
+
+    def _by_body(self, by_total: Array, values: Mapping[str, Array]) -> dict[str, Array]:
+        """Slopes by all that swings from one by its moments, (.., 10)."""
+        found: dict[str, Array] = {}
         for one in self.riding:
             part = moments_slope(values[one.block], one.turn, one.shift_m)
-            found[one.block] = found.get(one.block, 0.0) + total @ part
+            found[one.block] = found.get(one.block, 0.0) + by_total @ part
         if "scatter" in values:
             only = np.zeros((10, len(values["scatter"])))
             only[IZZ, self.place] = 1.0
-            found["scatter"] = total @ only
+            found["scatter"] = by_total @ only
         return found

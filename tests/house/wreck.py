@@ -375,6 +375,11 @@ HELD = (
     Held("ident/bench/told/classic.py", ("LEAST_PERIODS", "LEANING_PERCENT"), BENCH),
     Held("ident/bench/told/report_objects.py", ("RESTS_ON_PRIOR", "TELLS_NOTHING"), BENCH),
     Held("ident/bench/told/rolled.py", ("ROLLED_RAD",), "tests/ident/bench/test_rolled.py"),
+    Held(
+        "ident/bench/two_wires/free_roll.py",
+        ("MIDDLE_MOMENT", "WIDE_MOMENT", "LEAST_MOMENT", "ASIDE"),
+        "tests/ident/bench/two_wires/test_free_roll.py",
+    ),
     Held("ident/bench/channels.py", ("LEAST_OVER_NOISE",), BENCH),
     Held("ident/bench/diagnose/removal.py", ("SURE",), BENCH_DIAGNOSE),
     Held("ident/bench/diagnose/diagnose.py", ("LEAST_RUNS",), BENCH_DIAGNOSE),
@@ -589,7 +594,7 @@ HELD = (
     Held(
         "ident/bench/priors/motion_priors.py",
         (
-            "TWICE_AS_WIDE", "SWAY_RAD", "UNSEEN_RAD", "SEEN_RAD",
+            "TWICE_AS_WIDE", "CREEPS", "SWAY_RAD", "UNSEEN_RAD", "SEEN_RAD",
         ),
         PRIORS,
     ),

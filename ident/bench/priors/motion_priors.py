@@ -11,11 +11,12 @@ from freeswing.ident.bench.channels import Channel
 from freeswing.ident.bench.first_guesses import (
     Glimpse,
 )
-from freeswing.ident.bench.modal import SQUARE
+from freeswing.ident.bench.modal import CREEP, SQUARE
 from freeswing.ident.bench.swing import BenchSwing, Column
 from freeswing.ident.likelihood.unknowns import Gaussian, Unknown
 
 TWICE_AS_WIDE = 3.0  # of squared amplitude: a twist of twice the usual is one deviation off
+CREEPS = 0.5  # of what amplitude changes yaw's frequency by: sway that is half as strong as yaw
 SWAY_RAD = 0.02  # unseen sway after a twist by hand: a degree
 UNSEEN_RAD = 0.3  # an angle that no column measures directly
 SEEN_RAD = 0.5  # where it is measured the samples say all: nothing is assumed
@@ -30,6 +31,12 @@ def amplitude_block(channel: Channel) -> Unknown:
     prior = Gaussian(np.ones(1), np.full(1, wide), "gains" if main in channel.gains else "a twist")
     low = np.full(1, 1e-3)
     return Unknown(SQUARE, np.ones(1), np.full(1, min(1.0, wide)), prior, low=low)
+
+
+def creep_block(runs: int) -> Unknown:
+    """How yaw's frequency creeps in each run beside its decay: see `SmallMotion`."""
+    prior = Gaussian(np.zeros(1), np.full(1, CREEPS), "sway that comes and goes")
+    return Unknown(CREEP, np.zeros((runs, 1)), np.full(1, CREEPS), prior, each_run=True)
 
 
 def starts_block(swings: Sequence[BenchSwing], glimpses: Sequence[Glimpse]) -> Unknown:

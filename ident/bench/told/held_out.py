@@ -11,6 +11,7 @@ import numpy as np
 from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.robot import Array
 from freeswing.ident.bench.assemble import assembled
+from freeswing.ident.bench.modal import CREEP
 from freeswing.ident.bench.noise import column_residuals
 from freeswing.ident.bench.runs import Bench, BenchRun
 from freeswing.ident.bench.solve import Solved
@@ -128,6 +129,7 @@ def _known(unknowns: Unknowns, found: Solution, swing: BenchSwing) -> Unknowns:
     effects = np.median(found.value("effects"), axis=0)
     told["effects"] = np.tile(effects, (1, 1))
     held = [block.name for block in unknowns.shared] + ["effects", "wires_each"]
+    held += [CREEP] if CREEP in unknowns else []  # it says nothing of the second half
     acting = [one.block for one in swing.acting]
     more = [found.unknowns.block(name) for name in acting]
     return unknowns.moved(told).held(*held).joined(*more).held(*acting)

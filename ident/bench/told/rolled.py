@@ -40,6 +40,8 @@ def rolled_sentences(solved: Solved, runs: Sequence[BenchRun]) -> list[str]:
         if largest.what in {ACROSS.format(name=one) for one in (name, "the platform")}:
             share = 100.0 * largest.std_kg_m2 / abs(float(value[6]))
             posed = all(runs[k].coordinates == POSE_COORDINATES for k in mine)
+            if all(runs[k].level_std_rad is not None for k in mine):
+                continue
             if not posed or _rolled(solved, mine[0]) > ROLLED_RAD:
                 found.append(_sentence(solved, name, mine[0], share, posed))
     return found
@@ -59,7 +61,8 @@ def _sentence(solved: Solved, name: str, index: int, share: float, posed: bool) 
         f"move it by {1e3 * shift[0]:+.1f} mm along x and {1e3 * shift[1]:+.1f} mm along y, where "
         "all hangs level"
         if posed
-        else "lay it so that a spirit level on the platform shows level"
+        else "lay it so that a spirit level on the platform shows level, and say in these runs how "
+        "well (level_std_rad)"
     )
     push = ", or give one run a push that rolls it by some degrees" if posed else ""
     return (

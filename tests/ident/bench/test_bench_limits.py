@@ -22,6 +22,8 @@ from freeswing.ident.bench.told.classic import BESIDE, ClassicRun, leaning_sente
 from freeswing.ident.bench.told.report_objects import _in_true_scale, told_object
 from freeswing.ident.likelihood.unknowns import Gaussian, Unknown, Unknowns
 
+TRIFILAR = SimpleNamespace(robot=SimpleNamespace(n_cables=3))
+
 
 def body(mass_std: float, prior_std: float = 0.1) -> SimpleNamespace:
     """A fit of a platform of 5 kg whose other numbers are held."""
@@ -65,7 +67,7 @@ def test_scatter_is_looked_for_between_enough_runs(monkeypatch, runs, looked) ->
     monkeypatch.setattr(solve, "replace", lambda found, **_: found)
     monkeypatch.setattr(solve, "scatter_std", lambda found: asked.append(1) or 0.0)
     start = SimpleNamespace(swings=tuple(range(runs)), unknowns=blocks, runs=[none] * runs)
-    solve.solved(None, Bench(()), start)
+    solve.solved(TRIFILAR, Bench(()), start)
     assert bool(asked) == looked
 
 

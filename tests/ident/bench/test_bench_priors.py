@@ -16,7 +16,11 @@ from freeswing.ident.bench.channels import Channel
 from freeswing.ident.bench.priors import wire_priors
 from freeswing.ident.bench.priors.body_priors import platform_block, wide_body
 from freeswing.ident.bench.priors.channel_priors import channel_blocks, gain_spread
-from freeswing.ident.bench.priors.motion_priors import amplitude_block, loose_coordinates
+from freeswing.ident.bench.priors.motion_priors import (
+    amplitude_block,
+    creep_block,
+    loose_coordinates,
+)
 from freeswing.ident.bench.runs import Bench, BenchRun, KnownBody, Signal
 from freeswing.ident.bench.swing import COMMON
 from freeswing.ident.likelihood.unknowns import Gaussian, Unknown, Unknowns
@@ -25,6 +29,7 @@ TIMES = np.linspace(0.0, 1.0, 11)
 RADIUS_M = 0.25
 ENDS = RADIUS_M * np.array([[1.0, 0.0, 0.0], [-0.5, 0.75**0.5, 0.0], [-0.5, -(0.75**0.5), 0.0]])
 MASS_KG = 2.0
+TRIFILAR = SimpleNamespace(robot=SimpleNamespace(n_cables=3))
 BODY = np.array([MASS_KG, 0.0, 0.0, 0.0, 0.03, 0.03, 0.04, 0.0, 0.0, 0.0])
 
 
@@ -119,6 +124,13 @@ def test_a_twist_of_twice_the_usual_is_one_deviation_off() -> None:
     assert prior.std[0] == pytest.approx(2.0**2 - 1.0, rel=0.15)
 
 
+def test_yaw_may_creep_by_what_sway_of_half_its_energy_does() -> None:
+    """Energy sets the frequency as the amplitude's square does: half of it may come or go."""
+    prior = creep_block(3).prior
+    assert prior is not None
+    assert prior.std[0] == pytest.approx(0.5, rel=0.15)
+
+
 def test_what_no_column_shows_stays_small() -> None:
     """Sway by a degree of the wires' length, an angle by 17 degrees; what is seen is free."""
     loose = loose_coordinates((SimpleNamespace(coordinate=5),), np.full(3, 1.5))
@@ -200,7 +212,7 @@ def test_a_run_whose_izz_is_a_hundredth_off_is_lost(monkeypatch) -> None:
     monkeypatch.setattr(solve, "scatter_std", lambda found: 0.0)
     none = SimpleNamespace(coordinates=(), signals=())
     ready = SimpleNamespace(swings=tuple(range(5)), unknowns=known, runs=[none] * 5)
-    solve.solved(None, Bench(()), ready)
+    solve.solved(TRIFILAR, Bench(()), ready)
     priors = [b.prior for one in asked for b in one.blocks if b.name == "scatter"]
     assert priors, "it was looked for"
     assert priors[0].std[0] == pytest.approx(0.01 * 5.0, rel=0.15)

@@ -1,0 +1,151 @@
+"""Two wires leave roll free, and roll pulls at yaw: yaw alone then tells most of every body.
+
+What no run measures is held at first (`ident/bench/held_uncertain.py`). From there it is fitted, as
+the numbers of a body that can be, from either side on which the platform's centre of mass may
+lie: seen by yaw alone a bench and its mirror image look much alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from freeswing.cdpr.model.equations import Model
+from freeswing.cdpr.robot import Array, Robot
+from freeswing.ident.bench.held_uncertain import Held
+from freeswing.ident.bench.swing import BenchSwing
+from freeswing.ident.likelihood.fit import Solution, fit
+from freeswing.ident.likelihood.fit_blocks import Dense
+from freeswing.ident.likelihood.unknowns import Gaussian, Unknown, Unknowns
+
+MIDDLE_MOMENT = 0.8  # of Izz: half of it by width, the rest by height
+WIDE_MOMENT = 1.0  # likewise: up to a cylinder twice as high as wide, or nearly a rod
+LEAST_MOMENT = 0.02  # likewise: a rod of a seventh of its length
+ASIDE = 0.5  # of what is believed of a centre of mass: where a start lies on either side
+ROUGH = Dense(steps=60, tolerance=3.0)
+FINE = Dense(steps=60, tolerance=0.1)
+
+
+@dataclass(frozen=True, slots=True)
+class Freed:
+    """A fit of all that was held.
+
+    Attributes:
+        solution: the likeliest.
+        first: its unknowns as they were before: what is believed of a body.
+        between: covariance (p, p) of its shared unknowns by what else is nearly as likely.
+    """
+
+    solution: Solution
+    first: Unknowns
+    between: Array
+
+
+def rolls_unseen(model: Model, held: Held) -> bool:
+    """Whether the platform is free to roll, and numbers are held that its roll would show."""
+    return model.robot.n_cables == 2 and any(mask[1:].any() for mask in held.values())
+
+
+def freed(
+    model: Model, swings: Sequence[BenchSwing], found: Unknowns, held: Held, first: Unknowns
+) -> Freed | None:
+    """Fit all that is held, from where the others came to lie.
+
+    Args:
+        model: of the bench.
+        swings: with the noise of the fit so far.
+        found: its unknowns.
+        held: which are held, by block.
+        first: the unknowns before any fit.
+
+    Returns:
+        None where no start led to a minimum.
+
+    Source:
+        Bishop 2006, Pattern Recognition and Machine Learning, sec. 4.4 and 2.3.9: each minimum a
+        normal density, and their mixture.
+    """
+    for name, mask in held.items():
+        believed = possible_body(found.block(name), mask)
+        found = found.exchanged(believed).estimating(name, mask)
+        first = first.known(name, believed.prior)
+    ends = []
+    for start in sides(model.robot, found):
+        try:
+            ends.append(fit(swings, start, ROUGH))
+        except (ValueError, np.linalg.LinAlgError):
+            continue
+    ends = [one for one in ends if one.converged]
+    if not ends:
+        return None
+    least = min(ends, key=lambda one: one.cost)
+    best = fit(swings, least.unknowns, FINE)
+    if not best.converged:
+        return None
+    others = [one for one in ends if one is not least]
+    return Freed(best, first, between(best, others))
+
+
+def possible_body(block: Unknown, held: Array) -> Unknown:
+    """A body with what is believed of its held moments: by the one that yaw shows.
+
+    Yaw shows the moment about the vertical, Izz; across, a body that has it may have anything from
+    a rod's to a tower's, and never less than nothing.
+
+    Args:
+        block: of the body, as far as it is known.
+        held: which of its ten numbers no run tells, (10,).
+
+    Source:
+        Featherstone 2008, Rigid Body Dynamics Algorithms, sec. 2.13: moments of a body are sums of
+        two positive second moments each.
+    """
+    shown = block.value[4:7][~held[4:7]]
+    if block.prior is None or not len(shown) or not held[4:7].any():
+        return block
+    moments = np.isin(np.arange(10), (4, 5, 6)) & held
+    size = float(np.abs(shown).max())
+    mean = np.where(moments, MIDDLE_MOMENT * size, block.prior.mean)
+    std = np.where(moments, WIDE_MOMENT * size, block.prior.std)
+    value = np.where(moments, MIDDLE_MOMENT * size, block.value)
+    low = np.where(moments, LEAST_MOMENT * size, np.asarray(block.low))
+    prior = Gaussian(mean, std, "a body that can be")
+    return replace(block, value=value, prior=prior, low=low)
+
+
+def sides(robot: Robot, unknowns: Unknowns) -> list[Unknowns]:
+    """The platform's centre of mass on either side of the line of the wires' lower ends."""
+    block = unknowns.block("platform")
+    if block.prior is None:
+        return [unknowns]
+    line = robot.attachments_m[1] - robot.attachments_m[0]
+    across = np.cross(robot.gravity_m_s2, line)
+    across = across / np.linalg.norm(across)
+    step = ASIDE * np.linalg.norm(block.prior.std[1:4] * across) * across
+    found = []
+    for side in (-1.0, 1.0):
+        value = np.array(block.value)
+        value[1:4] += side * step
+        found.append(unknowns.moved({"platform": value}))
+    return found
+
+
+def between(best: Solution, others: Sequence[Solution]) -> Array:
+    """What other minima, each as likely as its cost says, add to the best one's covariance.
+
+    Source:
+        Bishop 2006, Pattern Recognition and Machine Learning, sec. 2.3.9: a mixture's spread.
+    """
+    here = _shared(best)
+    added = np.zeros((len(here), len(here)))
+    for other in others:
+        odds = float(np.exp(-0.5 * max(other.cost - best.cost, 0.0)))
+        off = _shared(other) - here
+        added += odds / (1.0 + odds) * np.outer(off, off)
+    return added
+
+
+def _shared(solution: Solution) -> Array:
+    return np.concatenate([block.value for block in solution.unknowns.shared])
