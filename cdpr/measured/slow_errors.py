@@ -18,6 +18,7 @@ Array = NDArray[np.float64]
 
 # Who knows a run's frame beforehand, where that is what its poses state and no common tolerance.
 STATED_BY_RUN = "what each run's poses state"
+BESIDE_STATED = "what each run's poses state, and what frames differ by beside it"
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from freeswing.cdpr.files.documents import DataError
-from freeswing.cdpr.model.equations import Model
-from freeswing.cdpr.robot import Array
+from freeswing.cdpr.measured.slow_errors import BESIDE_STATED
+from freeswing.cdpr.model.equations import Model, build_model
+from freeswing.cdpr.robot import Array, Robot
 from freeswing.ident.diagnose.outstanding_runs import tempered
 from freeswing.ident.diagnose.spectrum import residual_powers
 from freeswing.ident.judge.consistency import is_possible
@@ -36,6 +37,26 @@ SAME_FIT = 0.1
 # What an effect leaves is small beside the swings; what a fit in the wrong valley leaves is not.
 SMALL_BESIDE_SWINGS = 0.25
 AT_THE_NOISE = 2.0
+FRAME = "platform_frame"
+
+
+def with_frames(robot: Robot, nuisances: tuple[str, ...]) -> Model:
+    """The declared model with nuisances of what is measured, each run's own.
+
+    Frames differ from run to run by what the poses state, and by the robot's tolerance beside it,
+    as where lengths are judged: while effects are missing, what the layout has wrong in all runs
+    has no other place, and a frame held to what is stated bends the inertia instead.
+
+    Args:
+        robot: as declared.
+        nuisances: names of effects on what is measured.
+    """
+    model = build_model(robot, nuisances)
+    parameters = tuple(
+        replace(one, source=BESIDE_STATED) if name.startswith(f"{FRAME}.") else one
+        for name, one in zip(model.names, model.parameters, strict=True)
+    )
+    return replace(model, parameters=parameters)
 
 
 def base_fit(

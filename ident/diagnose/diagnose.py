@@ -34,7 +34,7 @@ from freeswing.ident.diagnose.decision import (
     excess_of,
     left_out,
 )
-from freeswing.ident.diagnose.declared_model import base_fit, refuse_few
+from freeswing.ident.diagnose.declared_model import base_fit, refuse_few, with_frames
 from freeswing.ident.diagnose.heldout import HeldOut, held_out
 from freeswing.ident.diagnose.lengths.wrong_places import Kinematics
 from freeswing.ident.diagnose.refit import Refit
@@ -174,7 +174,7 @@ def diagnose(
     considered = tuple(name for name in names if name not in barred)
     starts = likelihood_starts(model, prepared, tuple(one.values for one in by_fidim.values()))
     base, fitted, dropped = base_fit(
-        build_model(robot, nuisances if full else ()),
+        with_frames(robot, nuisances if full else ()),
         fitted,
         free,
         starts,

@@ -13,7 +13,7 @@ import numpy as np
 
 from freeswing.cdpr.effects import effect_named
 from freeswing.cdpr.measured.pose_errors import PoseErrors
-from freeswing.cdpr.measured.slow_errors import STATED_BY_RUN, SlowErrors
+from freeswing.cdpr.measured.slow_errors import BESIDE_STATED, STATED_BY_RUN, SlowErrors
 from freeswing.cdpr.model.batch import evaluate, moved_columns, with_jacobian
 from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.model.free_motion import coordinate_indices
@@ -244,17 +244,31 @@ def own_prior(motion: Motion, samples: Samples) -> Array:
     return _own_whitener(motion.model, samples) @ motion.values[motion.model.own_values]
 
 
-def _own_whitener(model: Model, samples: Samples) -> Array:
-    """Turns a run's own effect values into independent ones of unit deviation, (o, o).
+def own_covariance(model: Model, samples: Samples) -> Array:
+    """What is known of a run's own effect values beforehand, as their covariance, (o, o).
 
-    A frame that is said to be known as a run states it is known so where the run does.
+    A frame that is said to be known as a run states it is known so where the run does; one that is
+    said to differ by more, by so much beside it.
+
+    Source:
+        JCGM 100:2008, Guide to the Expression of Uncertainty in Measurement, sec. 5.1: independent
+        errors add by their squares.
     """
     places = model.own_values
     known = np.diag([model.parameters[k].prior_std ** 2 for k in places])
-    frame = [i for i, k in enumerate(places) if model.parameters[k].source == STATED_BY_RUN]
-    if frame and samples.slow is not None:
-        known[np.ix_(frame, frame)] = samples.slow.frame_covariance
-    return np.linalg.inv(np.linalg.cholesky(known))
+    if samples.slow is None:
+        return known
+    for source, share in ((STATED_BY_RUN, 0.0), (BESIDE_STATED, 1.0)):
+        frame = [i for i, k in enumerate(places) if model.parameters[k].source == source]
+        if frame:
+            block = np.ix_(frame, frame)
+            known[block] = share * known[block] + samples.slow.frame_covariance
+    return known
+
+
+def _own_whitener(model: Model, samples: Samples) -> Array:
+    """Turns a run's own effect values into independent ones of unit deviation, (o, o)."""
+    return np.linalg.inv(np.linalg.cholesky(own_covariance(model, samples)))
 
 
 def _own_priors(motion: Motion, samples: Samples, directions: int, columns: int) -> Array:
