@@ -369,6 +369,11 @@ HELD = (
         "tests/cdpr/measured/test_sound_samples.py",
     ),
     Held("ident/bench/solve.py", ("LEAST_FOR_SCATTER",), BENCH),
+    Held(
+        "freeswing/doctor/bench_units.py",
+        ("LONGEST", "SHORTEST", "FARTHEST", "HEAVIEST", "WIDEST", "SLOWEST"),
+        "tests/freeswing/doctor/test_bench_units.py",
+    ),
     Held("ident/bench/mass_verdict.py", ("CONTRADICTED", "CHECKING", "GIVES_WAY"), BENCH),
     Held("ident/bench/noise.py", ("BAND", "LEAST_SHARE",), BENCH),
     Held("ident/bench/scatter.py", ("SIGNIFICANT",), BENCH),

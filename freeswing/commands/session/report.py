@@ -109,12 +109,13 @@ def write_report(
     kinds = {"calibrate": "calibration", "track": "tracking", "identify": "identification"}
     kinds |= {"diagnose": "diagnosis"}
     absent = {kinds[name]: why for name, why in (failures or {}).items()}
-    if not any(run.role == "validate" for run in session.runs):
+    robot = _robot(session)
+    if not any(run.role == "validate" for run in session.runs) and not _is_bench(session, robot):
         absent.setdefault("diagnosis", NO_VALIDATION)
     material = read_material(
         session.name,
         session.results,
-        robot=_robot(session),
+        robot=robot,
         folder=str(session.folder),
         left_out=left_out,
         absent=absent,
@@ -130,6 +131,13 @@ NO_VALIDATION = (
     'No run has role = "validate": missing effects are judged on runs that are never fitted, so '
     "freeswing diagnose has nothing to judge by. Give a third of the runs that role."
 )
+
+
+def _is_bench(session: Session, robot: Robot | None) -> bool:
+    """Whether `diagnose` leaves each run out in turn, where none has role validate."""
+    from freeswing.session.load_bench import is_bench
+
+    return robot is not None and is_bench(session, robot)
 
 
 def open_page(page: Path, console: Console) -> None:

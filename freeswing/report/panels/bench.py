@@ -23,7 +23,7 @@ class BenchPanel:
             return None
         changed = changed_objects(material.diagnosis) if material.diagnosis else []
         return {
-            "changed": [{"body": name, "Izz without and with": text} for name, text in changed],
+            "changed": [{"body": name, "without, with": text} for name, text in changed],
             "objects": [
                 {"name": one.name, "rows": [_row(row) for row in one.parameters]}
                 for one in found.objects

@@ -20,14 +20,14 @@ from freeswing.cdpr.robot import INERTIA_NAMES, Array
 from freeswing.ident.bench.objects import specific
 from freeswing.ident.bench.swing import BenchSwing
 
-MASS = "declared mass against the fit's"
-LENGTH = "stated wire length against the fit's"
-UNEQUAL = "wires of different lengths"
-BESIDE = "centre of mass beside the middle: yaw moves it along"
-ROLLS = "products of inertia: it rolls or pitches along"
-LEAN = "wires that lean, or ends that differ above and below"
-AMPLITUDE = "amplitude, and sway: the period changes with them"
-LEFT = "what the fit leaves of the period"
+MASS = "declared mass"
+LENGTH = "stated wire length"
+UNEQUAL = "unequal wires"
+BESIDE = "centre of mass beside the middle"
+ROLLS = "rolling along"
+LEAN = "wires that lean"
+AMPLITUDE = "amplitude and sway"
+LEFT = "what the fit leaves"
 IZZ_SPECIFIC = INERTIA_NAMES.index("Izz_m2")
 PRODUCTS = tuple(INERTIA_NAMES.index(name) for name in ("Ixy_m2", "Ixz_m2", "Iyz_m2"))
 CHI = 5

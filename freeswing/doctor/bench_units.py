@@ -1,0 +1,95 @@
+"""Numbers of a bench that can only be in another unit: no swing shows it, and results hang on it.
+
+Yaw alone tells inertia over wire length: with lengths in cm Izz came out a hundredth, and sure.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from freeswing.cdpr.files.documents import InputError
+from freeswing.cdpr.robot import Robot
+from freeswing.ident.bench.runs import Bench, BenchRun, Signal
+
+LONGEST = 50.0  # wires over their distance from the middle: 12 m at 0.25 m
+SHORTEST = 0.1  # the same: 25 mm at 0.25 m
+FARTHEST = 10.0  # a known mass, or an object's centre, over the wires' distance from the middle
+HEAVIEST = 200.0  # what lies on a platform over the platform
+WIDEST = 2.0  # a platform's motion over its wires' length: it goes round
+SLOWEST = 0.25  # of a pendulum's period between samples: yaw may be four times as fast
+
+
+def refuse_wrong_units(bench: Bench, robot: Robot) -> None:
+    """Refuse lengths, masses, places, positions and times that must be in another unit.
+
+    Raises:
+        InputError: naming run, key or column, number and what it is held against.
+    """
+    ends = robot.attachments_m - robot.attachments_m.mean(axis=0)
+    radius = float(np.sqrt(np.mean(np.sum(ends**2, axis=1))))
+    told = [*_of_loads(bench, robot, radius)]
+    for run in bench.runs:
+        told += [f"run {run.name}: {one}" for one in _of_run(run, robot, radius)]
+    if told:
+        more = f"; and {len(told) - 3} more" if len(told) > 3 else ""
+        raise InputError(f"{'; '.join(told[:3])}{more}: write m, kg, s and rad")
+
+
+def _of_loads(bench: Bench, robot: Robot, radius_m: float) -> Iterator[str]:
+    for load in bench.loads:
+        yield from _of_mass(f"loads {load.name}: mass_kg", load.mass_kg, robot)
+        if load.com_m is not None:
+            yield from _of_place(f"loads {load.name}: com_m", load.com_m, radius_m)
+
+
+def _of_run(run: BenchRun, robot: Robot, radius_m: float) -> Iterator[str]:
+    for payload in run.payloads:
+        yield from _of_mass("payload mass_kg", payload.mass_kg, robot)
+        yield from _of_place("payload position_m", payload.position_m, radius_m)
+    if run.lengths_m is None or not radius_m > 0.0:
+        return
+    length = float(np.mean(run.lengths_m))
+    if not SHORTEST * radius_m <= length <= LONGEST * radius_m:
+        yield (
+            f"cable_lengths_m (session.toml) of {length:.4g} m on wires whose attachment_m "
+            f"(robot.toml) lie {radius_m:.4g} m from their middle: one of them is in another unit"
+        )
+        return
+    for signal in run.signals:
+        yield from _of_positions(signal, length)
+    yield from _of_times(run, length)
+
+
+def _of_mass(what: str, mass_kg: float, robot: Robot) -> Iterator[str]:
+    platform = robot.platform.mass_kg
+    if platform is not None and mass_kg > HEAVIEST * platform:
+        yield f"{what} = {mass_kg:.4g} kg on a platform of {platform:.4g} kg: is it in g?"
+
+
+def _of_place(what: str, place_m: np.ndarray, radius_m: float) -> Iterator[str]:
+    far = float(np.linalg.norm(place_m))
+    if far > FARTHEST * radius_m > 0.0:
+        yield f"{what} is {far:.4g} m from P, the wires {radius_m:.4g} m from their middle: in mm?"
+
+
+def _of_positions(signal: Signal, length_m: float) -> Iterator[str]:
+    known = signal.values[np.isfinite(signal.values)]
+    if signal.column in ("x", "y", "z") and len(known) and np.ptp(known) > WIDEST * length_m:
+        yield (
+            f"column {signal.column}_m goes over {float(np.ptp(known)):.4g} m, on wires of "
+            f"{length_m:.4g} m: is it in mm?"
+        )
+
+
+def _of_times(run: BenchRun, length_m: float) -> Iterator[str]:
+    if len(run.times_s) < 3:
+        return
+    apart = float(np.median(np.diff(run.times_s)))
+    period = 2.0 * np.pi * float(np.sqrt(length_m / 9.81))
+    if apart > SLOWEST * period:
+        yield (
+            f"column t_s: samples are {apart:.4g} s apart, and wires of {length_m:.4g} m sway in "
+            f"{period:.2g} s: is it in ms, or were samples left out?"
+        )

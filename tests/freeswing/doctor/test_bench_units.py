@@ -1,0 +1,77 @@
+"""Numbers of a bench in another unit are named before a fit: both sides of each limit."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from freeswing.cdpr.files.documents import InputError
+from freeswing.cdpr.robot import Platform
+from freeswing.doctor.bench_units import refuse_wrong_units
+from freeswing.ident.bench.runs import Bench, BenchRun, KnownBody, Load, Signal
+from tests.ident.bench.test_swing_slopes import trifilar
+
+ROBOT = replace(trifilar(), platform=Platform(mass_kg=1.2))  # wires 0.25 m from the middle
+TIMES = np.arange(100) / 50.0
+
+
+def bench_of(loads: tuple[Load, ...] = (), **fields: Any) -> Bench:
+    signals = (Signal("chi", 0.1 * np.sin(TIMES)),)
+    run = BenchRun("a", "identify", TIMES, signals, np.full(3, 1.2))
+    return Bench((replace(run, **fields),), loads=loads)
+
+
+def payload(mass_kg: float, far_m: float) -> dict[str, Any]:
+    return {"payloads": (KnownBody(mass_kg, np.array([far_m, 0.0, 0.0]), np.zeros(6)),)}
+
+
+def moved(column: str, over_m: float) -> dict[str, Any]:
+    return {"signals": (Signal(column, np.linspace(0.0, over_m, 100)),)}
+
+
+def load(mass_kg: float, far_m: float) -> dict[str, Any]:
+    return {"loads": (Load("cube", mass_kg, com_m=np.array([0.0, far_m, 0.0])),)}
+
+
+PENDULUM_S = 2.0 * np.pi * np.sqrt(1.2 / 9.81)
+
+
+@pytest.mark.parametrize(
+    ("fields", "says"),
+    [
+        ({"lengths_m": np.full(3, 12.4)}, ""),
+        ({"lengths_m": np.full(3, 12.6)}, "run a: cable_lengths_m (session.toml) of 12.6 m"),
+        ({"lengths_m": np.full(3, 0.026)}, ""),
+        ({"lengths_m": np.full(3, 0.024)}, "run a: cable_lengths_m (session.toml) of 0.024 m"),
+        ({"lengths_m": None}, ""),
+        (payload(239.0, 0.1), ""),
+        (payload(241.0, 0.1), "run a: payload mass_kg = 241 kg"),
+        (payload(0.4, 2.4), ""),
+        (payload(0.4, 2.6), "run a: payload position_m is 2.6 m"),
+        (load(241.0, 0.1), "loads cube: mass_kg = 241 kg"),
+        (load(0.4, 2.6), "loads cube: com_m is 2.6 m"),
+        (moved("x", 2.3), ""),
+        (moved("x", 2.5), "run a: column x_m goes over 2.5 m"),
+        (moved("dot_px", 1e3), ""),
+        ({"times_s": 0.24 * PENDULUM_S * np.arange(100.0)}, ""),
+        ({"times_s": 0.26 * PENDULUM_S * np.arange(100.0)}, "run a: column t_s: samples are"),
+        ({"times_s": TIMES[:2]}, ""),
+    ],
+)
+def test_what_can_only_be_another_unit(fields: dict[str, Any], says: str) -> None:
+    bench = bench_of(**fields)
+    if not says:
+        refuse_wrong_units(bench, ROBOT)
+        return
+    with pytest.raises(InputError, match="write m, kg, s and rad") as told:
+        refuse_wrong_units(bench, ROBOT)
+    assert says in str(told.value)
+
+
+def test_many_are_counted() -> None:
+    bench = bench_of(lengths_m=np.full(3, 120.0))
+    with pytest.raises(InputError, match="and 2 more: write"):
+        refuse_wrong_units(replace(bench, runs=bench.runs * 5), ROBOT)
