@@ -26,14 +26,15 @@ MOST_FREE_PASSES = 25  # sharp small tags settle slowly, others in four to six
 FIRST_BLACK, FIRST_CONTRAST = 40.0, 160.0  # where nothing is predicted
 LEAST_CONTRAST = 10.0
 ANY_RESIDUAL = 1e6
-FARTHEST = 2.0  # the longest step, in half sides of the tag
+FARTHEST = 2.0  # the longest step, in cells
 SETTLING, SETTLED = 0.02, 0.006  # steps from which all pixels take part, and from which it is done
 TOO_NARROW = -1.0
 SHARP = 0.5  # px; no lens is sharper, but the blur of a fit may pass by smaller values
 MOST_EDGE_PASSES = 20  # one or two from a prediction, three from a search, more where covered
 EDGE_SETTLED = 0.12
-"""A step of so many blur widths is the last along the edges: what it leaves to its third order,
-d^3 / 12, is then 1.4e-4 of the blur's width, 2 % of a corner's deviation at the best."""
+"""A step in cells, times half the tag's cells, of so many blur widths is the last along the edges:
+with eight cells one of d = 0.03 blur widths. It leaves the blur too wide by d^2 / 4 of it, 2e-4,
+and corners wrong by d^3 / 12, which is nothing."""
 EDGE_LOST = 0.5  # after a longer one other pixels are near the edges
 OUTLYING = 0.02
 """Where more of the pixels than this lie beyond four noise levels (6e-5 do by chance), part of the
@@ -71,7 +72,7 @@ class PatternFit(NamedTuple):
         noise: standard deviation of a pixel.
         explained: share of the grey values' variance; 0 where the fit has failed.
         pixels: that took part.
-        last: step, in half sides of the tag.
+        last: step, in cells, or half of that of the blur over the blur.
     """
 
     pattern_from_ray: Array
@@ -107,7 +108,7 @@ def _outlying(seen: Pass, scale: float) -> float:
 
 @kernel
 def _settled_at(seen: Pass, scale: float, next_scale: float, at_last: bool) -> float:
-    """Step along the edges, in blur widths, from which a fit is done; 0: in no case."""
+    """Step along the edges, as `EDGE_SETTLED` has it, from which a fit is done; 0: in no case."""
     if _outlying(seen, next_scale) <= OUTLYING:
         return EDGE_SETTLED
     if scale >= COVERED_SCALE * next_scale:
@@ -183,7 +184,7 @@ class _Step(NamedTuple):
         h: the map after it.
         state: black, contrast, blur in px after it.
         normal: matrix that was solved.
-        size: of the step, in half sides of the tag.
+        size: of the step, the largest change of the small homography, in cells.
         blur_step: of the blur over the blur.
         scale: noise level for the next pass.
         variance: of a pixel, of what the step leaves to first order.

@@ -11,8 +11,8 @@ from freeswing.calib.tags.corners import fit_tag, pixel_rays, rimmed_cells
 from freeswing.calib.tags.edge_pass import new_work, pass_over
 from freeswing.calib.tags.edge_pixels import COUNTS, edge_pixels
 from freeswing.calib.tags.gaussian_tables import TABLES
-from freeswing.calib.tags.pattern_fit import _is_wide
-from freeswing.calib.tags.tag_map import map_of_square
+from freeswing.calib.tags.pattern_fit import PatternFit, Search, _fit_edges, _is_wide
+from freeswing.calib.tags.tag_map import corners_of_map, map_of_square
 from freeswing.vision.look.follow import MOST_PIXELS
 
 SIZE_PX = (180, 180)
@@ -142,23 +142,30 @@ def test_narrow_cells_are_read_from_the_whole_box(cell_blurs, wide) -> None:
     assert np.abs(fit.rays - corners).max() < 0.01, f"{np.abs(fit.rays - corners).max():.4f} px"
 
 
-def fitted_rays(image: np.ndarray, guess: np.ndarray) -> np.ndarray:
-    """Corners from a prediction in an image without noise, (4, 2)."""
-    fit = fit_tag(
-        image, GRID, guess, guess, rimmed_cells("tag36h11", 5), blurs_px=(0.76,),
-        before=(*LEVELS, 0.76, 0.3),
-    )  # fmt: skip
-    assert fit is not None
-    return fit.rays
+def fitted_along_edges(image: np.ndarray, guess: np.ndarray) -> PatternFit:
+    """The fit along the edges of an image without noise, from a prediction of its corners."""
+    box = np.array([0, 0, *SIZE_PX], dtype=np.int64)
+    tag = TagImage(image, GRID, np.eye(2), rimmed_cells("tag36h11", 5), box, *TABLES)
+    search = Search(np.array([0.76]), 1.0, 1e9, np.array([*LEVELS, 0.3]))
+    state = np.array([*LEVELS, 0.76])
+    return _fit_edges(tag, map_of_square(guess, 8.0), state, search, 2.6)
 
 
-@pytest.mark.parametrize(("off_blurs", "moved"), [(0.10, False), (0.15, True)])
-def test_one_step_is_enough_from_a_tenth_of_a_blur(off_blurs, moved) -> None:
-    """What a step leaves to its third order stays where it is small, else another follows."""
-    corners = square(100.0, turn=0.0)
+@pytest.mark.parametrize("at", [(90.3, 89.6), (89.1, 90.9)])
+@pytest.mark.parametrize(("off_blurs", "again"), [(0.027, False), (0.037, True)])
+def test_one_step_is_enough_from_three_hundredths_of_a_blur(off_blurs, again, at) -> None:
+    """The last step is the way there; from farther off one more follows, which hardly moves.
+
+    Either way what is left is within a tenth of the corners' own deviation, that of noise of 1.
+    """
+    corners = square(100.0, at=at)
     image = exposed(drawn(corners, 0.76), 1, 0.0)
-    shift = np.array([off_blurs * 0.76, 0.0])
-    away = np.abs(fitted_rays(image, corners + shift) - fitted_rays(image, corners)).max()
-    left = off_blurs**3 / 12.0 * 0.76
-    assert away < 4.0 * left, f"{away:.6f} px from the settled fit, {left:.6f} expected at the most"
-    assert (away < 0.3 * left) == moved, f"{away:.6f} px, third order {left:.6f}"
+    off = off_blurs * 0.76
+    fit = fitted_along_edges(image, corners + np.array([off, 0.0]))
+    share = fit.last / (off / (100.0 / 8.0))
+    assert share < 0.5 if again else 0.9 < share < 1.1, f"{share:.3f} of the way by the last step"
+    found, covariance, _ = corners_of_map(fit.pattern_from_ray, fit.covariance, 8)
+    settled = fitted_along_edges(image, corners)
+    away = np.abs(found - corners_of_map(settled.pattern_from_ray, settled.covariance, 8)[0]).max()
+    deviation = float(np.sqrt(np.diag(covariance).min()))
+    assert away < deviation / 10.0, f"{away:.6f} px of {deviation:.6f}"

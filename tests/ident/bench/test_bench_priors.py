@@ -13,6 +13,7 @@ import pytest
 from freeswing.ident.bench import assemble, solve
 from freeswing.ident.bench.assemble import Guess
 from freeswing.ident.bench.channels import Channel
+from freeswing.ident.bench.first_guesses import _variance
 from freeswing.ident.bench.priors import wire_priors
 from freeswing.ident.bench.priors.body_priors import platform_block, wide_body
 from freeswing.ident.bench.priors.channel_priors import channel_blocks, gain_spread
@@ -129,6 +130,20 @@ def test_yaw_may_creep_by_what_sway_of_half_its_energy_does() -> None:
     prior = creep_block(3).prior
     assert prior is not None
     assert prior.std[0] == pytest.approx(0.5, rel=0.15)
+
+
+def test_a_quiet_angle_counts_as_if_rest_leant_by_six_degrees() -> None:
+    """Yaw about a vertical that leans so shows by its sine in pitch, of which no guess knows."""
+    yaw, pitch = np.sin(np.linspace(0.0, 60.0, 4000)), np.zeros(4000)
+    view = SimpleNamespace(
+        values=np.column_stack([pitch, yaw, 5.0 * yaw]),
+        known=np.ones((4000, 3), dtype=bool),
+        direct=np.ones(3, dtype=bool),
+        seen=np.eye(6)[[4, 5, 0]],  # two angles, and x, which is none
+    )
+    leans = np.sin(np.deg2rad(5.7)) * yaw
+    assert _variance(view, 0) == pytest.approx(float(np.var(leans)), rel=0.15)
+    assert _variance(view, 1) == pytest.approx(float(np.var(yaw)), rel=0.02)
 
 
 def test_what_no_column_shows_stays_small() -> None:
