@@ -372,7 +372,7 @@ HELD = (
     Held("ident/bench/solve.py", ("LEAST_FOR_SCATTER",), BENCH),
     Held(
         "freeswing/doctor/bench_units.py",
-        ("LONGEST", "SHORTEST", "FARTHEST", "HEAVIEST", "WIDEST", "SLOWEST"),
+        ("LONGEST", "SHORTEST", "FARTHEST", "HEAVIEST", "LIGHTEST", "WIDEST", "SLOWEST", "FEWEST"),
         "tests/freeswing/doctor/test_bench_units.py",
     ),
     Held("ident/bench/mass_verdict.py", ("CONTRADICTED", "CHECKING", "GIVES_WAY"), BENCH),
@@ -387,6 +387,7 @@ HELD = (
         "tests/ident/bench/two_wires/test_free_roll.py",
     ),
     Held("ident/bench/channels.py", ("LEAST_OVER_NOISE",), BENCH),
+    Held("ident/bench/runs.py", ("STILL",), BENCH),
     Held("ident/bench/diagnose/removal.py", ("SURE",), BENCH_DIAGNOSE),
     Held("ident/bench/diagnose/diagnose.py", ("LEAST_RUNS",), BENCH_DIAGNOSE),
     Held("ident/bench/diagnose/unexplained.py", ("COLOURED", "SLOWEST_PARTS"), BENCH_DIAGNOSE),
