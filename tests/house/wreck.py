@@ -371,6 +371,11 @@ HELD = (
     ),
     Held("ident/bench/solve.py", ("LEAST_FOR_SCATTER",), BENCH),
     Held(
+        "ident/bench/solve.py",
+        ("FIRST_S", "LONGER"),
+        "tests/ident/bench/test_first_seconds.py",
+    ),
+    Held(
         "freeswing/doctor/bench_units.py",
         ("LONGEST", "SHORTEST", "FARTHEST", "HEAVIEST", "LIGHTEST", "WIDEST", "SLOWEST", "FEWEST"),
         "tests/freeswing/doctor/test_bench_units.py",

@@ -58,6 +58,7 @@ def test_scatter_is_looked_for_between_enough_runs(monkeypatch, runs, looked) ->
         solve, "fit", lambda _, unknowns, how: SimpleNamespace(**(fitted | {"unknowns": unknowns}))
     )
     monkeypatch.setattr(solve, "_rough", lambda swings, unknowns: unknowns)
+    monkeypatch.setattr(solve, "stretched", lambda swings, unknowns: unknowns)
     monkeypatch.setattr(solve, "_fastest", lambda *_: 1.0)
     monkeypatch.setattr(solve, "rescaled", lambda swings, *_, **__: swings)
     monkeypatch.setattr(
