@@ -82,6 +82,7 @@ SCENE = "tests/calib/scene/test_scene_limits.py"
 MEASURED = "tests/cdpr/measured/test_measured_limits.py"
 BAND_LIMITS = "tests/ident/signals/test_band_limits.py"
 UNTAGGED = "tests/vision/untagged/test_untagged_limits.py"
+FEATURES = "tests/vision/untagged/test_feature_bias.py"
 CDPR = "tests/cdpr/test_cdpr_limits.py"
 START = "tests/vision/rig/test_start_limits.py"
 RIG_START = "tests/calib/rig/test_rig_start_limits.py"
@@ -673,6 +674,7 @@ HELD = (
     Held("vision/untagged/features.py", ("RATIO", "MOST_ANGLE_COS",), UNTAGGED),
     Held("vision/untagged/look.py", ("LEAST_MATCHES", "INLIER_PX", "FEATURE_STD_PX",), UNTAGGED),
     Held("vision/untagged/refine.py", ("_FAR",), UNTAGGED),
+    Held("vision/untagged/feature_bias.py", ("LEAST_FRAMES",), FEATURES),
     Held(
         "vision/untagged/rest_model.py",
         (
