@@ -80,6 +80,7 @@ LENS = "tests/calib/camera/test_lens_limits.py"
 BOARD = "tests/calib/board/test_board_limits.py"
 SCENE = "tests/calib/scene/test_scene_limits.py"
 MEASURED = "tests/cdpr/measured/test_measured_limits.py"
+SIGNALS = "tests/ident/signals/test_limits.py"
 BAND_LIMITS = "tests/ident/signals/test_band_limits.py"
 UNTAGGED = "tests/vision/untagged/test_untagged_limits.py"
 FEATURES = "tests/vision/untagged/test_feature_bias.py"
@@ -281,11 +282,8 @@ HELD = (
         "tests/ident/signals/test_limits.py",
     ),
     Held("ident/signals/motions.py", ("LENGTH_LIMIT_M",), "tests/ident/signals/test_limits.py"),
-    Held(
-        "ident/signals/derivatives.py",
-        ("_UNUSUAL", "_LEAST_OUTPUTS"),
-        "tests/ident/signals/test_limits.py",
-    ),
+    Held("ident/signals/jumps.py", ("_ABOVE_NOISE", "_UNUSUAL"), SIGNALS),
+    Held("ident/signals/derivatives.py", ("_LEAST_OUTPUTS",), SIGNALS),
     Held(
         "ident/diagnose/decision.py",
         (
