@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator
+from dataclasses import replace
 
 from freeswing.cdpr.files.documents import DataError, InputError
 from freeswing.cdpr.measured.target import Target
@@ -20,6 +21,8 @@ from freeswing.session.load_bench import coordinate_swings, load_bench
 from freeswing.session.load_swings import trajectory_path
 from freeswing.session.repeated_runs import refuse_repeated
 from freeswing.session.session_file import Session
+
+WHOLE = "all of the recording is fitted: give it from where the hand has let go"
 
 
 def bench_findings(
@@ -42,7 +45,9 @@ def bench_findings(
         return []
     swings = coordinate_swings(bench)
     for swing in swings:
-        yield from run_findings(swing, robot, session.frame_rate_hz)
+        for finding in run_findings(swing, robot, session.frame_rate_hz):
+            whole = finding.text == "no window_s"
+            yield replace(finding, remedy=WHOLE) if whole else finding
     for refuses in (refuse_wrong_bench_runs, check_runs):
         try:
             refuses(bench, robot)
