@@ -30,8 +30,8 @@ from freeswing.calib.rig.solve_rig import Rig, solve_rig, start_cameras, tie_to_
 from freeswing.calib.rig.swing_tie import Joined, SwingFilms, joined
 from freeswing.calib.rig.views import Views
 from freeswing.calib.scene.marks import Click, read_clicks
-from freeswing.calib.scene.source import SurveyedPoint
 from freeswing.calib.scene.survey import Survey
+from freeswing.calib.scene.tape_measured import SurveyedPoint
 from freeswing.calib.tags.base_tags import CORNER_NAMES, SURVEY_STD_M, SurveyedTag
 from freeswing.calib.tags.tag_bend import straightened
 from freeswing.calib.verdict.calibration_result import (

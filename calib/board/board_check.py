@@ -66,11 +66,12 @@ def _bent(board: Board, pixels: Array) -> float:
     return float(np.nanmedian(flatness_errors(board.points_m[:, :2], pixels)))
 
 
-def corners_in_a_mirror(board: Board, images: Sequence[NDArray[np.uint8]]) -> int:
-    """How many corners of the board images show in a mirror."""
+def is_mirrored(board: Board, images: Sequence[NDArray[np.uint8]]) -> bool:
+    """Whether images that show no board show one in a mirror."""
     detector = BoardDetector(board)
-    found = [detector.detect(np.ascontiguousarray(image[:, ::-1])) for image in images]
-    return sum(corners.count for corners in found if corners is not None)
+    return any(
+        detector.detect(np.ascontiguousarray(image[:, ::-1])) is not None for image in images
+    )
 
 
 def marker_warning(board: Board, growth_m: float) -> str | None:

@@ -27,6 +27,7 @@ from freeswing.calib.scene.marks import (
 from freeswing.calib.scene.scene_rig import rig_of_map, rig_part
 from freeswing.calib.scene.scene_verdict import (
     SceneChecks,
+    can_be_halved_by_size,
     check_scene,
     grown,
     growth_of,
@@ -86,7 +87,10 @@ def calibrate_scene(
     free = rig_of_map(found, stills, model)
     count = len(rig)
     halves = halves_of(free, count)
-    growth = growth_of(*halves, rig_part(free, count).problem.free)
+    unknown = rig_part(free, count).problem.free
+    growth = growth_of(*halves, unknown)
+    if can_be_halved_by_size(free, count):
+        growth = max(growth, growth_of(*halves_of(free, count, by_size=True), unknown))
     told("survey", 0.85)
     whole, survey = _in_metres(free, source, base_tags, {s.name: s for s in stills}, clicks)
     part = rig_part(grown(whole, growth), count)

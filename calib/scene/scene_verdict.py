@@ -58,11 +58,17 @@ class SceneChecks:
     points: np.ndarray
 
 
-def halves_of(rig: Rig, count: int) -> tuple[Adjustment, Adjustment]:
-    """Two adjustments that share no point: those of even and of odd number."""
+def halves_of(rig: Rig, count: int, *, by_size: bool = False) -> tuple[Adjustment, Adjustment]:
+    """Two adjustments that share no point: those of even and of odd number.
+
+    With `by_size` those of the smaller and of the larger blobs, after which points are numbered:
+    what moves the middles of blobs moves those of large ones more.
+    """
     found = []
-    for parity in (0, 1):
-        views, pieces = rig.problem.views.select(rig.problem.views.piece % 2 == parity).compacted()
+    number = rig.problem.views.piece
+    second = number > np.median(number) if by_size else number % 2 == 1
+    for parity in (False, True):
+        views, pieces = rig.problem.views.select(second == parity).compacted()
         problem = replace(rig.problem, views=views)
         start = rig.adjustment.scene.pieces(pieces)
         sigma = rig.adjustment.sigma_px
@@ -70,6 +76,20 @@ def halves_of(rig: Rig, count: int) -> tuple[Adjustment, Adjustment]:
         half = Rig(result, problem, rig.reference, (), 0)
         found.append(rig_part(half, count).adjustment)
     return found[0], found[1]
+
+
+def can_be_halved_by_size(rig: Rig, count: int) -> bool:
+    """Whether smaller and larger blobs are enough for a lens in each of the rig's `count` cameras.
+
+    Images of the walk, whose lens is one, need a fourth of that for their poses.
+    """
+    views = rig.problem.views
+    second = views.piece > np.median(views.piece)
+    wanted = np.where(np.arange(len(rig.cameras)) < count, LEAST_POINTS, LEAST_POINTS / 4)
+    return all(
+        (np.bincount(views.camera[half], minlength=len(wanted)) >= wanted).all()
+        for half in (second, ~second)
+    )
 
 
 def growth_of(first: Adjustment, second: Adjustment, free: np.ndarray) -> float:

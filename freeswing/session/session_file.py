@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.calib.scene.scene_keys import read_scene, read_surveyed
-from freeswing.calib.scene.source import SceneSource, SurveyedPoint
+from freeswing.calib.scene.source import SceneSource
+from freeswing.calib.scene.tape_measured import SurveyedPoint
 from freeswing.cdpr.files.documents import InputError, Problems, Reader, inside, load_toml
 from freeswing.cdpr.robot import frozen_array
 from freeswing.cdpr.system.confine import results_folder

@@ -14,7 +14,7 @@ import pytest
 from freeswing.calib.scene import stills
 from freeswing.calib.scene.map_frame import scale_of, similarity
 from freeswing.calib.scene.marks import read_clicks
-from freeswing.calib.scene.scene_rig import _kept, chosen_points, feature_variance
+from freeswing.calib.scene.scene_rig import _kept, chosen_points, feature_variance, small_blobs
 from freeswing.calib.scene.tape_measured import Distance
 from freeswing.cdpr.files.documents import DataError, InputError
 
@@ -87,3 +87,14 @@ def test_a_walk_has_three_images(monkeypatch, images, refused) -> None:
     monkeypatch.setattr(stills, "_shares", lambda _: shares)
     with pytest.raises(InputError, match="need 3") if refused else nullcontext():
         stills.walk_stills(Path("walk"))
+
+
+@pytest.mark.parametrize(("apart_px", "kept"), [(0.0115, True), (0.0125, False)])
+def test_large_blobs_are_left_out_by_what_a_slanted_view_does_to_them(apart_px, kept) -> None:
+    """size^2 / f on both sides of the limit, in an image that has enough of small ones."""
+    image = np.zeros(121, dtype=int)
+    sizes = np.full(121, 1.0)
+    sizes[-1] = np.sqrt(apart_px * 600.0)
+    assert small_blobs(image, sizes, np.array([600.0]))[-1] == kept
+    few = small_blobs(image[-1:], sizes[-1:], np.array([600.0]))
+    assert few.tolist() == [True]
