@@ -233,8 +233,11 @@ class Valley(Protocol[P, L]):
         """A damped step."""
         ...
 
-    def moved(self, place: P, step: L) -> P | None:
-        """The place after a step; None where nothing can be computed."""
+    def moved(self, place: P, step: L, most: float) -> P | None:
+        """The place after a step; None where nothing can be computed, or it costs more than most.
+
+        What costs more need not be known to its end.
+        """
         ...
 
     def settled(self, place: P) -> P:
@@ -253,6 +256,8 @@ class Watchdog:
         shorter: than the last step is the next one where a climb leads on.
         most_rises: steps above the best cost, until it has to be beaten.
         negligible: share of the tolerance that is not worth a trial.
+        foresees: whether it ends as well where all steps to come would lower the cost by less than
+            the tolerance, each by the share of the one before that the last one did.
     """
 
     steps: int
@@ -261,11 +266,12 @@ class Watchdog:
     shorter: float
     most_rises: int
     negligible: float
+    foresees: bool = False
 
     def descend(self, problem: Valley[P, L], place: P) -> tuple[P, L, int, Stop]:
         """The lowest place found, the step to it, how many were tried, and why it ended."""
         here = best = problem.settled(place)
-        damping, rises, taken, falls = 0.0, 0, 0, False
+        damping, rises, taken, falls, before = 0.0, 0, 0, False, 0.0
         stop = out_of_steps(self.steps)
         for taken in range(1, self.steps + 1):
             step = problem.step(here, damping)
@@ -274,12 +280,16 @@ class Watchdog:
             promised = step.promised if damping == 0.0 else math.inf
             if promised < self.negligible * self.tolerance and here is best:
                 return best, step, taken, _gained(promised)
-            trial = problem.moved(here, step)
+            # A damped step that climbs leads nowhere, wherever it ends.
+            trial = problem.moved(here, step, math.inf if damping == 0.0 else best.cost)
             gain = -math.inf if trial is None else best.cost - trial.cost
-            if trial is not None and self._ends(promised, gain, damping == 0.0 and here is best):
+            full = damping == 0.0 and here is best
+            if trial is not None and (
+                self._ends(promised, gain, full) or self._foreseen(before, gain, full)
+            ):
                 kept = problem.settled(trial) if gain >= 0.0 else best
                 return kept, step, taken, _gained(gain)
-            falls = gain > 0.0
+            falls, before = gain > 0.0, gain if full else 0.0
             if trial is not None and falls:
                 here = best = problem.settled(trial)
                 damping, rises = self.damping.eased(damping, 1.0), 0
@@ -298,6 +308,17 @@ class Watchdog:
         """Whether nothing is to be gained any more, by what a step promised or a full one did."""
         settled = promised < self.tolerance or (gain < self.tolerance and full)
         return settled and abs(gain) < self.tolerance
+
+    def _foreseen(self, before: float, gain: float, full: bool) -> bool:
+        """Whether the steps to come gain less than the tolerance, after two full ones that fell.
+
+        Source:
+            Deuflhard 2011, Newton Methods for Nonlinear Problems, sec. 4.3.1: a Gauss-Newton search
+            converges linearly, the incompatibility factor being the ratio of its steps.
+        """
+        if not (self.foresees and full and before > gain > 0.0):
+            return False
+        return gain * gain / (before - gain) < self.tolerance
 
     def _leads_on(self, problem: Valley[P, L], trial: P, step: L) -> bool:
         return problem.step(trial, 0.0).longest < self.shorter * step.longest

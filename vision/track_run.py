@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +15,8 @@ from freeswing.cdpr.measured.trajectory import Trajectory
 from freeswing.vision.fuse.calibration_share import (
     CalibrationNoise,
     RunShare,
-    frame_causes,
     run_share,
+    share_instants,
 )
 from freeswing.vision.fuse.fuse_cameras import Fit, free_of
 from freeswing.vision.fuse.poses import Poses
@@ -24,13 +25,23 @@ from freeswing.vision.fuse.tag_layout import LayoutSums, layout_sums
 from freeswing.vision.look.follow import STATUS_NAMES, USED
 from freeswing.vision.look.watched_target import Watch
 from freeswing.vision.recorded_alone import recorded_by_two
-from freeswing.vision.rig.correct_rig import correct_rig
+from freeswing.vision.rig.correct_rig import Corrected, correct_rig
 from freeswing.vision.rig.rig_effects import Finding
 from freeswing.vision.settings import Settings
 
 Array = NDArray[np.float64]
 
 PROVENANCE = "cameras"
+
+
+class PlatformCauses(Protocol):
+    """Causes of the platform's own that put all poses of all runs wrong together."""
+
+    def __call__(
+        self, poses: Poses, views: Sequence[CameraViews], watch: Watch, chosen: NDArray[np.int64]
+    ) -> Array:
+        """What one deviation of each does to the chosen poses, (n, 6, m), m alike in all runs."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,20 +81,20 @@ def track_run(
     watch: Watch,
     settings: Settings,
     noise: CalibrationNoise | None = None,
-    frame: Array | None = None,
+    platform: PlatformCauses | None = None,
 ) -> RunTrack:
     """Fuses a run's sightings and corrects the rig.
 
     The trajectory's covariances are those of its scatter. What the calibration's own uncertainty
-    adds is common to the whole run and stated apart, where `noise` tells it; so is what `frame`
-    leaves open of the platform's frame: covariance of its shift (m) and turn (rad), (6, 6).
+    adds is common to the whole run and stated apart, where `noise` tells it; so is what `platform`
+    tells of the platform's frame and points.
     """
     views = [CameraViews(camera, paths) for camera, paths in sources]
     counts = tuple(camera_count(view) for view in views)
     corrected = correct_rig(views, watch, settings.survey_std_m, look=settings.correct_rig)
     poses, lone = recorded_by_two(corrected.poses, corrected.views)
     known = int(poses.known.sum())
-    shared = _shared(poses, frame, corrected.doubt)
+    shared = _shared(poses, corrected, watch, platform)
     share = run_share(poses, corrected.after, corrected.views, watch, noise, shared)
     deviations = np.sqrt(np.diagonal(poses.covariances, axis1=1, axis2=2))
     steps = np.diff(poses.times_s)
@@ -105,10 +116,13 @@ def track_run(
     )
 
 
-def _shared(poses: Poses, frame: Array | None, doubt: Array | None) -> Array | None:
+def _shared(
+    poses: Poses, corrected: Corrected, watch: Watch, platform: PlatformCauses | None
+) -> Array | None:
     """Causes that runs have in common beside the calibration's, (n, 6, m); None without any."""
-    causes = [] if frame is None else [frame_causes(poses, frame)]
-    causes += [] if doubt is None else [doubt]
+    chosen = share_instants(poses)
+    causes = [] if platform is None else [platform(poses, corrected.views, watch, chosen)]
+    causes += [] if corrected.doubt is None else [corrected.doubt[chosen]]
     return np.concatenate(causes, axis=2) if causes else None
 
 

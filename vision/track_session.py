@@ -3,9 +3,9 @@
 The call that the command line makes:
 
     tracked = track_session(session.video_runs, read_cameras(session.cameras),
-                            read_target(session.target), base_tags=..., results=session.results,
-                            frame_rate_hz=session.frame_rate_hz, workers=0,
-                            progress=console.progress)
+                            Watch.of(read_target(session.target), base_tags),
+                            results=session.results, frame_rate_hz=session.frame_rate_hz,
+                            workers=0, progress=console.progress)
 
 `results/calibration.json`, where there is one, tells how far the calibration may shift the poses.
 The call writes no result; it keeps each camera's sightings under `results/tracks/.sightings`, from
@@ -14,7 +14,7 @@ where one that was killed goes on.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -24,9 +24,7 @@ from freeswing.calib.board.recordings import Recording, find_recordings
 from freeswing.calib.camera.camera import Camera
 from freeswing.calib.footage.condition import condition_of, torn_text
 from freeswing.calib.footage.frame_times import frame_times, needed
-from freeswing.calib.tags.base_tags import SurveyedTag
 from freeswing.cdpr.files.documents import DataError, InputError
-from freeswing.cdpr.measured.target import Target
 from freeswing.cdpr.measured.trajectory import Trajectory
 from freeswing.vision.fuse.calibration_share import read_calibration_noise
 from freeswing.vision.fuse.tag_layout import layout_change, with_layout
@@ -71,10 +69,9 @@ class RecordedRun(Protocol):
 def track_session(
     runs: Sequence[RecordedRun],
     cameras: Sequence[Camera],
-    target: Target,
+    watch: Watch,
     *,
     results: Path,
-    base_tags: Iterable[SurveyedTag] = (),
     frame_rate_hz: float | None = None,
     settings: Settings | None = None,
     workers: int = 0,
@@ -86,10 +83,9 @@ def track_session(
     Args:
         runs: with `name` and `video`; those without a video are left out.
         cameras: as calibrated.
-        target: what is on the platform.
+        watch: what is on the platform, and the surveyed tags in the base.
         results: the session's results folder, of which it reads calibration.json and keeps
             sightings.
-        base_tags: surveyed tags in the base, with `family`, `id`, `corners_base_m`.
         frame_rate_hz: serves recordings without time stamps.
         settings: see `Settings`.
         workers: processes; 0 = one a core.
@@ -101,7 +97,6 @@ def track_session(
         InputError: a recording is missing, unreadable or of another size than its camera.
     """
     settings = settings or Settings()
-    watch = Watch.of(target, base_tags)
     filmed = [run for run in runs if run.video is not None]
     if not filmed:
         raise InputError("no run of the session has a video; there is nothing to track")

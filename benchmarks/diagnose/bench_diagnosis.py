@@ -144,6 +144,8 @@ def verdict_of(case: Case, told: dict[str, Any]) -> str:
         return ("in a group" if told["rivals"] else "named") + more
     if grouped:
         return f"in the group of {grouped[0]}{more}"
+    if told["unexplained"]:
+        return f"unexplained{more}"
     return ("cannot tell" if told["verdict"] == "not_identifiable" else "missed") + more
 
 

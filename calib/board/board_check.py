@@ -66,12 +66,11 @@ def _bent(board: Board, pixels: Array) -> float:
     return float(np.nanmedian(flatness_errors(board.points_m[:, :2], pixels)))
 
 
-def is_mirrored(board: Board, images: Sequence[NDArray[np.uint8]]) -> bool:
-    """Whether images that show no board show one in a mirror."""
+def corners_in_a_mirror(board: Board, images: Sequence[NDArray[np.uint8]]) -> int:
+    """How many corners of the board images show in a mirror."""
     detector = BoardDetector(board)
-    return any(
-        detector.detect(np.ascontiguousarray(image[:, ::-1])) is not None for image in images
-    )
+    found = [detector.detect(np.ascontiguousarray(image[:, ::-1])) for image in images]
+    return sum(corners.count for corners in found if corners is not None)
 
 
 def marker_warning(board: Board, growth_m: float) -> str | None:

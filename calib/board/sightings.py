@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from freeswing.calib.board.board_check import is_mirrored
+from freeswing.calib.board.board_check import corners_in_a_mirror
 from freeswing.calib.board.board_motion import Timeline, linked, timeline
 from freeswing.calib.board.boards import Board
-from freeswing.calib.board.detection import BoardDetector
+from freeswing.calib.board.detection import BoardCorners, BoardDetector
 from freeswing.calib.board.kept_boards import KeptBoards
 from freeswing.calib.board.platform_tags import PlatformDetector, PlatformTags
 from freeswing.calib.board.recordings import Recording, read_frames
@@ -134,7 +134,7 @@ def _see(
     wanted = in_bursts(count) if isinstance(detector, BoardDetector) else middle_frames(count)
     still_at = set(np.linspace(0, count - 1, n_still).round().astype(int)) if n_still else set()
     boards = KeptBoards(detector, kept, recording, len(wanted))
-    without: list[np.ndarray] = []  # some images without a board
+    doubtful: list[np.ndarray] = []  # some images that show half of the board at the most
     numbers, labels, found, stills, size = [], [], [], [], (0, 0)
     for position, (number, label, image) in enumerate(read_frames(recording)):
         size = (image.shape[1], image.shape[0])
@@ -150,10 +150,10 @@ def _see(
             numbers.append(number)
             labels.append(label)
             found.append(corners)
-        elif len(without) < _LOOKED_AT_AGAIN and position % _EVERY == 0:
-            without.append(image)
-    if not found:
-        _refuse_mirrored(recording, detector, without)
+        if len(doubtful) < _LOOKED_AT_AGAIN and position % _EVERY == 0 and _is_part(corners):
+            doubtful.append(image)
+    if all(map(_is_part, found)):
+        _refuse_mirrored(recording, detector, doubtful)
     frames = np.array(numbers, dtype=int)
     empty = detector.nothing()
     return Sightings(
@@ -170,16 +170,27 @@ def _see(
     )
 
 
+def _is_part(corners: BoardCorners | None) -> bool:
+    """Whether an image shows half of a board at the most."""
+    return corners is None or 2 * corners.count <= len(corners.pixels)
+
+
 def _refuse_mirrored(
     recording: Recording, detector: BoardDetector | PlatformDetector, images: list[np.ndarray]
 ) -> None:
-    """Passes images without a board that show none in a mirror either.
+    """Passes images that show no more of the board in a mirror than they do without.
+
+    Markers of small dictionaries are taken for others in a mirror: some corners are found then too.
 
     Raises:
-        DataError: where they do.
+        DataError: where they show more.
     """
     board = detector.board
-    if isinstance(board, Board) and board.has_tags and is_mirrored(board, images):
+    if not (isinstance(board, Board) and board.has_tags):
+        return
+    plain = (detector.detect(image) for image in images)
+    corners = sum(one.count for one in plain if one is not None)
+    if corners_in_a_mirror(board, images) > corners:
         raise DataError(
             f"{recording.path}: shows the board's mirrored image: its pictures are flipped, or the "
             "board is seen through its back. Record without a mirror"

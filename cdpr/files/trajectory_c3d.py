@@ -202,7 +202,7 @@ def _frames(
     if len(agreed) == 1 and there < min(agreed):
         return first, agreed.pop()  # cut short: said where the points are read
     if not told and there >= 1:
-        return first, there
+        return first, there - _blank_at_end(data, header, parameters, order, n_points)
     all_told = ", ".join(f"{name} {number}" for name, number in told.items()) or "no field"
     raise InputError(
         f"{path}: how many frames there are is told in contradiction: {all_told}, and the file's "
@@ -218,14 +218,40 @@ def _frames_of_length(
     n_points: int,
 ) -> tuple[int, int]:
     """Whole frames that the file has room for, and how many of them may fill the last block."""
-    item = 4 if parameters["POINT", "SCALE"].numbers(order)[0] < 0.0 else 2
-    bytes_a_frame = item * (4 * n_points + int(header[2]))
-    start = (int(header[8]) - 1) * BLOCK
+    start, end, bytes_a_frame = _room(data, header, parameters, order, n_points)
     if start < BLOCK or bytes_a_frame == 0:
         return 0, 0
-    parameters_at = (data[0] - 1) * BLOCK
-    end = parameters_at if parameters_at > start else len(data)
     return max(end - start, 0) // bytes_a_frame, BLOCK // bytes_a_frame
+
+
+def _room(
+    data: bytes,
+    header: NDArray[np.uint16],
+    parameters: dict[tuple[str, str], _Parameter],
+    order: str,
+    n_points: int,
+) -> tuple[int, int, int]:
+    """Where the frames' bytes start and end at most, and how many each frame has."""
+    item = 4 if parameters["POINT", "SCALE"].numbers(order)[0] < 0.0 else 2
+    start, parameters_at = (int(header[8]) - 1) * BLOCK, (data[0] - 1) * BLOCK
+    end = parameters_at if parameters_at > start else len(data)
+    return start, end, item * (4 * n_points + int(header[2]))
+
+
+def _blank_at_end(
+    data: bytes,
+    header: NDArray[np.uint16],
+    parameters: dict[tuple[str, str], _Parameter],
+    order: str,
+    n_points: int,
+) -> int:
+    """Frames of zeros that fill up the last block where the file's length alone counts frames."""
+    start, end, size = _room(data, header, parameters, order, n_points)
+    stop = start + (end - start) // size * size
+    blank = 0
+    while blank < BLOCK // size and not any(data[stop - (blank + 1) * size : stop - blank * size]):
+        blank += 1
+    return blank
 
 
 def _long(data: bytes, order: str) -> int:

@@ -106,7 +106,7 @@ def error_terms(
 
 
 def fitted_terms(terms: Array, slopes: Array) -> Array:
-    """Least-squares coefficients of slopes (n, 6, m) over terms (n, 13), (6, 13, m).
+    """Least-squares coefficients of slopes (n, 6, m) over k terms (n, k), (6, k, m).
 
     Source:
         Press et al. 2007, Numerical Recipes, sec. 15.4: general linear least squares.
@@ -114,7 +114,7 @@ def fitted_terms(terms: Array, slopes: Array) -> Array:
     scale = np.maximum(np.sqrt(np.mean(terms**2, axis=0)), 1e-12)
     flat = slopes.reshape(len(slopes), -1)
     found = np.linalg.lstsq(terms / scale, flat, rcond=_LEAST_SPREAD)[0] / scale[:, None]
-    return np.moveaxis(found.reshape(TERMS, *slopes.shape[1:]), 0, 1)
+    return np.moveaxis(found.reshape(len(scale), *slopes.shape[1:]), 0, 1)
 
 
 def _rounded(values: Array) -> list[Any]:

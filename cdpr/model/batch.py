@@ -324,7 +324,9 @@ def moved_columns(
 
 
 @_built_once(16)
-def jacobians_about(function: Any, still: tuple[float, ...]) -> tuple[Any, Any]:
+def jacobians_about(
+    function: Any, still: tuple[float, ...], among: tuple[int, ...] | None = None
+) -> tuple[Any, Any]:
     """Jacobians of a function where its last values stand still: by all before them, and by them.
 
     What effects that do nothing there would cost falls away: a screen needs their slopes alone.
@@ -332,6 +334,8 @@ def jacobians_about(function: Any, still: tuple[float, ...]) -> tuple[Any, Any]:
     Args:
         function: a casadi Function of SX expressions, of time, columns and, last, values.
         still: the last values' numbers.
+        among: columns that are asked for, of all inputs but time one after another, ascending;
+            None: all.
 
     Returns:
         Two functions of the same inputs without these values: Jacobians of the first output by all
@@ -343,8 +347,12 @@ def jacobians_about(function: Any, still: tuple[float, ...]) -> tuple[Any, Any]:
     # A symbol of its own: slices of one cannot be inputs.
     known = ca.SX.sym("known", first)
     there = function.call([*symbols[:-1], ca.vertcat(known, numbers)])[0]
-    by_others = ca.jacobian(there, ca.vertcat(*symbols[1:-1], known))
-    by_fixed = ca.jacobian(function.call(symbols)[0], fixed)
+    others = ca.vertcat(*symbols[1:-1], known)
+    size = others.numel()
+    asked = range(size + len(still)) if among is None else among
+    by_others = ca.jacobian(there, others[[k for k in asked if k < size]])
+    moved = fixed[[k - size for k in asked if k >= size]]
+    by_fixed = ca.jacobian(function.call(symbols)[0], moved)
     by_fixed = ca.substitute(by_fixed, ca.vertcat(moving, fixed), ca.vertcat(known, numbers))
     one, other = (
         ca.Function(

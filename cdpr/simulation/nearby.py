@@ -23,7 +23,7 @@ from freeswing.cdpr.simulation.free_swing import (
     check_swivels,
     tails,
 )
-from freeswing.cdpr.simulation.sensitivity import Linearised
+from freeswing.cdpr.simulation.sensitivity import Factors, Linearised
 
 SWEEPS = 15  # a simulation takes as long as thirty
 LARGEST_RATIO = 0.7  # of a change to the last one: above, the motion is not near
@@ -31,45 +31,31 @@ LARGEST_RATIO = 0.7  # of a change to the last one: above, the motion is not nea
 
 @dataclass(frozen=True, slots=True)
 class Surroundings:
-    """What leads from a motion to one nearby; matrices in single precision, they only precondition.
+    """What leads from a motion to one nearby: slopes and factors that only precondition.
 
     Attributes:
         motion: the known one.
         columns: which of [zeta_0; rates_0; inertia; values] derivatives are by, (c,).
-        states: derivatives of the segments' starts by these, (s, 12, c).
-        accelerations: of the node accelerations, (s, 6 m, c).
-        inverses: of the collocation matrices there or nearby, (s, 6 m, 6 m).
+        accelerations: of the node accelerations by these, (s, 6 m, c).
+        factors: of the collocation matrices there.
         by_start: of a segment's accelerations by its own start, (s, 6 m, 12).
         ends: of a segment's end by its start, (s, 12, 12).
     """
 
     motion: Motion
     columns: np.ndarray
-    states: Array
     accelerations: Array
-    inverses: Array
+    factors: Factors
     by_start: Array
     ends: Array
 
     @classmethod
-    def of(cls, linear: Linearised, before: Surroundings | None = None) -> Surroundings:
-        """What is worth keeping of a linearised motion.
-
-        Args:
-            linear: the motion to first order.
-            before: of a motion that it came from: where its segments are the same ones their
-                inverse matrices serve on, which saves half the time.
-        """
-        s = len(linear.states)
-        flat = linear.accelerations.reshape(s, -1, linear.accelerations.shape[-1])
-        if before is not None and _on_same_segments(linear.motion, before.motion):
-            inverses = before.inverses
-        else:
-            inverses = np.linalg.inv(linear.matrices)
-        parts = (linear.states, flat, inverses, linear.by_start, linear.ends)
-        return cls(
-            linear.motion, linear.columns, *(part.astype(np.float32, copy=False) for part in parts)
-        )
+    def of(cls, linear: Linearised) -> Surroundings:
+        """What is worth keeping of a linearised motion."""
+        found = linear.accelerations
+        flat = found.reshape(len(found), -1, found.shape[-1])
+        factors, by_start, ends = linear.factors, linear.by_start, linear.ends
+        return cls(linear.motion, linear.columns, flat, factors, by_start, ends)
 
     def motion_at(
         self, zeta: Array, rates: Array, inertia: Array, values: Array, tolerance_m: float
@@ -134,7 +120,7 @@ class Surroundings:
 
     def _answer(self, lacking: Array, aimed: Motion, t: Table) -> Array:
         """Change of all node accelerations (s, 6 m) that makes up for what they lack."""
-        local = np.asarray((self.inverses @ lacking.astype(np.float32)[..., None])[..., 0])
+        local = self.factors.solved(lacking)
         nodes = local.reshape(len(local), len(t.nodes), 6)
         step = aimed.steps_s[:, None]
         kicks = np.concatenate([step**2 * (t.twice_end @ nodes), step * (t.once_end @ nodes)], 1)
@@ -142,12 +128,6 @@ class Surroundings:
         for k in range(len(local) - 1):
             states[k + 1] = self.ends[k] @ states[k] + kicks[k]
         return local + (self.by_start @ states[..., None])[..., 0]
-
-
-def _on_same_segments(one: Motion, other: Motion) -> bool:
-    return np.array_equal(one.starts_s, other.starts_s) and np.array_equal(
-        one.steps_s, other.steps_s
-    )
 
 
 def obeys(motion: Motion, tolerance_m: float) -> bool:

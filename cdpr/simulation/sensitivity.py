@@ -7,15 +7,50 @@ its transition, and the chain of transitions the whole motion.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
+from scipy.linalg import get_lapack_funcs
 
-from freeswing.cdpr.model.batch import evaluate, jacobians_about, moved_columns, with_jacobian
+from freeswing.cdpr.model.batch import evaluate, jacobians_about, moved_columns
 from freeswing.cdpr.robot import Array
 from freeswing.cdpr.simulation.collocation import interpolation, of_segments, table
 from freeswing.cdpr.simulation.free_swing import Motion
 
 STATE = 12
+_factored, _solved = get_lapack_funcs(("getrf", "getrs"), dtype=np.float64)
+
+
+@dataclass(frozen=True, slots=True)
+class Factors:
+    """LU factors of a stack of square matrices, for as many right sides as come.
+
+    Attributes:
+        parts: triangles and pivots of each transposed matrix, as LAPACK tells them.
+    """
+
+    parts: tuple[tuple[Array, Array], ...]
+
+    @classmethod
+    def of(cls, matrices: Array) -> Factors:
+        """Factors of matrices (s, n, n), which are lost.
+
+        Raises:
+            LinAlgError: when one is singular.
+
+        Source:
+            Golub, Van Loan 2013, Matrix Computations, sec. 3.4: partial pivoting.
+        """
+        # A transposed matrix lies in memory as LAPACK wants it.
+        found = [_factored(one.T, overwrite_a=True) for one in matrices]
+        if any(info > 0 for _, _, info in found):
+            raise np.linalg.LinAlgError("Singular matrix")
+        return cls(tuple((triangles, pivots) for triangles, pivots, _ in found))
+
+    def solved(self, right: Array) -> Array:
+        """What the matrices turn into right sides (s, n) or (s, n, c), of their shape."""
+        pairs = zip(self.parts, right, strict=True)
+        return np.array([_solved(*part, one, trans=1)[0] for part, one in pairs])
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +64,7 @@ class Linearised:
         columns: those of them that are told, (c,); those by the others asked for are zero.
         states: of [zeta; rates] at the segment starts, (s, 12, c).
         accelerations: of the node accelerations, (s, m, 6, c).
-        matrices: of the collocation equations, one a segment, (s, 6 m, 6 m).
+        factors: of the collocation equations' matrices, one a segment, (6 m, 6 m).
         by_start: derivatives of a segment's node accelerations by its own start, (s, 6 m, 12).
         ends: of the state at a segment's end by that at its start, (s, 12, 12).
     """
@@ -39,7 +74,7 @@ class Linearised:
     columns: np.ndarray
     states: Array
     accelerations: Array
-    matrices: Array
+    factors: Factors
     by_start: Array
     ends: Array
 
@@ -84,52 +119,49 @@ def linearise(motion: Motion, still: int = 0, wanted: np.ndarray | None = None) 
     )
     rates = motion.rates[:, None] + step * (t.once @ motion.accelerations)
     times = motion.starts_s[:, None] + motion.steps_s[:, None] * t.nodes
-    asked = np.arange(STATE + motion.inertia.size + motion.values.size)
-    columns = asked
-    if wanted is None:
-        slopes = _slopes(motion, still, times, zetas, rates)
-    else:
+    asked = columns = np.arange(STATE + motion.inertia.size + motion.values.size)
+    if wanted is not None:
         asked = asked[np.concatenate([np.ones(STATE, dtype=bool), wanted])]
-        slopes, columns = _slopes_by(motion, asked, times, zetas, rates)
-    matrices, changes = _segment_changes(motion, slopes)
+    slopes, moved = _slopes(motion, asked, still, times, zetas, rates)
+    if wanted is not None:
+        columns = np.union1d(np.arange(STATE), moved)
+    if len(columns) > len(moved):
+        dense = np.zeros((*slopes.shape[:-1], len(columns)))
+        dense[..., np.searchsorted(columns, moved)] = slopes
+        slopes = dense
+    factors, changes = _segment_changes(motion, slopes)
     states, ends = _chained(motion, changes)
     flat = changes.reshape(len(states), -1, changes.shape[-1])
     total = flat[..., :12] @ states
     total[..., 12:] += flat[..., 12:]
     accelerations = total.reshape(changes.shape)
     by_start, ends = flat[..., :STATE], ends[..., :STATE]
-    return Linearised(motion, asked, columns, states, accelerations, matrices, by_start, ends)
+    return Linearised(motion, asked, columns, states, accelerations, factors, by_start, ends)
 
 
-def _slopes(motion: Motion, still: int, *instants: Array) -> Array:
-    """Of the accelerations by [zeta; rates; inertia; values] at instants (s, m), (s, m, 6, c)."""
-    force = motion.model.acceleration
-    if not still:
-        function = with_jacobian(force, (1, 2, 3, 4))
-        return evaluate(function, *instants, motion.inertia, motion.values)[1]
-    first = len(motion.values) - still
-    numbers = tuple(float(value) for value in motion.values[first:])
-    parts = [
-        evaluate(function, *instants, motion.inertia, motion.values[:first])[0]
-        for function in jacobians_about(force, numbers)
-    ]
-    return np.concatenate(parts, axis=-1)
+def _slopes(
+    motion: Motion, asked: np.ndarray, still: int, *instants: Array
+) -> tuple[Array, np.ndarray]:
+    """Of the accelerations by [zeta; rates; inertia; values] at instants (s, m), (s, m, 6, c).
 
-
-def _slopes_by(motion: Motion, asked: np.ndarray, *instants: Array) -> tuple[Array, np.ndarray]:
-    """The same by some columns, (s, m, 6, c), and which of these are told."""
-    function, moved = moved_columns(motion.model.acceleration, (1, 2, 3, 4), tuple(asked.tolist()))
+    By those of the columns asked for that are not zero throughout, which come second.
+    """
+    force, places = motion.model.acceleration, tuple(asked.tolist())
+    if still:
+        first = len(motion.values) - still
+        numbers = tuple(float(value) for value in motion.values[first:])
+        parts = [
+            evaluate(function, *instants, motion.inertia, motion.values[:first])[0]
+            for function in jacobians_about(force, numbers, places)
+        ]
+        return np.concatenate(parts, axis=-1), asked
+    function, moved = moved_columns(force, (1, 2, 3, 4), places)
     found = evaluate(function, *instants, motion.inertia, motion.values)[0]
-    columns = np.union1d(np.arange(STATE), np.array(moved, dtype=np.int64))
-    if len(columns) == len(moved):
-        return found, columns
-    whole = np.zeros((*found.shape[:-1], len(columns)))
-    whole[..., np.searchsorted(columns, moved)] = found
-    return whole, columns
+    return found, np.array(moved, dtype=np.int64)
 
 
-def _segment_changes(motion: Motion, slopes: Array) -> tuple[Array, Array]:
-    """Matrices (s, 6 m, 6 m), and what their inverses make of all that a segment depends on.
+def _segment_changes(motion: Motion, slopes: Array) -> tuple[Factors, Array]:
+    """Factors of matrices (6 m, 6 m), and what their inverses make of all a segment depends on.
 
     That is the node accelerations' derivatives by [zeta_s; rates_s; inertia; values], (s, m, 6, c).
     """
@@ -139,12 +171,19 @@ def _segment_changes(motion: Motion, slopes: Array) -> tuple[Array, Array]:
     step = motion.steps_s[:, None, None, None]
     drifting = by_rates + by_zeta * step * t.nodes[:, None, None]
     right = np.concatenate([by_zeta, drifting, by_rest], axis=-1)
-    step = step[..., None]
-    matrix = t.twice[:, None, :, None] * (-(step**2) * by_zeta[:, :, :, None, :])
-    matrix -= t.once[:, None, :, None] * (step * by_rates[:, :, :, None, :])
-    matrix = matrix.reshape(s, 6 * m, 6 * m)
+    both = np.concatenate([step**2 * by_zeta, step * by_rates], axis=-1)
+    matrix = (both @ _spread(m)).reshape(s, 6 * m, 6 * m)
     matrix[:, np.arange(6 * m), np.arange(6 * m)] += 1.0
-    return matrix, np.linalg.solve(matrix, right.reshape(s, 6 * m, -1)).reshape(s, m, 6, -1)
+    factors = Factors.of(matrix)
+    return factors, factors.solved(right.reshape(s, 6 * m, -1)).reshape(s, m, 6, -1)
+
+
+@cache
+def _spread(m: int) -> Array:
+    """Takes slopes by [zeta; rates] at each node to those by all accelerations, (m, 12, 6 m)."""
+    t = table(m)
+    parts = [np.einsum("ij,ab->iajb", -part, np.eye(6)) for part in (t.twice, t.once)]
+    return np.concatenate(parts, axis=1).reshape(m, 12, 6 * m)
 
 
 def _chained(motion: Motion, changes: Array) -> tuple[Array, Array]:

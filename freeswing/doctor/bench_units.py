@@ -17,7 +17,9 @@ LONGEST = 50.0  # wires over their distance from the middle: 12 m at 0.25 m
 SHORTEST = 0.1  # the same: 25 mm at 0.25 m
 FARTHEST = 10.0  # a known mass, or an object's centre, over the wires' distance from the middle
 HEAVIEST = 200.0  # what lies on a platform over the platform
+LIGHTEST = 1000.0  # a platform over the heaviest that lies on it, of which no swing shows more
 WIDEST = 2.0  # a platform's motion over its wires' length: it goes round
+FEWEST = 20  # samples: two swings of ten, from which a start and its rates can be told
 SLOWEST = 0.25  # of a pendulum's period between samples: yaw may be four times as fast
 
 
@@ -29,7 +31,8 @@ def refuse_wrong_units(bench: Bench, robot: Robot) -> None:
     """
     ends = robot.attachments_m - robot.attachments_m.mean(axis=0)
     radius = float(np.sqrt(np.mean(np.sum(ends**2, axis=1))))
-    told = [*_of_loads(bench, robot, radius)]
+    _refuse_too_few(bench)
+    told = [*_of_loads(bench, robot, radius), *_of_platform(bench, robot)]
     for run in bench.runs:
         told += [f"run {run.name}: {one}" for one in _of_run(run, robot, radius)]
     if told:
@@ -37,11 +40,38 @@ def refuse_wrong_units(bench: Bench, robot: Robot) -> None:
         raise InputError(f"{'; '.join(told[:3])}{more}: write m, kg, s and rad")
 
 
+def _refuse_too_few(bench: Bench) -> None:
+    """Refuse columns that hold next to no numbers.
+
+    Raises:
+        InputError: naming run, column and count.
+    """
+    for run in bench.runs:
+        for signal in run.signals:
+            known = int(np.isfinite(signal.values).sum())
+            if known < FEWEST:
+                raise InputError(
+                    f"run {run.name}: the column of {signal.column} holds {known} number(s), "
+                    f"{FEWEST} are needed: record the swing, or leave the column out"
+                )
+
+
 def _of_loads(bench: Bench, robot: Robot, radius_m: float) -> Iterator[str]:
     for load in bench.loads:
         yield from _of_mass(f"loads {load.name}: mass_kg", load.mass_kg, robot)
         if load.com_m is not None:
             yield from _of_place(f"loads {load.name}: com_m", load.com_m, radius_m)
+
+
+def _of_platform(bench: Bench, robot: Robot) -> Iterator[str]:
+    masses = [load.mass_kg for load in bench.loads]
+    masses += [payload.mass_kg for run in bench.runs for payload in run.payloads]
+    platform = robot.platform.mass_kg
+    if platform is not None and masses and platform > LIGHTEST * max(masses):
+        yield (
+            f"platform mass_kg (robot.toml) = {platform:.4g} kg, and the heaviest on it has "
+            f"{max(masses):.4g} kg: is it in g?"
+        )
 
 
 def _of_run(run: BenchRun, robot: Robot, radius_m: float) -> Iterator[str]:

@@ -8,6 +8,7 @@ from typing import TypeVar
 from freeswing.cdpr.files.documents import DataError, InputError
 from freeswing.cdpr.measured.target import Target
 from freeswing.cdpr.robot import Robot
+from freeswing.doctor.bench_runs import bench_findings
 from freeswing.doctor.finding import Finding
 from freeswing.doctor.geometry import robot_findings
 from freeswing.doctor.markers import marker_findings
@@ -19,6 +20,7 @@ from freeswing.doctor.recordings import (
 )
 from freeswing.doctor.run_roles import split_findings
 from freeswing.ident.runs import SwingRun
+from freeswing.session.load_bench import is_bench
 from freeswing.session.load_swings import load_robot, load_swing, load_target, trajectory_path
 from freeswing.session.marker_runs import MarkerRuns, read_marker_runs
 from freeswing.session.session_file import Run, Session
@@ -44,15 +46,18 @@ def _findings(session: Session, progress: Progress) -> Iterator[Finding]:
     markers = read_marker_runs(session, target)
     yield from marker_findings(markers)
     swings: list[SwingRun] = []
+    bench = robot is not None and is_bench(session, robot)
     for count, run in enumerate(session.runs):
         progress("examining the runs", count / len(session.runs))
         if run.video is not None:
             yield from video_findings(session, run)
             yield from footage_findings(f"run {run.name}", run.video, session.frame_rate_hz)
-        if robot is not None:
+        if robot is not None and not bench:
             swing = yield from _run(session, run, robot, target, markers)
             swings += [] if swing is None else [swing]
-    yield from split_findings(session, swings)
+    if robot is not None and bench:
+        swings = yield from bench_findings(session, robot, target)
+    yield from split_findings(session, swings, left_out=bench)
     progress("examining the runs", 1.0)
 
 

@@ -25,6 +25,11 @@ class Kind:
     radius_m: float | None = 0.0
     any_count: bool = False
 
+    @property
+    def is_bench(self) -> bool:
+        """Whether it hangs on two or three parallel strings."""
+        return not self.any_count and self.cables in (2, 3)
+
 
 KINDS = {
     "cable-robot": Kind("a platform on cables over pulleys", 4, '["x", "y"]', None, True),
@@ -39,6 +44,10 @@ def robot_toml(name: str, kind: Kind, cables: int, mass_kg: float | None) -> str
     """The text of robot.toml with every number that has to be measured marked `nan`."""
     free = kind.free_coordinates if cables == kind.cables else '"auto"'
     mass = f"mass_kg = {mass_kg:g}" if mass_kg else "# mass_kg = 8.0     # weigh it: optional"
+    if kind.is_bench:
+        weighed = f"{mass_kg:g}" if mass_kg else MISSING
+        mass = f"mass_kg = {weighed}      # with all that hangs on it: kg m2 go with it"
+        mass += "\n# mass_std_kg = 0.001   # how well; without it the mass is trusted"
     lines = [
         'format = "freeswing-robot/1"',
         f'name = "{name}"',

@@ -59,8 +59,29 @@ class Channel:
                     f"channel {self.name}: {what} of {', '.join(strange)}, which is not among its "
                     f"coordinates {', '.join(self.coordinates)}"
                 )
+        self._check_gains()
         object.__setattr__(self, "gains", MappingProxyType(dict(self.gains)))
         object.__setattr__(self, "gains_std", MappingProxyType(dict(self.gains_std)))
+
+    def _check_gains(self) -> None:
+        main = self.main_coordinate
+        if self.gains.get(main) == 0.0:
+            raise ValueError(
+                f"channel {self.name}: gains of {main} is 0: it would show no swing; leave gains "
+                "out where they are not known"
+            )
+        without = [name for name in self.gains_std if name not in self.gains]
+        if without:
+            raise ValueError(
+                f"channel {self.name}: gains_std of {', '.join(without)} without gains of it: give "
+                "both, or neither"
+            )
+        exact = [name for name, std in self.gains_std.items() if not std > 0.0]
+        if exact:
+            raise ValueError(
+                f"channel {self.name}: gains_std of {', '.join(exact)} must be above 0; leave it "
+                "out where the gain is exact"
+            )
 
     @property
     def terms(self) -> tuple[tuple[int, ...], ...]:

@@ -13,7 +13,7 @@ from freeswing.cdpr.robot import POSE_COORDINATES, Array, Robot
 from freeswing.ident.bench.assemble import EFFECTS, assembled
 from freeswing.ident.bench.channels import check_moves
 from freeswing.ident.bench.priors.wire_priors import with_lengths
-from freeswing.ident.bench.runs import Bench, BenchRun, Signal
+from freeswing.ident.bench.runs import Bench, BenchRun, Signal, check_swings
 from freeswing.ident.bench.solve import Solved, solved
 from freeswing.ident.bench.told.budget import budget
 from freeswing.ident.bench.told.classic import (
@@ -109,7 +109,7 @@ def identify_bench(bench: Bench, robot: Robot) -> BenchResult:
     Raises:
         DataError: when the data cannot give a result, naming run, number and remedy.
     """
-    _check(bench, robot)
+    check_runs(bench, robot)
     model = build_model(robot, EFFECTS)
     runs = tuple(with_lengths(model, run) for run in bench.runs)
     bench = replace(bench, runs=tuple(_windowed(run) for run in runs))
@@ -128,7 +128,12 @@ def identify_bench(bench: Bench, robot: Robot) -> BenchResult:
     return BenchResult(found, bench, classic, validation, tuple(notes), envelopes(found))
 
 
-def _check(bench: Bench, robot: Robot) -> None:
+def check_runs(bench: Bench, robot: Robot) -> None:
+    """Refuse a session whose runs cannot give what is asked of them.
+
+    Raises:
+        DataError: naming what is missing, or the run and the column that shows nothing.
+    """
     fitted = [run for run in bench.runs if run.role == "identify"]
     if not fitted:
         raise DataError('no run with role = "identify": there is nothing to identify from')
@@ -153,6 +158,7 @@ def _check(bench: Bench, robot: Robot) -> None:
                 f"run {run.name}: level_std_rad says how a platform rolls on two wires, and this "
                 f"one hangs on {robot.n_cables}: leave it out"
             )
+        check_swings(run)
         for signal in run.signals:
             if not signal.is_coordinate:
                 check_moves(run.name, signal.column, signal.values)

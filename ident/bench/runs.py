@@ -7,8 +7,11 @@ from typing import Literal
 
 import numpy as np
 
+from freeswing.cdpr.files.problems import DataError
 from freeswing.cdpr.robot import POSE_COORDINATES, Array
 from freeswing.ident.bench.channels import Channel
+
+STILL = 1.5  # of the noise between neighbours: noise alone spreads by 1, five samples a swing by 2
 
 Role = Literal["identify", "validate"]
 
@@ -138,3 +141,36 @@ class Bench:
     def load(self, name: str) -> Load:
         """The load of that name."""
         return next(load for load in self.loads if load.name == name)
+
+
+def check_swings(run: BenchRun) -> None:
+    """Refuses a run whose coordinates stand still: its noise would be taken for nothing.
+
+    A yaw of the same number throughout made a session 94 % wrong, and sure.
+
+    Args:
+        run: any; one with channels is looked at by theirs.
+
+    Raises:
+        DataError: naming the run, and the columns or the one that never changes.
+    """
+    mine = [signal for signal in run.signals if signal.is_coordinate]
+    for signal in mine:
+        if not np.nanmax(signal.values) > np.nanmin(signal.values):
+            raise DataError(
+                f"run {run.name}: column {signal.column} is the same number throughout, which no "
+                "sensor gives: leave it out"
+            )
+    if mine and len(mine) == len(run.signals) and not any(_moves(one.values) for one in mine):
+        names = ", ".join(signal.column for signal in mine)
+        raise DataError(
+            f"run {run.name}: {names} never move above their noise: twist wider, or leave the run "
+            "out"
+        )
+
+
+def _moves(values: Array) -> bool:
+    """Whether a column's spread is more than the noise between its neighbours."""
+    known = values[np.isfinite(values)]
+    noise = float(np.std(np.diff(known, 2))) / np.sqrt(6.0)
+    return float(np.std(known)) > STILL * noise

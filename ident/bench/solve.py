@@ -24,8 +24,10 @@ from freeswing.ident.likelihood.fit import Solution, fit
 from freeswing.ident.likelihood.fit_blocks import Dense
 from freeswing.ident.likelihood.unknowns import Unknowns
 
+FIRST_S = 12.0  # of long runs: a guess from half of it still counts their swings right
+LONGER = 3.0  # each next stretch: a fit of one knows its frequency to far less than a third
 ROUGH = Dense(steps=30, tolerance=3.0)
-FINE = Dense(steps=30, tolerance=0.1)
+FINE = Dense(steps=60, tolerance=0.1)
 LEAST_FOR_SCATTER = 5  # runs: fewer cannot tell scatter from what is looked for
 
 
@@ -92,7 +94,7 @@ def solved(model: Model, bench: Bench, start: Assembled) -> Solved:
     izz = float(moments(unknowns.block("platform").value)[IZZ])
     if scattering:  # from the start, or the noise would be taken for as large as the scatter
         unknowns = unknowns.joined(scatter_block(len(swings), izz, WIDE_SCATTER * izz))
-    found = fit(swings, unknowns, ROUGH)
+    found = fit(swings, stretched(swings, unknowns), ROUGH)
     fastest_hz = _fastest(model, found, swings[0])
     swings = rescaled(swings, found, fastest_hz, coloured=True)
     found = fit(swings, found.unknowns, FINE)
@@ -127,6 +129,20 @@ def solved(model: Model, bench: Bench, start: Assembled) -> Solved:
     names = (block.name for block in unweighed.unknowns.shared)
     doubts = {name: change[unweighed.unknowns.columns(name)] for name in names}
     return Solved(found, swings, first, tau, mass, wires, held, fastest_hz, doubts)
+
+
+def stretched(swings: tuple[BenchSwing, ...], unknowns: Unknowns) -> Unknowns:
+    """The unknowns once growing stretches of the runs have been followed, all but the last.
+
+    A guess that is right to a percent loses count of the swings of a minute.
+    """
+    longest = max(swing.span_s[1] - swing.span_s[0] for swing in swings)
+    span = FIRST_S
+    while span < longest:
+        parts = [swing.until(swing.span_s[0] + span) for swing in swings]
+        unknowns = fit(parts, unknowns, ROUGH).unknowns
+        span *= LONGER
+    return unknowns
 
 
 def _without_scatter(unknowns: Unknowns) -> Unknowns:
@@ -178,7 +194,8 @@ def _rough(swings: tuple[BenchSwing, ...], unknowns: Unknowns) -> Unknowns:
     if not bent:
         return unknowns
     held = Unknowns(tuple(bent.get(block.name, block) for block in unknowns.blocks))
-    found = fit(swings, held, ROUGH).unknowns
+    parts = [swing.until(swing.span_s[0] + FIRST_S) for swing in swings]
+    found = fit(parts, held, ROUGH).unknowns
     return unknowns.moved({block.name: block.value for block in found.blocks})
 
 

@@ -6,8 +6,8 @@ Every measured column is one coordinate or one channel, each with its own noise 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import dataclass, replace
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -138,6 +138,15 @@ class BenchSwing:
     def span_s(self) -> tuple[float, float]:
         """First and last sample."""
         return float(self.times_s[0]), float(self.times_s[-1])
+
+    def until(self, end_s: float) -> Self:
+        """The run up to some time."""
+        inside = self.times_s <= end_s
+        columns = (
+            replace(column, values=column.values[inside], std=column.std[inside])
+            for column in self.columns
+        )
+        return replace(self, times_s=self.times_s[inside], columns=tuple(columns))
 
     def total(self, values: Mapping[str, Array]) -> Array:
         """Mass, first moments and tensor about P of everything that swings, (10,)."""

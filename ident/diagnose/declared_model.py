@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -34,6 +34,8 @@ MOST_STARTS = 3
 ROUGH_TOLERANCE = 1.0
 # Two starts that end within a tenth of the deviations have found one valley.
 SAME_FIT = 0.1
+# After the first stretch, roughly followed, they are apart by 0.14, after the next by 1e-4.
+SAME_VALLEY = 0.5
 # What an effect leaves is small beside the swings; what a fit in the wrong valley leaves is not.
 SMALL_BESIDE_SWINGS = 0.25
 AT_THE_NOISE = 2.0
@@ -84,17 +86,22 @@ def base_fit(
         DataError: when fewer than three runs can be started, or no start leads to a fit.
     """
     found: list[tuple[LikelihoodFit, list[PreparedRun], list[str]]] = []
-    failure = ""
+    failure, earlier = "", list[_Watch]()
     for inertia in starts[:MOST_STARTS]:
         try:
             kept, samples, states, left = begun(model, runs, free, inertia)
             refuse_few(kept)
             unknowns = first_unknowns(model, inertia, states, [run.payload for run in samples])
             swings = Swings(model, tuple(samples), noise_scales)
-            rough = fit(swings, unknowns, FreeSwing(tolerance=ROUGH_TOLERANCE, progress=progress))
+            watch = _Watch(earlier, len(kept))
+            how = FreeSwing(tolerance=ROUGH_TOLERANCE, progress=progress, begun=watch)
+            rough = fit(swings, unknowns, how)
+        except _SameValleyError:
+            break
         except (ValueError, np.linalg.LinAlgError) as error:
             failure = failure or str(error)
             continue
+        earlier.append(watch)
         found.append((rough, kept, [f"run {one.run} left out: {one.why}" for one in left]))
         follows = is_possible(rough.inertia) and _follows(rough, noise_scales)
         if follows or any(_is_same(rough, other) for other, _, _ in found[:-1]):
@@ -108,7 +115,41 @@ def base_fit(
     # In units of the noise a residual far above it would be followed to its last digit.
     power = rough.cost / rough.n_samples * float(np.max(rough.scales / noise_scales)) ** 2
     tolerance = CONVERGED_DECREASE * max(1.0, power)
-    return fit(swings, rough.unknowns, replace(ONWARD, tolerance=tolerance)), kept, dropped
+    return (
+        fit(swings, rough.unknowns, replace(ONWARD, tolerance=tolerance, foresees=True)),
+        kept,
+        dropped,
+    )
+
+
+class _SameValleyError(Exception):
+    """A start has come to where an earlier one was, which was fitted."""
+
+
+class _Watch:
+    """Where a fit stands after its first stretch; ends it where an earlier one stood as well.
+
+    Args:
+        earlier: those of starts that led to a fit.
+        runs: how many this one has.
+    """
+
+    def __init__(self, earlier: Sequence[_Watch], runs: int) -> None:
+        self.earlier = tuple(earlier)
+        self.runs = runs
+        self.inertia = np.full(9, np.nan)
+
+    def __call__(self, inertia: Array, stds: Array) -> None:
+        """Told once the first stretch is fitted.
+
+        Raises:
+            _SameValleyError: where the rest would go the way of an earlier fit.
+        """
+        self.inertia = inertia
+        for one in self.earlier:
+            near = np.abs(inertia - one.inertia) < SAME_VALLEY * stds
+            if one.runs == self.runs and bool(near.all()):
+                raise _SameValleyError
 
 
 def refuse_few(runs: list[PreparedRun]) -> None:

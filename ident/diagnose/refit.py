@@ -13,7 +13,7 @@ from freeswing.cdpr.model.known_values import with_effects, with_known, without_
 from freeswing.cdpr.robot import Array
 from freeswing.ident.diagnose.leave_one_out import Evidence, Score, score
 from freeswing.ident.diagnose.outstanding_runs import tempered
-from freeswing.ident.diagnose.screen import screen
+from freeswing.ident.diagnose.screen import NONE, screen
 from freeswing.ident.diagnose.spectrum import residual_powers
 from freeswing.ident.diagnose.variants import effect_of, inside
 from freeswing.ident.likelihood.blocks import (
@@ -32,6 +32,8 @@ BY_LENGTHS = "the lengths along the runs"
 # Surveys and calibrations are good to a few tenths of a millimetre: 0.3 mm for a displaced point.
 NEGLIGIBLE = 0.1
 RANKING_ACCURACY_M = 3e-7
+# What is told of the last one is fitted again from there, with its own noise.
+SEARCHED = replace(ONWARD, foresees=True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,9 +71,18 @@ def colour_of(fit: LikelihoodFit, noise_scales: Array) -> float:
     return max(1.0, power * correlation_factor(fit.motions, fit.samples, noise_scales))
 
 
-def rescored(current: LikelihoodFit, noise_scales: Array, colour: float) -> Refit:
-    """Score a fit that is there already, by the unknowns that it estimates."""
-    linear = screen(current, (), noise_scales, colour=colour)
+def rescored(
+    current: LikelihoodFit, noise_scales: Array, colour: float, beside: np.ndarray = NONE
+) -> Refit:
+    """Score a fit that is there already, by the unknowns that it estimates.
+
+    Args:
+        current: the fit.
+        noise_scales: of metres and radians, (2,).
+        colour: of its residual.
+        beside: shared unknowns that the evidence is by as well, held though they are, (h,).
+    """
+    linear = screen(current, (), noise_scales, colour=colour, beside=beside)
     return Refit(current, linear.evidence, score(linear.evidence.subset(linear.base)))
 
 
@@ -155,7 +166,7 @@ def polished(found: LikelihoodFit, noise_scales: Array) -> Refit:
     """A fit that goes on to convergence."""
     colour = colour_of(found, noise_scales)
     samples, scales = tempered(found, noise_scales), noise_scales * np.sqrt(colour)
-    exact = fit(replace(found.swings, samples=samples, scales=scales), found.unknowns, ONWARD)
+    exact = fit(replace(found.swings, samples=samples, scales=scales), found.unknowns, SEARCHED)
     return rescored(exact, noise_scales, colour)
 
 
@@ -172,7 +183,7 @@ def freed(one: Refit, noise_scales: Array) -> Refit:
         return one
     samples = freed_samples(found, step)
     scales = noise_scales * np.sqrt(colour_of(found, noise_scales))
-    exact = fit(replace(found.swings, samples=samples, scales=scales), found.unknowns, ONWARD)
+    exact = fit(replace(found.swings, samples=samples, scales=scales), found.unknowns, SEARCHED)
     return rescored(exact, noise_scales, colour_of(exact, noise_scales))
 
 
@@ -180,14 +191,14 @@ def without(found: LikelihoodFit, name: str, noise_scales: Array) -> Refit:
     """A fit without one of its effects, from where it stands, converged."""
     mine = (name, each_run(name)) if each_run(name) in found.unknowns else (name,)
     unknowns, fewer = found.unknowns.without(*mine), without_effect(found.model, name)
-    exact = fit(Swings(fewer, found.samples, found.scales), unknowns, ONWARD)
+    exact = fit(Swings(fewer, found.samples, found.scales), unknowns, SEARCHED)
     return rescored(exact, noise_scales, colour_of(exact, noise_scales))
 
 
 def _ranked(swings: Swings, unknowns: Unknowns, cost: float) -> LikelihoodFit:
     """Converged to a ten-thousandth of the cost before: enough to rank candidates."""
     how = replace(
-        ONWARD,
+        SEARCHED,
         steps=RANKING_STEPS,
         tolerance=max(0.1, 1e-4 * cost),
         accuracy_m=RANKING_ACCURACY_M,

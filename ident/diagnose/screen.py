@@ -22,6 +22,8 @@ from freeswing.ident.likelihood.calibration_modes import amplitudes_of, motion_s
 from freeswing.ident.likelihood.fit_swings import LikelihoodFit
 from freeswing.ident.likelihood.run_residuals import Reduced, Samples, reduce_run
 
+NONE = np.zeros(0, dtype=np.int64)
+
 
 @dataclass(frozen=True, slots=True)
 class Screen:
@@ -53,8 +55,11 @@ def screen(
     noise_scales: Array,
     shapes: dict[str, dict[str, float]] | None = None,
     colour: float = 1.0,
+    beside: np.ndarray = NONE,
 ) -> Screen:
     """Linearise a fit by its own unknowns and by the amplitudes of candidates.
+
+    The columns of the evidence by all others are zero.
 
     Args:
         fit: the current model's.
@@ -63,6 +68,7 @@ def screen(
         shapes: values for shape parameters (a frequency) by effect and parameter name.
         colour: power of the residual in the band of the motion over the noise's, >= 1: samples
             that a model does not reach count that much less beside the priors.
+        beside: further shared unknowns to linearise by, held though they are, (h,).
     """
     fresh = [n for n in dict.fromkeys(map(effect_of, keys)) if n not in fit.model.effects]
     model = with_effects(fit.model, fresh) if fresh else fit.model
@@ -74,13 +80,18 @@ def screen(
             parameter = model.parameters[k]
             values[k] = (shapes or {}).get(name, {}).get(parameter.name, parameter.start)
     common = len(amplitudes_of(fit.samples))
+    base = np.flatnonzero(fit.free)
+    columns = {key: _amplitudes(model, key) for key in keys}
+    wanted = np.zeros(shared_size(model), dtype=bool)
+    own = len(fit.inertia) + model.own_values
+    wanted[np.concatenate([base, own, beside, *columns.values()])] = True
 
     def reduced(motion: Motion, samples: Samples) -> tuple[Array, OwnValues | None]:
         mine = values.copy()
         mine[: len(fit.values)] = motion.values
         moved = replace(motion, model=model, values=mine)
         found = reduce_run(
-            linearise(moved, len(values) - len(fit.values)),
+            linearise(moved, len(values) - len(fit.values), wanted),
             samples,
             noise_scales,
             motion_shifts(motion, samples, common) if common else None,
@@ -88,7 +99,7 @@ def screen(
         )
         return found.rows, _own_values(found, moved, colour)
 
-    triangles, own = zip(*side_by_side(reduced, fit.motions, fit.samples), strict=True)
+    triangles, known = zip(*side_by_side(reduced, fit.motions, fit.samples), strict=True)
     counts = [_count(samples, model) for samples in fit.samples]
     evidence = Evidence(
         tuple(s.name for s in fit.samples),
@@ -96,10 +107,9 @@ def screen(
         np.array(counts, dtype=np.float64),
         np.sqrt(colour) * known_rows(model, values, fit.samples),
         common,
-        _together(own),
+        _together(known),
     )
-    columns = {key: _amplitudes(model, key) for key in keys}
-    return Screen(model, values, evidence, np.flatnonzero(fit.free), columns)
+    return Screen(model, values, evidence, base, columns)
 
 
 def _count(samples: Samples, model: Model) -> int:

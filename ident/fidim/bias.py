@@ -78,9 +78,9 @@ def smoothing_bias(
 ) -> Share:
     """The share of smoothing: swings without noise, smoothed and solved alike.
 
-    The swings are those of the estimate less what noise moves it by. Where smoothing's share is
-    larger than the scatter they are not quite the platform's: those of the estimate less that share
-    too are nearer, and are asked in turn.
+    The swings are the estimate's own. Where noise and smoothing move it by more than the scatter
+    they are not quite the platform's: those of the estimate less both are nearer, and are asked in
+    turn.
 
     Args:
         model: the robot.
@@ -99,15 +99,16 @@ def smoothing_bias(
         parametric bootstrap, here of its noise-free draw; Gourieroux, Monfort, Renault 1993,
         Indirect Inference, sec. 2: the values whose draws give the estimate.
     """
-    estimate = stack.values[:9] - (0.0 if noise is None else noise)
-    inertia = estimate
+    inertia = stack.values[:9]
+    without_noise = inertia - (0.0 if noise is None else noise)
     change = _smoothed_away(model, runs, full, settings, stack, inertia)
     before = None
     for _ in range(_ROUNDS):
-        size = change[:9] if before is None else change[:9] - before[1][:9]
+        off = without_noise - change[:9] - inertia
+        size = off if before is None else change[:9] - before[1][:9]
         if np.abs(size / scatter).max() < SETTLED:
             break
-        following = _nearer(estimate, inertia, change[:9], before, scatter)
+        following = _nearer(without_noise, inertia, change[:9], before, scatter)
         before = inertia, change
         try:
             change = _smoothed_away(model, runs, full, settings, stack, following)

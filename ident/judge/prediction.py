@@ -12,7 +12,13 @@ from freeswing.cdpr.robot import POSE_COORDINATES, Array, frozen_array
 from freeswing.cdpr.rotation import pose_differences
 from freeswing.ident.likelihood.blocks import STARTS, each_run, first_unknowns, split_own
 from freeswing.ident.likelihood.fit import fit
-from freeswing.ident.likelihood.fit_swings import ONWARD, FreeSwing, LikelihoodFit, Swings
+from freeswing.ident.likelihood.fit_swings import (
+    CONVERGED_DECREASE,
+    ONWARD,
+    FreeSwing,
+    LikelihoodFit,
+    Swings,
+)
 from freeswing.ident.likelihood.run_residuals import Samples, predicted, residuals
 from freeswing.ident.likelihood.session_estimates import sampled, started
 from freeswing.ident.likelihood.unknowns import Unknowns
@@ -21,6 +27,8 @@ from freeswing.ident.signals.prepare import PreparedRun
 
 # Ten samples a period at the 5 Hz where swings of a platform end (`band.LOWEST_PASS_HZ`).
 PREDICTED_HZ = 50.0
+# A fit that only weighs the next one is not followed further: the errors differ by 4e-4 of them.
+_WEIGHED_DECREASE = 0.5
 _AS_GOOD = 1.1  # times the error under a model before: no reason for another, careful start
 _ASTRAY = 0.05  # residual over motion beyond which a fit deserves a second, careful start
 
@@ -241,7 +249,7 @@ def _weighed(found: LikelihoodFit) -> LikelihoodFit:
     What a model misses follows the swing: of thousands of samples a few dozen are independent, and
     counted one by one they turn a platform's frame by many times what markers can be off.
     """
-    if not len(found.model.own_values):
+    if not _is_weighed(found.model):
         return found
     (samples,), (motion,) = found.samples, found.motions
     white = residuals(motion, samples, found.scales)
@@ -250,8 +258,14 @@ def _weighed(found: LikelihoodFit) -> LikelihoodFit:
     return fit(swings, found.unknowns, ONWARD)
 
 
+def _is_weighed(model: Model) -> bool:
+    """Whether a run has unknowns of its own beside its start."""
+    return bool(len(model.own_values))
+
+
 def _fitted(swings: Swings, unknowns: Unknowns, grow: bool) -> LikelihoodFit:
-    return fit(swings, unknowns, FreeSwing(grow=grow))
+    tolerance = _WEIGHED_DECREASE if _is_weighed(swings.model) else CONVERGED_DECREASE
+    return fit(swings, unknowns, FreeSwing(tolerance=tolerance, grow=grow))
 
 
 def _seen(found: LikelihoodFit) -> Array:

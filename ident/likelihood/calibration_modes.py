@@ -21,6 +21,7 @@ from freeswing.cdpr.robot import Array
 from freeswing.cdpr.rotation import angle_rate_matrix, matrix_from_angles
 from freeswing.cdpr.simulation.free_swing import Motion
 from freeswing.cdpr.simulation.sensitivity import linearise
+from freeswing.cdpr.system.threads import side_by_side
 from freeswing.ident.likelihood.blocks import state_of
 from freeswing.ident.likelihood.fit import fit
 from freeswing.ident.likelihood.fit_swings import FreeSwing, LikelihoodFit
@@ -214,13 +215,16 @@ def _solved(current: LikelihoodFit) -> _Joint:
     layout = problem.layout.joined(MODES, n_modes)
     state = state_of(current.unknowns, current.model, current.scales)
     weight = 1.0 / np.sqrt(current.enlargement)
+
+    def reduced(motion: Motion, run: Samples) -> Array:
+        linear = linearise(motion, wanted=problem.wanted)
+        return reduce_run(linear, run, current.scales, motion_shifts(motion, run, n_modes)).rows
+
     rows = []
-    for motion, run in zip(current.motions, current.samples, strict=True):
-        shifts = motion_shifts(motion, run, n_modes)
-        found = reduce_run(linearise(motion), run, current.scales, shifts).rows[:-1]
+    for found in side_by_side(reduced, current.motions, current.samples):
         shared = problem.shared_map(len(rows), state)
-        by_shared = found[:, : len(shared)] @ shared
-        rows.append(weight * np.hstack([by_shared, found[:, len(shared) :]]))
+        by_shared = found[:-1, : len(shared)] @ shared
+        rows.append(weight * np.hstack([by_shared, found[:-1, len(shared) :]]))
     prior = problem.prior_rows(state)
     rows.append(np.hstack([prior[:, :-1], np.zeros((len(prior), n_modes)), prior[:, -1:]]))
     rows.append(np.hstack([np.zeros((n_modes, n_shared)), np.eye(n_modes), amplitudes[:, None]]))

@@ -35,6 +35,7 @@ from freeswing.ident.likelihood.unknowns import Mask, Unknowns
 from freeswing.ident.signals.residual_colour import enlargement, low_band_factor
 
 Progress = Callable[[str, float], None]
+Begun = Callable[[Array, Array], None]
 WHOLE = "maximum likelihood: whole runs"
 
 FIRST_STATES_S = 0.4  # short enough that no mode turns round: rough first states become good
@@ -177,7 +178,11 @@ class FreeSwing:
         own_noise: whether noise scales follow the residuals.
         consistent: hold the inertia, of which all is then free, to what a body can have.
         accuracy_m: local error of the simulated motions.
+        foresees: whether it ends a step sooner where the steps to come would lower the cost by less
+            than the tolerance: where no digits are told.
         progress: told a label and a fraction.
+        begun: told inertia and its standard deviations, (9,) each, once the first stretch is
+            fitted; what it raises ends the fit.
     """
 
     steps: int = STEPS
@@ -186,7 +191,9 @@ class FreeSwing:
     own_noise: bool = True
     consistent: bool = False
     accuracy_m: float = TOLERANCE_M
+    foresees: bool = False
     progress: Progress | None = None
+    begun: Begun | None = None
 
     def fitted(self, swings: Swings, unknowns: Unknowns) -> LikelihoodFit:
         """Inertia, effect values, payloads, initial states and lengths that make runs likeliest.
@@ -203,7 +210,9 @@ class FreeSwing:
         else:
             self.tell(WHOLE, 0.0)
         problem = _problem(swings.model, swings.samples, free, self, self.accuracy_m)
-        state, step, taken, stop = minimised(problem, state, self.steps, self.tolerance)
+        state, step, taken, stop = minimised(
+            problem, state, self.steps, self.tolerance, self.foresees
+        )
         self.tell("maximum likelihood", 1.0)
         return _packed(problem, state, step, taken, stop)
 
@@ -229,13 +238,23 @@ def _grown(swings: Swings, state: State, free: Mask, how: FreeSwing) -> State:
                 short = [run.until(run.span_s[0] + first_s) for run in parts]
                 states_alone = Problem(model, short, none, how.own_noise)
                 state = minimised(states_alone, state, STEPS, ROUGH_DECREASE)[0]
-        state = minimised(_problem(model, parts, free, how), state, STEPS, ROUGH_DECREASE)[0]
+        problem = _problem(model, parts, free, how)
+        state, step, *_ = minimised(problem, state, STEPS, ROUGH_DECREASE)
+        if index == 0 and how.begun:
+            how.begun(state.inertia, _inertia_stds(problem, step))
     how.tell(WHOLE, (total - 1) / total)
     for std in (LOOSE_LENGTH_STD_M, TIGHTER_LENGTH_STD_M):
         if any(run.lengths_m is not None and run.lengths_std_m < std for run in samples):
             problem = _problem(model, [run.loosened(std) for run in samples], free, how)
             state = minimised(problem, state, STEPS, ROUGH_DECREASE)[0]
     return state
+
+
+def _inertia_stds(problem: Problem, step: Step) -> Array:
+    """Standard deviations of the inertia by a step's triangle, (9,)."""
+    determined = step.rank >= int(problem.free.sum())
+    covariance = shared_covariance(step.triangle, determined, problem.free, problem.unit)
+    return np.sqrt(np.diag(covariance))[problem.layout.place(INERTIA)]
 
 
 def _problem(

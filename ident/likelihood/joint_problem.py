@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -153,22 +152,35 @@ class Problem:
         far = [3.0 * INERTIA_UNIT, [(p.high - p.low) / 3.0 for p in parameters], self.loads.unit]
         self.farthest = np.concatenate(far)
 
-    def simulated(self, state: State, near: Sequence[Surroundings] = ()) -> State:
+    def simulated(
+        self, state: State, near: Sequence[Surroundings] = (), most: float = np.inf
+    ) -> State:
         """The state with motions from its starts, whose rates are made admissible.
 
         Args:
             state: its motions do not count.
             near: of motions that may be near, one a run, or none.
+            most: runs are followed until they cost more together.
 
         Raises:
-            ValueError: when one cannot be followed, naming the run.
+            ValueError: when one cannot be followed, naming the run, and where they cost more.
         """
         runs = range(len(state.starts))
-        motions = tuple(
-            side_by_side(
-                partial(self._followed, state), runs, state.starts, near or [None] * len(runs)
-            )
-        )
+        costs = [] if np.isinf(most) else [self._shared_cost(state)]
+
+        def refuse_more() -> None:
+            if sum(costs) > most:
+                raise ValueError(f"the runs cost more than {most:g}")
+
+        def followed(run: int, start: Array, near: Surroundings | None) -> Motion:
+            refuse_more()
+            motion = self._followed(state, run, start, near)
+            if costs:
+                costs.append(_run_cost(motion, self.samples[run], state.scales))
+                refuse_more()
+            return motion
+
+        motions = tuple(side_by_side(followed, runs, state.starts, near or [None] * len(runs)))
         starts = np.array([np.concatenate([one.zetas[0], one.rates[0]]) for one in motions])
         return replace(state, starts=starts, motions=motions)
 
@@ -213,13 +225,15 @@ class Problem:
 
     def cost(self, state: State) -> float:
         """Sum of squared whitened residuals, lengths and priors included."""
-        total = float(np.sum(self.prior(state.values) ** 2))
-        total += float(np.sum((self.loads_of(state) / self.loads.prior_std) ** 2))
+        total = self._shared_cost(state)
         for motion, samples in zip(state.motions, self.samples, strict=True):
-            total += float(np.sum(residuals(motion, samples, state.scales) ** 2))
-            total += float(np.sum(lengths_residual(motion, samples) ** 2))
-            total += float(np.sum(own_prior(motion, samples) ** 2))
+            total += _run_cost(motion, samples, state.scales)
         return total
+
+    def _shared_cost(self, state: State) -> float:
+        """Squared distances from what is known of the unknowns that all runs share."""
+        loads = self.loads_of(state) / self.loads.prior_std
+        return float(np.sum(self.prior(state.values) ** 2)) + float(np.sum(loads**2))
 
     def loads_of(self, state: State) -> Array:
         """What payload runs add to the unknowns, (u,)."""
@@ -229,22 +243,14 @@ class Problem:
         """Independent distances of unit deviation from what is known of the values, (k,)."""
         return self.prior_whitener @ (values - self.prior_centre)
 
-    def linear(self, state: State, before: Sequence[Surroundings] = ()) -> Linear:
-        """The motions of a state to first order.
+    def linear(self, state: State) -> Linear:
+        """The motions of a state to first order."""
 
-        Args:
-            state: with its motions.
-            before: of the state that it came from, or none.
-        """
-
-        def one(
-            motion: Motion, samples: Samples, near: Surroundings | None
-        ) -> tuple[Reduced, Surroundings]:
+        def one(motion: Motion, samples: Samples) -> tuple[Reduced, Surroundings]:
             linear = linearise(motion, wanted=self.wanted)
-            return reduce_run(linear, samples, state.scales), Surroundings.of(linear, near)
+            return reduce_run(linear, samples, state.scales), Surroundings.of(linear)
 
-        runs = len(self.samples)
-        found = side_by_side(one, state.motions, self.samples, before or [None] * runs)
+        found = side_by_side(one, state.motions, self.samples)
         reduced, surroundings = zip(*found, strict=True)
         return Linear(reduced, surroundings)
 
@@ -322,13 +328,16 @@ class Problem:
         payloads[:, -1] = self.loads_of(state) / self.loads.prior_std
         return np.vstack([effects, payloads])
 
-    def moved(self, state: State, step: Step, near: Sequence[Surroundings]) -> State | None:
+    def moved(
+        self, state: State, step: Step, near: Sequence[Surroundings], most: float = np.inf
+    ) -> State | None:
         """The simulated state after a step, or None where it cannot be simulated.
 
         Args:
             state: from which the step leads.
             step: the step.
             near: of the state's motions.
+            most: None as well where it costs more.
         """
         change = self.layout.split(step.shared)
         aimed = replace(
@@ -340,7 +349,7 @@ class Problem:
             loads=self.loads_of(state) + change[PAYLOADS],
         )
         try:
-            return self.simulated(aimed, near)
+            return self.simulated(aimed, near, most)
         except ValueError:
             return None
 
@@ -364,3 +373,10 @@ class Problem:
         factors = np.sqrt(squares / np.maximum(share * counts, 1.0))
         scales = np.where(counts > 0, state.scales * np.maximum(factors, 1e-6), state.scales)
         return replace(state, scales=scales)
+
+
+def _run_cost(motion: Motion, samples: Samples, scales: Array) -> float:
+    """Sum of squares of a run: residuals, lengths, and what is known of its own effect values."""
+    total = float(np.sum(residuals(motion, samples, scales) ** 2))
+    total += float(np.sum(lengths_residual(motion, samples) ** 2))
+    return total + float(np.sum(own_prior(motion, samples) ** 2))

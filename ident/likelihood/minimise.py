@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from freeswing.cdpr.descent import Stop, Undamped, Watchdog
-from freeswing.cdpr.simulation.nearby import Surroundings
 from freeswing.ident.likelihood.joint_problem import Linear, Problem, State, Step
 
 FIRST_DAMPING = 1e-7  # of the largest curvature: below, a damped step is the full one
@@ -22,7 +21,7 @@ NEGLIGIBLE = 1e-4  # of the tolerance: not worth a simulation
 
 
 def minimised(
-    problem: Problem, state: State, steps: int, tolerance: float
+    problem: Problem, state: State, steps: int, tolerance: float, foresees: bool = False
 ) -> tuple[State, Step, int, Stop]:
     """The state of least cost, the step that led to it, how many were taken, and why it stopped.
 
@@ -33,6 +32,7 @@ def minimised(
         state: where to start; motions that belong to it are not simulated again.
         steps: at most so many.
         tolerance: converged when an undamped step lowers the cost by less, as it promises or does.
+        foresees: or when the steps to come would, see `Watchdog`.
 
     Raises:
         ValueError: when the start cannot be simulated, naming the run.
@@ -40,7 +40,7 @@ def minimised(
     damping = Undamped(
         raised=FIRST_DAMPING, relief=4.0, least=FIRST_DAMPING / 10.0, largest=LARGEST_DAMPING
     )
-    search = Watchdog(steps, tolerance, damping, SHORTER, MOST_RISES, NEGLIGIBLE)
+    search = Watchdog(steps, tolerance, damping, SHORTER, MOST_RISES, NEGLIGIBLE, foresees)
     runs = _Runs(problem)
     place, step, taken, stop = search.descend(runs, runs.at(problem.begun(state)))
     return place.state, step, taken, stop
@@ -48,14 +48,10 @@ def minimised(
 
 @dataclass(frozen=True)
 class _Place:
-    """A state; its cost and all runs to first order once they are asked for.
-
-    `before` are the surroundings of the state that it came from.
-    """
+    """A state; its cost and all runs to first order once they are asked for."""
 
     problem: Problem
     state: State
-    before: tuple[Surroundings, ...] = ()
 
     @property
     def cost(self) -> float:
@@ -67,7 +63,7 @@ class _Place:
 
     @cached_property
     def linear(self) -> Linear:
-        return self.problem.linear(self.state, self.before)
+        return self.problem.linear(self.state)
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,10 +78,10 @@ class _Runs:
     def step(self, place: _Place, damping: float) -> Step:
         return self.problem.step(place.state, place.linear, damping)
 
-    def moved(self, place: _Place, step: Step) -> _Place | None:
+    def moved(self, place: _Place, step: Step, most: float) -> _Place | None:
         around = place.linear.surroundings
-        state = self.problem.moved(place.state, step, around)
-        return None if state is None else _Place(self.problem, state, around)
+        state = self.problem.moved(place.state, step, around, most)
+        return None if state is None else _Place(self.problem, state)
 
     def settled(self, place: _Place) -> _Place:
         state = self.problem.rescaled(place.state)

@@ -19,6 +19,7 @@ from freeswing.cdpr.rotation import angle_rate_matrix
 from freeswing.ident.runs import SwingRun
 from freeswing.ident.signals.band import LOWEST_PASS_HZ, best_pass_hz
 from freeswing.ident.signals.filters import Smoother, forward_difference_smoother, smoother
+from freeswing.ident.signals.jumps import jumps_in
 from freeswing.ident.signals.regular_grid import (
     Bridge,
     Grid,
@@ -26,7 +27,6 @@ from freeswing.ident.signals.regular_grid import (
     bridges,
     gaps,
     incomplete,
-    jump_sizes,
     regular_grid,
     white_noise_std,
 )
@@ -34,9 +34,6 @@ from freeswing.ident.signals.window import free_window
 
 Processing = Literal["centred", "authors"]
 _ANGLES = ("phi", "theta", "chi")
-# Times the median extrapolation error that a step must exceed: 5.4 deviations, which normal errors
-# exceed once in ten million samples.
-_UNUSUAL = 8.0
 _LEAST_OUTPUTS = 10  # one more than the nine parameters
 _LEVER_M = 0.2  # makes angles comparable to metres where only their relative size matters
 
@@ -151,7 +148,7 @@ def signals_of(run: SwingRun, settings: SignalSettings | None = None) -> Signals
     gap_samples = int(settings.longest_gap_s / grid.period_s + 1e-9)
     made = bridges(incomplete(grid.values), gap_samples)
     filled = bridged(grid.values, made)
-    jumps = _jumps(filled, trajectory.coordinates, settings)
+    jumps = jumps_in(filled, _jump_limits(trajectory.coordinates, settings))
     window = _window(run, grid, filled, jumps, rough)
     inside = (grid.times_s >= window[0] - 1e-9) & (grid.times_s <= window[1] + 1e-9)
     missing = _missing_share(grid, inside, settings)
@@ -234,24 +231,9 @@ def _pass_band(
     return round(best_pass_hz(filled[start:end], period_s, _scale(coordinates)), 1)
 
 
-def _jumps(
-    filled: Array, coordinates: tuple[str, ...], settings: SignalSettings
-) -> NDArray[np.bool_]:
-    """True where a sample lies a step away from the one before it, (n,)."""
-    sizes, gain = jump_sizes(filled)
+def _jump_limits(coordinates: tuple[str, ...], settings: SignalSettings) -> Array:
     angular = np.array([name in _ANGLES for name in coordinates])
-    limit = np.where(angular, settings.jump_limit_rad, settings.jump_limit_m)
-    limit = np.fmax(limit, 8.0 * gain * white_noise_std(filled))
-    # A slowly sampled swing outruns the extrapolation everywhere; a step does so once.
-    known = np.isfinite(sizes).all(axis=1)
-    if known.any():
-        limit = np.fmax(limit, _UNUSUAL * np.median(np.abs(sizes[known]), axis=0))
-    magnitude = np.where(np.isfinite(sizes), np.abs(sizes), 0.0) / limit
-    worst = magnitude.max(axis=1)
-    # One step is felt by several neighbouring estimates: its place is the largest of them.
-    padded = np.pad(worst, 4)
-    largest = np.lib.stride_tricks.sliding_window_view(padded, 9).max(axis=1)
-    return (worst > 1.0) & (worst >= largest)
+    return np.where(angular, settings.jump_limit_rad, settings.jump_limit_m)
 
 
 def _unbroken(usable: NDArray[np.bool_], jumps: NDArray[np.bool_], half: int) -> NDArray[np.bool_]:

@@ -80,8 +80,10 @@ LENS = "tests/calib/camera/test_lens_limits.py"
 BOARD = "tests/calib/board/test_board_limits.py"
 SCENE = "tests/calib/scene/test_scene_limits.py"
 MEASURED = "tests/cdpr/measured/test_measured_limits.py"
+SIGNALS = "tests/ident/signals/test_limits.py"
 BAND_LIMITS = "tests/ident/signals/test_band_limits.py"
 UNTAGGED = "tests/vision/untagged/test_untagged_limits.py"
+FEATURES = "tests/vision/untagged/test_feature_bias.py"
 CDPR = "tests/cdpr/test_cdpr_limits.py"
 START = "tests/vision/rig/test_start_limits.py"
 RIG_START = "tests/calib/rig/test_rig_start_limits.py"
@@ -280,11 +282,8 @@ HELD = (
         "tests/ident/signals/test_limits.py",
     ),
     Held("ident/signals/motions.py", ("LENGTH_LIMIT_M",), "tests/ident/signals/test_limits.py"),
-    Held(
-        "ident/signals/derivatives.py",
-        ("_UNUSUAL", "_LEAST_OUTPUTS"),
-        "tests/ident/signals/test_limits.py",
-    ),
+    Held("ident/signals/jumps.py", ("_ABOVE_NOISE", "_UNUSUAL"), SIGNALS),
+    Held("ident/signals/derivatives.py", ("_LEAST_OUTPUTS",), SIGNALS),
     Held(
         "ident/diagnose/decision.py",
         (
@@ -371,8 +370,13 @@ HELD = (
     ),
     Held("ident/bench/solve.py", ("LEAST_FOR_SCATTER",), BENCH),
     Held(
+        "ident/bench/solve.py",
+        ("FIRST_S", "LONGER"),
+        "tests/ident/bench/test_first_seconds.py",
+    ),
+    Held(
         "freeswing/doctor/bench_units.py",
-        ("LONGEST", "SHORTEST", "FARTHEST", "HEAVIEST", "WIDEST", "SLOWEST"),
+        ("LONGEST", "SHORTEST", "FARTHEST", "HEAVIEST", "LIGHTEST", "WIDEST", "SLOWEST", "FEWEST"),
         "tests/freeswing/doctor/test_bench_units.py",
     ),
     Held("ident/bench/mass_verdict.py", ("CONTRADICTED", "CHECKING", "GIVES_WAY"), BENCH),
@@ -387,6 +391,7 @@ HELD = (
         "tests/ident/bench/two_wires/test_free_roll.py",
     ),
     Held("ident/bench/channels.py", ("LEAST_OVER_NOISE",), BENCH),
+    Held("ident/bench/runs.py", ("STILL",), BENCH),
     Held("ident/bench/diagnose/removal.py", ("SURE",), BENCH_DIAGNOSE),
     Held("ident/bench/diagnose/diagnose.py", ("LEAST_RUNS",), BENCH_DIAGNOSE),
     Held("ident/bench/diagnose/unexplained.py", ("COLOURED", "SLOWEST_PARTS"), BENCH_DIAGNOSE),
@@ -668,6 +673,7 @@ HELD = (
     Held("vision/untagged/features.py", ("RATIO", "MOST_ANGLE_COS",), UNTAGGED),
     Held("vision/untagged/look.py", ("LEAST_MATCHES", "INLIER_PX", "FEATURE_STD_PX",), UNTAGGED),
     Held("vision/untagged/refine.py", ("_FAR",), UNTAGGED),
+    Held("vision/untagged/feature_bias.py", ("LEAST_FRAMES",), FEATURES),
     Held(
         "vision/untagged/rest_model.py",
         (

@@ -12,6 +12,7 @@ from freeswing.cdpr.files.documents import DataError, write_json
 from freeswing.cdpr.files.trajectory_files import write_csv
 from freeswing.cdpr.measured.target import Target
 from freeswing.cdpr.rotation import log_rotation
+from freeswing.vision.look.watched_target import Watch
 from freeswing.vision.render.record import record
 from freeswing.vision.render.render_scene import Look
 from freeswing.vision.track_session import track_session
@@ -51,9 +52,9 @@ def film(folder, true_cameras, frames=FRAMES, **changes) -> FilmedRun:
     return FilmedRun("swing", folder / "runs" / "swing")
 
 
-def tracked(runs, cameras, target, *, results, **options):
+def tracked(runs, cameras, target, *, results, base_tags=(), **options):
     """Track, and write what comes of it as the command does; the document."""
-    found = track_session(runs, cameras, target, results=results, **options)
+    found = track_session(runs, cameras, Watch.of(target, base_tags), results=results, **options)
     for name, trajectory in found.trajectories.items():
         write_csv(results / "tracks" / f"{name}.csv", trajectory)
     write_json(results / "tracking.json", found.document)

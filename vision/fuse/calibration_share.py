@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from freeswing.calib.camera.lens_models import PARAMETER_NAMES
 from freeswing.calib.verdict.calibration_result import read_camera_covariance
 from freeswing.cdpr.files.documents import InputError
-from freeswing.cdpr.measured.pose_errors import PoseErrors, error_terms, fitted_terms
+from freeswing.cdpr.measured.pose_errors import TERMS, PoseErrors, error_terms, fitted_terms
 from freeswing.vision.fuse.blocks import blocks
 from freeswing.vision.fuse.fuse_cameras import Fit, free_of
 from freeswing.vision.fuse.linearised_block import linearised
@@ -33,6 +33,7 @@ Ints = NDArray[np.int64]
 
 _POSE_NAMES = ("tx_m", "ty_m", "tz_m", "rx_rad", "ry_rad", "rz_rad")
 _INSTANTS_A_RUN = 150
+_STILL = 7  # of `TERMS`: those that hold no velocity
 _LEFT_OUT = 1e-4  # of the variance, over all runs
 
 
@@ -91,14 +92,14 @@ def run_share(
         watch: what was looked for.
         noise: the calibration's, None where it is not known.
         shared: causes more that the run has in common with others, such as the platform's frame or
-            what cameras that contradict each other leave open, by instants, (n, 6, m).
+            what cameras that contradict each other leave open, at `share_instants`, (n, 6, m).
     """
     if noise is None and shared is None:
         return None
     known = np.flatnonzero(poses.known)
     if not len(known):
         return None
-    chosen = known[:: max(1, len(known) // _INSTANTS_A_RUN)]
+    chosen = share_instants(poses)
     roots = np.zeros((0, 0)) if noise is None else noise.roots()
     found = []
     for block in blocks(views, watch, poses.times_s, poses):
@@ -109,19 +110,29 @@ def run_share(
             slopes = _pose_slopes(block, poses, views, fit.noise, noise.names, mine, free_of(watch))
             found.append(slopes @ roots)
     slopes = np.concatenate(found) if found else np.zeros((len(chosen), 6, 0))
+    moving = slopes.shape[2]  # clocks are the calibration's alone: other causes know no velocity
     if shared is not None:
-        slopes = np.concatenate([slopes, shared[chosen]], axis=2)
+        slopes = np.concatenate([slopes, shared], axis=2)
     about = int(known[len(known) // 2])
     origin, turn = poses.positions_m[about], poses.rotations[about]
     terms = error_terms(
         poses.positions_m[chosen], poses.rotations[chosen], poses.motions[chosen, :6], origin, turn
     )
-    modes = np.moveaxis(fitted_terms(terms, slopes), 2, 0)
+    fitted = fitted_terms(terms, slopes[:, :, :moving])
+    still = fitted_terms(terms[:, :_STILL], slopes[:, :, moving:])
+    still = np.concatenate([still, np.zeros((6, TERMS - _STILL, still.shape[2]))], axis=1)
+    modes = np.moveaxis(np.concatenate([fitted, still], axis=2), 2, 0)
     return RunShare(
         np.median(np.sqrt(np.sum(slopes**2, axis=2)), axis=0),
         PoseErrors(origin, turn, modes),
         np.sqrt(np.mean(terms**2, axis=0)),
     )
+
+
+def share_instants(poses: Poses) -> Ints:
+    """Some known instants, spread over a run, that tell how its poses are off together, (n,)."""
+    known = np.flatnonzero(poses.known)
+    return np.asarray(known[:: max(1, len(known) // _INSTANTS_A_RUN)])
 
 
 def frame_causes(poses: Poses, covariance: Array) -> Array:

@@ -196,7 +196,8 @@ class NoiseSums:
         counts = block.counts[chosen]
         for index, known in enumerate(self.seen):
             mine = camera_of == index
-            known.append(_Seen(scores[mine], counts[mine], squares[mine], shares[mine]))
+            if mine.any():
+                known.append(_Seen(scores[mine], counts[mine], squares[mine], shares[mine]))
 
     def turned_px(self) -> Array:
         """What turns tags in each camera, zero where that is not sure, (n_c,)."""

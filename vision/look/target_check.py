@@ -2,7 +2,8 @@
 
 All tags that one image shows are placed together; where that fails by pixels the target is wrong,
 and the usual mistakes are tried: ids exchanged, a wrong size, the tags' axes turned, millimetres
-for metres, the tags' poses inverted. What then fits is named; exchanged ids are put right.
+for metres, the tags' poses inverted. What then fits is named; exchanged ids are put right. Pictures
+that show no tag are looked at in a mirror, as some webcams give theirs.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from itertools import combinations, islice, permutations, product
 import numpy as np
 from numpy.typing import NDArray
 
-from freeswing.calib.board.recordings import Recording, read_frames
+from freeswing.calib.board.recordings import Image, Recording, read_frames
 from freeswing.calib.camera.camera import Camera
 from freeswing.calib.tags.corners import lens_rays
 from freeswing.cdpr.files.documents import DataError
@@ -57,11 +58,14 @@ def examined_watch(
     Raises:
         DataError: when the tags cannot sit as target.toml has them, with the mistake that fits.
     """
+    seen = []
+    for camera, recording in recordings:
+        own = list(_looked(watch, camera, recording))
+        if not own:
+            _refuse_mirrored(watch, camera, recording)
+        seen += own
     if len(watch.tags) < 2:
         return watch, []
-    seen = [
-        frame for camera, recording in recordings for frame in _looked(watch, camera, recording)
-    ]
     if len(seen) < _LEAST_FRAMES:
         return watch, []
     miss = _miss(watch.tag_corners_m, seen)
@@ -85,12 +89,11 @@ def examined_watch(
 
 def _looked(watch: Watch, camera: Camera, recording: Recording) -> Iterator[_Seen]:
     """Images of a recording that show two platform tags or more."""
+    if len(watch.tags) < 2:
+        return
     finder = TagFinder.of(watch.tags)
     directions = lens_rays(camera)
-    frames = islice(read_frames(recording), 0, _EVERY * _FRAMES, _EVERY)
-    for _, _, image in frames:
-        if (image.shape[1], image.shape[0]) != camera.size_px:
-            return  # said where the frames are followed
+    for image in _some(camera, recording):
         fits = detect_tags(image, camera, directions, watch.tags, finder)
         if len(fits) < 2:
             continue
@@ -98,6 +101,38 @@ def _looked(watch: Watch, camera: Camera, recording: Recording) -> Iterator[_See
         tags = np.array([watch.tags.index(key) for key in fits])
         sides = np.linalg.norm(rays - np.roll(rays, 1, axis=1), axis=2)
         yield _Seen(tags, rays, float(sides.mean()))
+
+
+def _some(camera: Camera, recording: Recording) -> Iterator[Image]:
+    """Some images of a recording; none of another size than the camera's, which is said later."""
+    for _, _, image in islice(read_frames(recording), 0, _EVERY * _FRAMES, _EVERY):
+        if (image.shape[1], image.shape[0]) == camera.size_px:
+            yield image
+
+
+def _refuse_mirrored(watch: Watch, camera: Camera, recording: Recording) -> None:
+    """Passes a recording that shows its tags as they are, or none in a mirror either.
+
+    Raises:
+        DataError: where a mirror alone shows them.
+    """
+    keys = (*watch.tags, *watch.base_tags)
+    if not keys:
+        return
+    finder, directions = TagFinder.of(keys), lens_rays(camera)
+
+    def shown(image: Image) -> int:
+        return len(detect_tags(image, camera, directions, keys, finder))
+
+    images = list(_some(camera, recording))
+    if any(map(shown, images)):
+        return
+    if any(shown(np.ascontiguousarray(image[:, ::-1])) for image in images):
+        raise DataError(
+            f"{recording.path}: shows its tags in a mirror alone: the picture is flipped, as some "
+            "webcams show their user. Switch that off, or flip the video, and calibrate the camera "
+            "from pictures that are not flipped either"
+        )
 
 
 def _miss(corners_m: Array, seen: Sequence[_Seen]) -> float:

@@ -85,15 +85,22 @@ def charuco_patch(
     marker_m: float,
     dictionary: str,
     margin_squares: float = 0.5,
+    *,
+    legacy: bool = False,
 ) -> Patch:
-    """A ChArUco board as OpenCV 5 prints it: `squares` are columns and rows of squares."""
+    """A ChArUco board as OpenCV prints it: `squares` are columns and rows of squares.
+
+    In the layout of OpenCV before 4.6 (`legacy`) a board of an even count of rows begins with a
+    marker, not with a black square.
+    """
     cells_side = tag_dictionary(dictionary).markerSize + 2
     ratio = Fraction(marker_m / square_m).limit_denominator(64)
     side = _common_side([ratio / cells_side, (1 - ratio) / 2, Fraction(1, 2)])
     board = cv2.aruco.CharucoBoard(
         (int(squares[0]), int(squares[1])), square_m, marker_m, tag_dictionary(dictionary)
     )
-    sheet = _checker(squares, side, first_black=True)
+    board.setLegacyPattern(legacy)
+    sheet = _checker(squares, side, first_black=not legacy or int(squares[1]) % 2 == 1)
     marker = round(ratio * side)
     inset = (side - marker) // 2
     for tag_id, corners in zip(np.ravel(board.getIds()), board.getObjPoints(), strict=True):

@@ -6,7 +6,7 @@ again; the frame stays that of the named points at rest.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +18,12 @@ from freeswing.vision.fuse.linearised_block import lags
 from freeswing.vision.fuse.poses import Poses
 from freeswing.vision.fuse.run_views import CameraViews
 from freeswing.vision.look.watched_target import Watch
+from freeswing.vision.untagged.feature_bias import FeatureBias, Placed, feature_bias
 from freeswing.vision.untagged.rest_model import RestModel
 from freeswing.vision.untagged.still_pose import still_pose
 
 Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 _INSTANTS = 120  # of each run: more add little to points that each of them shows
 _STEPS = 3
@@ -39,13 +41,7 @@ class PointSums:
 
     def add(self, which: NDArray[np.int64], T_camera_platform: Array, rays: Array) -> None:
         """Sightings of points `which` (m,) from poses (m, 4, 4), at rays x/z, y/z (m, 2)."""
-        turn = T_camera_platform[:, :3, :3]
-        at = np.einsum("mij,mj->mi", turn, self.points_m[which]) + T_camera_platform[:, :3, 3]
-        predicted = at[:, :2] / at[:, 2:]
-        off = rays - predicted
-        slope = (turn[:, :2] - predicted[:, :, None] * turn[:, 2:]) / at[:, 2, None, None]
-        near = (at[:, 2] > 0.0) & (np.linalg.norm(off, axis=1) < _FAR)
-        slope, off, which = slope[near], off[near], which[near]
+        which, off, slope = placed(self.points_m, which, T_camera_platform, rays)
         np.add.at(self.normal, which, np.swapaxes(slope, 1, 2) @ slope)
         np.add.at(self.slope, which, (np.swapaxes(slope, 1, 2) @ off[..., None])[..., 0])
 
@@ -56,6 +52,23 @@ class PointSums:
         safe = np.where(known[:, None, None], self.normal, np.eye(3))
         step = np.linalg.solve(safe, self.slope[..., None])[..., 0]
         return self.points_m + np.where(known[:, None], step, 0.0)
+
+
+def placed(
+    points_m: Array, which: Ints, T_camera_platform: Array, rays: Array
+) -> tuple[Ints, Array, Array]:
+    """Points, residuals and slopes of the sightings that are near, see `feature_bias.Placed`.
+
+    Source:
+        Hartley, Zisserman 2004, Multiple View Geometry in Computer Vision, appendix 6.
+    """
+    turn = T_camera_platform[:, :3, :3]
+    at = np.einsum("mij,mj->mi", turn, points_m[which]) + T_camera_platform[:, :3, 3]
+    predicted = at[:, :2] / at[:, 2:]
+    off = rays - predicted
+    slope = (turn[:, :2] - predicted[:, :, None] * turn[:, 2:]) / at[:, 2, None, None]
+    near = (at[:, 2] > 0.0) & (np.linalg.norm(off, axis=1) < _FAR)
+    return which[near], off[near], slope[near]
 
 
 def refined_points(
@@ -94,6 +107,14 @@ def refined_points(
 
 
 def _add_run(sums: PointSums, views: Sequence[CameraViews], watch: Watch, poses: Poses) -> None:
+    for _, which, T_camera_platform, rays in _seen(views, watch, poses):
+        sums.add(which, T_camera_platform, rays)
+
+
+def _seen(
+    views: Sequence[CameraViews], watch: Watch, poses: Poses
+) -> Iterator[tuple[Ints, Ints, Array, Array]]:
+    """Camera, point, T_camera_platform and ray of the sightings at some of a run's instants."""
     few = np.zeros(len(poses.times_s), dtype=bool)
     few[np.unique(np.linspace(0, len(few) - 1, _INSTANTS).round().astype(int))] = True
     few &= poses.known
@@ -109,8 +130,38 @@ def _add_run(sums: PointSums, views: Sequence[CameraViews], watch: Watch, poses:
         step = motion[:, 3:6] * dt[:, None] + 0.5 * motion[:, 9:] * dt[:, None] ** 2
         T = np.tile(np.eye(4), (len(own), 1, 1))
         T[:, :3, :3], T[:, :3, 3] = exp_rotation(step) @ poses.rotations[own], place
-        which = block.things[use] - watch.first_marker
-        sums.add(which, cameras[block.camera_of[use]] @ T, block.rays[use, :2])
+        camera_of = block.camera_of[use]
+        yield (
+            camera_of,
+            block.things[use] - watch.first_marker,
+            cameras[camera_of] @ T,
+            block.rays[use, :2],
+        )
+
+
+def bias_of_features(
+    runs: Sequence[tuple[Sequence[CameraViews], Poses]], watch: Watch, cameras: Sequence[Camera]
+) -> FeatureBias:
+    """What features have wrong for good, from all sightings about the points as they are.
+
+    Args:
+        runs: as `refined_points` takes them.
+        watch: the points.
+        cameras: as calibrated.
+    """
+    names = [camera.name for camera in cameras]
+    points = watch.marker_positions_m
+
+    def sightings() -> Iterator[Placed]:
+        for views, poses in runs:
+            own = np.array([names.index(view.camera.name) for view in views])
+            for camera_of, which, T_camera_platform, rays in _seen(views, watch, poses):
+                for camera in range(len(views)):
+                    mine = camera_of == camera
+                    near = placed(points, which[mine], T_camera_platform[mine], rays[mine])
+                    yield Placed(int(own[camera]), *near)
+
+    return feature_bias(sightings(), names, len(points))
 
 
 def at_home(points_m: Array, model: RestModel, cameras: Sequence[Camera]) -> tuple[Array, Array]:

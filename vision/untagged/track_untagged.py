@@ -19,6 +19,7 @@ from freeswing.calib.camera.camera import Camera
 from freeswing.cdpr.files.documents import InputError
 from freeswing.cdpr.measured.target import Untagged
 from freeswing.vision.fuse.calibration_share import read_calibration_noise
+from freeswing.vision.fuse.poses import Poses
 from freeswing.vision.fuse.run_views import CameraViews
 from freeswing.vision.fuse.tag_layout import layout_change
 from freeswing.vision.jobs import Job, run_jobs
@@ -36,9 +37,10 @@ from freeswing.vision.track_session import (
     unmatched,
 )
 from freeswing.vision.tracking_report import tracking_document
+from freeswing.vision.untagged.feature_bias import PlatformErrors
 from freeswing.vision.untagged.look import collect_points
-from freeswing.vision.untagged.refine import refined_points
-from freeswing.vision.untagged.rest_model import RestModel, rest_model
+from freeswing.vision.untagged.refine import bias_of_features, refined_points
+from freeswing.vision.untagged.rest_model import rest_model
 
 Array = NDArray[np.float64]
 Sources = list[tuple[str, tuple[tuple[Camera, tuple[Path, ...]], ...]]]
@@ -109,26 +111,35 @@ def track_untagged(
     ]
     rest = np.zeros((6, 6))
     for _ in range(_ROUNDS):
-        points, rest = _refined(sources, watch, model, cameras, settings)
+        points, rest = refined_points(_fused(sources, watch, settings), watch, model, cameras)
         watch = _watch(points)
+    bias = bias_of_features(_fused(sources, watch, settings), watch, cameras)
     noise = read_calibration_noise(results / "calibration.json")
     frame = frame_of_platform(model.frame_covariance + rest, model.T_base_rest)
+    errors = PlatformErrors(frame, bias)
     tracks = [
-        _grown(track_run(name, views, watch, settings, noise, frame)) for name, views in sources
+        _grown(track_run(name, views, watch, settings, noise, errors)) for name, views in sources
     ]
-    deviations = np.sqrt(np.diag(frame))
-    told = (
-        f"{len(model.points_m)} points of the platform; its frame is known to "
-        f"{1e3 * deviations[:3].max():.3f} mm and {1e3 * deviations[3:].max():.3f} mrad by the "
-        "marked points and the images at rest, which shifts all poses alike: what is identified "
-        "counts it"
-    )
+    focal_px = float(np.mean([camera.focal_px.mean() for camera in cameras]))
+    told = _how_well(len(model.points_m), errors, focal_px)
     remarks = {run.name: (told, *unmatched(run, cameras)) for run in filmed}
     tracks = [replace(t, problems=(*remarks[t.name], *t.problems)) for t in tracks]
     change = layout_change([track.layout for track in tracks], watch)
     document = tracking_document(tracks, watch, change, refined=False)
     known = {track.name: track.trajectory for track in tracks if track.trajectory is not None}
     return Tracked(document, known, empty_run(tracks))
+
+
+def _how_well(points: int, errors: PlatformErrors, focal_px: float) -> str:
+    """What all poses may have wrong together, in words."""
+    deviations = np.sqrt(np.diag(errors.frame))
+    bias_px = errors.bias.size * focal_px
+    return (
+        f"{points} points of the platform; its frame is known to {1e3 * deviations[:3].max():.3f} "
+        f"mm and {1e3 * deviations[3:].max():.3f} mrad by the marked points and the images at "
+        f"rest, which shifts all poses alike; its features err by {bias_px:.2f} px for good, which "
+        "shifts all poses of a place alike: what is identified counts both"
+    )
 
 
 def frame_of_platform(covariance: Array, T_base_rest: Array) -> Array:
@@ -183,19 +194,16 @@ def _swings(found: Sequence[tuple[Camera, Recording]]) -> dict[str, list[Image]]
     return swings
 
 
-def _refined(
-    sources: Sources,
-    watch: Watch,
-    model: RestModel,
-    cameras: Sequence[Camera],
-    settings: Settings,
-) -> tuple[Array, Array]:
+def _fused(
+    sources: Sources, watch: Watch, settings: Settings
+) -> list[tuple[Sequence[CameraViews], Poses]]:
+    """Each run's cameras and poses with the points as they are."""
     runs = []
     for _, own in sources:
         views = [CameraViews(camera, paths) for camera, paths in own]
         corrected = correct_rig(views, watch, settings.survey_std_m, look=settings.correct_rig)
         runs.append((corrected.views, corrected.poses))
-    return refined_points(runs, watch, model, cameras)
+    return runs
 
 
 def _grown(track: RunTrack) -> RunTrack:

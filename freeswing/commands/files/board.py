@@ -123,7 +123,8 @@ def _board_label(table: Mapping[str, object]) -> str:
     counts = f"{board.columns} x {board.rows}"
     side_mm = 1e3 * board.square_m
     if board.kind == "charuco":
-        return f"charuco {board.dictionary}, {counts} squares of {side_mm:.6g} mm"
+        layout = ", layout of OpenCV before 4.6" if board.legacy else ""
+        return f"charuco {board.dictionary}, {counts} squares of {side_mm:.6g} mm{layout}"
     if board.kind == "chessboard":
         return f"chessboard, {counts} inner corners, squares of {side_mm:.6g} mm"
     if board.kind in CIRCLES:
@@ -144,7 +145,9 @@ def _board_patch(table: Mapping[str, object]) -> Patch:
     board = board_from(table)
     counts = (board.columns, board.rows)
     if board.kind == "charuco":
-        return charuco_patch(counts, board.square_m, board.marker_m, board.dictionary)
+        return charuco_patch(
+            counts, board.square_m, board.marker_m, board.dictionary, legacy=board.legacy
+        )
     if board.kind == "chessboard":
         return chessboard_patch(counts, board.square_m)
     if board.kind in CIRCLES:

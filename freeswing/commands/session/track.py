@@ -97,6 +97,7 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
     from freeswing.calib.camera.cameras_file import read_cameras
     from freeswing.cdpr.files.documents import DataError, InputError
     from freeswing.session.load_swings import load_target
+    from freeswing.vision.look.watched_target import Watch
     from freeswing.vision.settings import Settings
     from freeswing.vision.track_session import track_session
 
@@ -110,12 +111,12 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
     how = Settings(settings["correct_rig"], settings["refine_layout"])
     if settings.get("no_tags") or not (target.tags or target.markers):
         return _made(_by_looks(session, console, how, crew, target), session, console)
+    base_tags = session.calibration.base_tags if session.calibration else ()
     found = track_session(
         session.video_runs,
         read_cameras(session.cameras),
-        target,
+        Watch.of(target, base_tags),
         results=session.results,
-        base_tags=session.calibration.base_tags if session.calibration else (),
         frame_rate_hz=session.frame_rate_hz,
         settings=how,
         workers=crew.processes,

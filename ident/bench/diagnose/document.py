@@ -26,6 +26,7 @@ from freeswing.ident.bench.diagnose.entries import (
 from freeswing.ident.bench.diagnose.search import Word
 from freeswing.ident.bench.diagnose.shown import Shown
 from freeswing.ident.bench.diagnose.unexplained import remaining
+from freeswing.ident.bench.mass_verdict import MassVerdict
 from freeswing.ident.bench.solve import Solved
 from freeswing.ident.bench.swing import COMMON
 from freeswing.ident.bench.told.contradicted import contradictions, group_sentence
@@ -35,6 +36,7 @@ from freeswing.ident.diagnose.decision import RIVAL
 from freeswing.ident.diagnose.experiments import separating_experiment
 
 NOT_ON_BENCHES = "it is not looked for on benches: their wires would not show it, or not alone"
+STRETCH = "cable_elasticity"
 UNSHOWN = "these runs would not show it if it were there"
 LEVEL = (
     "hold a plumb line beside the hooks, or a level on their frame; a constant force tilts a "
@@ -129,11 +131,21 @@ def _candidates(found: BenchDiagnosis) -> list[dict[str, Any]]:
         before = told.get(one.effect)
         if before is None or before["verdict"] == "rejected":
             told[one.effect] = removed_entry(one)
-    rows = [_with_sight(row, found.shown) for row in told.values()]
+    rows = [_beside_mass(_with_sight(row, found.shown), found.solved.mass) for row in told.values()]
     rows += [
         told_entry(n, "not_identifiable", NOT_ON_BENCHES) for n in catalogue() if n not in told
     ]
     return rows + mass_candidate(found.solved)
+
+
+def _beside_mass(row: dict[str, Any], mass: MassVerdict | None) -> dict[str, Any]:
+    """Stretch beside a mass that was freed: it may be what the payload runs want instead."""
+    if row["effect"] != STRETCH or row["verdict"] != "rejected":
+        return row
+    if mass is None or not (mass.contradicted and mass.is_small):
+        return row
+    reason = f"{row['reason']}, the mass being free: it may be what the payload runs want instead"
+    return told_entry(STRETCH, "not_identifiable", reason)
 
 
 def _with_sight(row: dict[str, Any], shown: Sequence[Shown]) -> dict[str, Any]:

@@ -24,7 +24,7 @@ from freeswing.ident.diagnose.decision import ACCEPTED, LEAST_GAIN, MOST_WORSE, 
 from freeswing.ident.likelihood.fit import fit
 from freeswing.ident.likelihood.unknowns import Unknowns
 
-SURE = 3.0  # deviations: a wire that differs by less is not named as the one
+SURE = 3.0  # deviations: a wire that differs by less is not the one, a rate below is no drag
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,8 +139,8 @@ def _judged(ground: Ground, last: Fit, bench: Bench, one: Removed) -> Removed:
         reason = f"not sure: with probability {chance:.2g} it is there rather than nothing"
     elif gains.sum() <= 0.0 or worse > MOST_WORSE * len(gains):
         reason = f"{worse} of {len(gains)} left-out runs are predicted worse with it"
-    elif each_run and one.values[0] <= 0.0:
-        reason = f"its rate comes out negative ({one.values[0]:.2g}): no drag"
+    elif each_run and no_drag(one):
+        reason = no_drag(one)
     elif largest <= allowed:
         reason = (
             f"wires differ by up to {1e3 * largest:.2g} mm, within what cable_lengths_std_m allows "
@@ -149,6 +149,16 @@ def _judged(ground: Ground, last: Fit, bench: Bench, one: Removed) -> Removed:
     else:
         there = True
     return replace(one, accepted=there, reason=reason)
+
+
+def no_drag(one: Removed) -> str:
+    """Why a rate that each run has for itself is no drag; empty where it is one."""
+    value, std = one.values[0], one.stds[0]
+    if value <= 0.0:
+        return f"its rate comes out negative ({value:.2g}): no drag"
+    if value <= SURE * std:
+        return f"its rate is {value:.2g} +- {std:.2g} over the runs: not told from nothing"
+    return ""
 
 
 def _stated(bench: Bench) -> float:

@@ -103,7 +103,7 @@ def confronted(
     swing = dress(start.swings[0])
     unknowns = _known(start.unknowns, found, swing)
     half = swing.times_s[len(swing.times_s) // 2]
-    first = _until(swing, half)
+    first = swing.until(half)
     fitted = fit([first], unknowns, Dense(steps=15, tolerance=0.1))
     values = fitted.unknowns.of_run(0)
     white = swing.residuals(values, swing.simulated(values))
@@ -133,13 +133,3 @@ def _known(unknowns: Unknowns, found: Solution, swing: BenchSwing) -> Unknowns:
     acting = [one.block for one in swing.acting]
     more = [found.unknowns.block(name) for name in acting]
     return unknowns.moved(told).held(*held).joined(*more).held(*acting)
-
-
-def _until(swing: BenchSwing, end_s: float) -> BenchSwing:
-    inside = swing.times_s <= end_s
-    columns = tuple(_part(column, inside) for column in swing.columns)
-    return replace(swing, times_s=swing.times_s[inside], columns=columns)
-
-
-def _part(column: Column, inside: np.ndarray) -> Column:
-    return replace(column, values=column.values[inside], std=column.std[inside])

@@ -17,10 +17,9 @@ from freeswing.cdpr.effects import effect_named
 from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.model.known_values import prior_whitener
 from freeswing.cdpr.robot import Array
-from freeswing.ident.diagnose.refit import Refit, colour_of, rescored
+from freeswing.ident.diagnose.refit import SEARCHED, Refit, colour_of, rescored
 from freeswing.ident.likelihood.blocks import with_effect_values
 from freeswing.ident.likelihood.fit import fit
-from freeswing.ident.likelihood.fit_swings import ONWARD
 
 
 def settled_places(model: Model) -> np.ndarray:
@@ -47,8 +46,9 @@ def cut(last: Refit, noise_scales: Array) -> Refit:
         block = unknowns.block(name)
         free = block.mask & ~settled[model.place_of(name)]
         unknowns = unknowns.exchanged(replace(block, estimated=free))
-    exact = fit(found.swings, unknowns, ONWARD)
-    return rescored(exact, noise_scales, colour_of(exact, noise_scales))
+    exact = fit(found.swings, unknowns, SEARCHED)
+    geometry = exact.inertia.size + settled_places(model)
+    return rescored(exact, noise_scales, colour_of(exact, noise_scales), geometry)
 
 
 def with_settled(covariance: Array, held: Refit) -> Array:

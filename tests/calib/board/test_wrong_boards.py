@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from freeswing.calib.board.board_check import is_mirrored, marker_warning, settled_board
+from freeswing.calib.board.board_check import corners_in_a_mirror, marker_warning, settled_board
 from freeswing.calib.board.boards import Board, board_from
 from freeswing.calib.board.detection import BoardDetector
 from freeswing.cdpr.files.documents import DataError, InputError
@@ -48,8 +48,8 @@ def test_a_negative_board_is_simply_used(image) -> None:
 
 def test_a_mirrored_board_is_told_from_no_board(image) -> None:
     assert BoardDetector(STATED).detect(np.ascontiguousarray(image[:, ::-1])) is None
-    assert is_mirrored(STATED, [np.ascontiguousarray(image[:, ::-1])])
-    assert not is_mirrored(STATED, [np.zeros_like(image)])
+    assert corners_in_a_mirror(STATED, [np.ascontiguousarray(image[:, ::-1])]) > 40
+    assert corners_in_a_mirror(STATED, [image, np.zeros_like(image)]) == 0
 
 
 def test_the_other_layout_is_used_and_said() -> None:

@@ -28,6 +28,10 @@ def payload(mass_kg: float, far_m: float) -> dict[str, Any]:
     return {"payloads": (KnownBody(mass_kg, np.array([far_m, 0.0, 0.0]), np.zeros(6)),)}
 
 
+def counted(known: int) -> dict[str, Any]:
+    return {"signals": (Signal("chi", np.where(np.arange(100) < known, 0.1, np.nan)),)}
+
+
 def moved(column: str, over_m: float) -> dict[str, Any]:
     return {"signals": (Signal(column, np.linspace(0.0, over_m, 100)),)}
 
@@ -59,6 +63,8 @@ PENDULUM_S = 2.0 * np.pi * np.sqrt(1.2 / 9.81)
         ({"times_s": 0.24 * PENDULUM_S * np.arange(100.0)}, ""),
         ({"times_s": 0.26 * PENDULUM_S * np.arange(100.0)}, "run a: column t_s: samples are"),
         ({"times_s": TIMES[:2]}, ""),
+        (payload(0.0012, 0.1) | {"name": "a"}, ""),
+        (payload(0.00119, 0.1), "platform mass_kg (robot.toml) = 1.2 kg, and the heaviest"),
     ],
 )
 def test_what_can_only_be_another_unit(fields: dict[str, Any], says: str) -> None:
@@ -69,6 +75,15 @@ def test_what_can_only_be_another_unit(fields: dict[str, Any], says: str) -> Non
     with pytest.raises(InputError, match="write m, kg, s and rad") as told:
         refuse_wrong_units(bench, ROBOT)
     assert says in str(told.value)
+
+
+@pytest.mark.parametrize(("known", "refused"), [(0, True), (19, True), (20, False)])
+def test_a_column_that_holds_next_to_nothing(known: int, refused: bool) -> None:
+    if not refused:
+        refuse_wrong_units(bench_of(**counted(known)), ROBOT)
+        return
+    with pytest.raises(InputError, match=f"run a: the column of chi holds {known} number"):
+        refuse_wrong_units(bench_of(**counted(known)), ROBOT)
 
 
 def test_many_are_counted() -> None:

@@ -61,6 +61,7 @@ def make(folder: Path, session: str = SESSION, scale: float = 1.0) -> Path:
         x, y = 0.25 * np.cos(2.1 * k), 0.25 * np.sin(2.1 * k)
         cables += f'[[cables]]\nname = "{k}"\nentry_m = [{x}, {y}, 1.2]\n'
         cables += f"pulley_radius_m = 0.0\nattachment_m = [{x}, {y}, 0.0]\n"
+    folder.mkdir(exist_ok=True)
     (folder / "robot.toml").write_text(ROBOT + cables)
     (folder / "session.toml").write_text(session)
     times = np.arange(200) / 50.0
@@ -101,6 +102,9 @@ def loaded(folder: Path) -> Bench:
         ("mass_kg = 0.5\n", "", "mass_kg"),
         ('"dot_px"', '"spot_px"', "unknown column"),
         ("order = 3", "order = 4", "order"),
+        ("gains = { chi = 3800.0 }", "gains = { chi = 0.0 }", "gains of chi is 0"),
+        ("gains = { chi = 3800.0 }", "", "gains_std of chi without gains"),
+        ("gains_std = { chi = 400.0 }", "gains_std = { chi = 0.0 }", "must be above 0"),
     ],
 )
 def test_wrong_keys_are_named(tmp_path: Path, old: str, new: str, said: str) -> None:
@@ -124,6 +128,21 @@ def test_a_partial_run_without_lengths_names_itself(
     make(tmp_path, SESSION.replace("cable_lengths_m = [1.2, 1.2, 1.2]\n", "", 1))
     assert main(["identify", str(tmp_path)]) == 1
     assert "run tare: it measures chi alone and cable_lengths_m" in capsys.readouterr().err
+
+
+def test_check_reads_a_bench_as_identify_does(
+    tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    """Yaw alone and a channel are no errors there; a mass in g and a still run are."""
+    folder = make(tmp_path / "right")
+    assert main(["check", str(folder)]) == 0
+    assert "role validate" not in capsys.readouterr().out
+    folder = make(tmp_path / "grams", SESSION.replace("mass_kg = 0.5\n", "mass_kg = 500.0\n"))
+    assert main(["check", str(folder)]) == 1
+    assert "is it in g?" in capsys.readouterr().out
+    folder = make(tmp_path / "still", scale=0.0)
+    assert main(["check", str(folder)]) == 1
+    assert "run tare: column chi is the same number" in capsys.readouterr().out
 
 
 def test_a_still_channel_names_run_and_channel(

@@ -28,7 +28,7 @@ from freeswing.ident.bench.diagnose.document import (
     experiment_of,
 )
 from freeswing.ident.bench.diagnose.entries import removed_entry
-from freeswing.ident.bench.diagnose.removal import Removed, _wires
+from freeswing.ident.bench.diagnose.removal import Removed, _wires, no_drag
 from freeswing.ident.bench.diagnose.search import Ground
 from freeswing.ident.bench.diagnose.shown import shown
 from freeswing.ident.bench.diagnose.unexplained import remaining
@@ -129,6 +129,16 @@ def test_the_wire_that_is_the_one(size_mm: float, part: str) -> None:
     told = _wires(last, Removed("cable_length_bias", ("wires.1",), (np.ones(3, bool),)))
     assert told.part == part
     assert told.values == pytest.approx(values)
+
+
+@pytest.mark.parametrize(
+    ("rate", "says"), [(-1e-3, "negative"), (2.9e-4, "not told from nothing"), (3.1e-4, "")]
+)
+def test_a_rate_that_the_runs_do_not_agree_on_is_no_drag(rate: float, says: str) -> None:
+    """By a track on two wires 4e-5 +- 3e-3 was accepted, beside a true rate of nothing."""
+    said = no_drag(Removed("rotational_drag", ("effects",), (), values=(rate,), stds=(1e-4,)))
+    assert says in said
+    assert bool(said) == bool(says)
 
 
 @pytest.mark.parametrize(("share", "told"), [(0.46, True), (0.54, False)])

@@ -15,7 +15,7 @@ from freeswing.ident.bench import mass_verdict, noise, solve
 from freeswing.ident.bench.channels import Channel, check_moves
 from freeswing.ident.bench.modal import SQUARE
 from freeswing.ident.bench.noise import _colours, rescaled
-from freeswing.ident.bench.runs import Bench
+from freeswing.ident.bench.runs import Bench, BenchRun, Signal, check_swings
 from freeswing.ident.bench.scatter import scatter_std
 from freeswing.ident.bench.swing import COMMON, Column
 from freeswing.ident.bench.told.classic import BESIDE, ClassicRun, leaning_sentence, sine_period
@@ -58,6 +58,7 @@ def test_scatter_is_looked_for_between_enough_runs(monkeypatch, runs, looked) ->
         solve, "fit", lambda _, unknowns, how: SimpleNamespace(**(fitted | {"unknowns": unknowns}))
     )
     monkeypatch.setattr(solve, "_rough", lambda swings, unknowns: unknowns)
+    monkeypatch.setattr(solve, "stretched", lambda swings, unknowns: unknowns)
     monkeypatch.setattr(solve, "_fastest", lambda *_: 1.0)
     monkeypatch.setattr(solve, "rescaled", lambda swings, *_, **__: swings)
     monkeypatch.setattr(
@@ -203,3 +204,25 @@ def test_a_gain_that_the_period_tells(share, told) -> None:
     np.testing.assert_allclose(gains[seen], (expected if told else value)[seen])
     assert np.isfinite(gains).tolist() == seen
     assert spread[0] == pytest.approx(0.5 * share * 50.0) if told else not np.isfinite(spread[0])
+
+
+def still_run(chi: np.ndarray, *more: Signal) -> BenchRun:
+    times = np.arange(len(chi)) / 50.0
+    return BenchRun("a", "identify", times, (Signal("chi", chi), *more), np.full(3, 1.2))
+
+
+@pytest.mark.parametrize(("over", "usable"), [(1.3, False), (1.7, True)])
+def test_a_run_that_stands_still(over, usable) -> None:
+    """Spread over the noise between neighbours; a channel beside it is judged by itself."""
+    random = np.random.default_rng(0).standard_normal(4000)
+    slow = np.sin(np.arange(4000) / 300.0)
+    chi = slow / slow.std() * np.sqrt(over**2 - 1.0) + random / random.std()
+    with nullcontext() if usable else pytest.raises(DataError, match="run a: chi never move"):
+        check_swings(still_run(chi))
+    check_swings(still_run(chi, Signal("dot_px", slow)))
+
+
+def test_a_column_that_no_sensor_gave() -> None:
+    chi, constant = np.sin(np.arange(100) / 9.0), Signal("theta", np.full(100, 0.1))
+    with pytest.raises(DataError, match="run a: column theta is the same number throughout"):
+        check_swings(still_run(chi, constant))

@@ -217,6 +217,7 @@ def test_a_run_whose_izz_is_a_hundredth_off_is_lost(monkeypatch) -> None:
 
     monkeypatch.setattr(solve, "fit", fit)
     monkeypatch.setattr(solve, "_rough", lambda swings, unknowns: unknowns)
+    monkeypatch.setattr(solve, "stretched", lambda swings, unknowns: unknowns)
     monkeypatch.setattr(solve, "_fastest", lambda *_: 1.0)
     monkeypatch.setattr(solve, "rescaled", lambda swings, *_, **__: swings)
     monkeypatch.setattr(

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
 from freeswing.cdpr.model.equations import build_model
 from freeswing.cdpr.model.statics import modes
+from freeswing.ident.bench import solve
 from freeswing.ident.bench.assemble import EFFECTS
 from freeswing.ident.bench.first_guesses import glimpse, sight
 from freeswing.ident.bench.swing import Column
@@ -61,3 +65,26 @@ def test_yaw_is_followed_where_the_guess_leans_and_the_platform_does_not() -> No
     yaw = int(np.argmax(np.abs(found.shapes[5]) / np.abs(found.shapes[:5]).max(axis=0)))
     told = glimpse(model, seen(found.frequencies_hz[yaw]), inertia)
     assert abs(told.zeta[5]) == pytest.approx(0.1, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("lasts_s", "followed_s"), [(11.0, []), (13.0, [12.0]), (35.0, [12.0]), (70.0, [12.0, 36.0])]
+)
+def test_long_runs_are_followed_in_growing_stretches(monkeypatch, lasts_s, followed_s) -> None:
+    """The first is twice what a guess saw, each next three times the last."""
+    asked = []
+
+    class Swing(SimpleNamespace):
+        def until(self, end_s):
+            return end_s - self.span_s[0]
+
+    def fit(parts, unknowns, how):
+        asked.append(parts)
+        return SimpleNamespace(unknowns=[*unknowns, len(asked)])
+
+    monkeypatch.setattr(solve, "fit", fit)
+    swings: Any = (Swing(span_s=(2.0, 2.0 + lasts_s)), Swing(span_s=(5.0, 9.0)))
+    none: Any = []
+    assert solve.stretched(swings, none) == list(range(1, 1 + len(followed_s)))
+    np.testing.assert_allclose([parts[0] for parts in asked], followed_s, rtol=0.05)
+    np.testing.assert_allclose([parts[1] for parts in asked], followed_s, rtol=0.05)

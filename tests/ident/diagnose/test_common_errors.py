@@ -11,6 +11,7 @@ import pytest
 from freeswing.ident.diagnose.decision import excess_of, included
 from freeswing.ident.diagnose.heldout import held_out
 from freeswing.ident.diagnose.refit import Refit, colour_of, freed, refit, rescored
+from freeswing.ident.diagnose.screen import screen
 from freeswing.ident.judge.prediction import Stage
 from freeswing.ident.likelihood.blocks import first_unknowns
 from freeswing.ident.likelihood.calibration_modes import amplitudes_of
@@ -52,6 +53,25 @@ def test_without_the_calibrations_errors_they_are_claimed() -> None:
     current, moved = searched(known=False)
     assert included(current, moved, "anchor_offset", SCALES) > 0.95
     assert current.evidence.common == 0
+
+
+def test_evidence_is_by_what_is_estimated_and_what_is_asked_for() -> None:
+    """A slope that is held costs nothing, and changes none of the others."""
+    fit = searched(known=True)[1].fit
+    held = np.array([10, 13])
+    unknowns = fit.unknowns
+    mask = unknowns.block("anchor_offset").mask.copy()
+    mask[held - 9] = False
+    block = replace(unknowns.block("anchor_offset"), estimated=mask)
+    fewer = replace(fit, unknowns=unknowns.exchanged(block))
+    alone = screen(fewer, (), SCALES).evidence
+    beside = screen(fewer, (), SCALES, beside=held).evidence
+    whole = screen(fit, (), SCALES).evidence
+    assert not alone.triangles[:, :, held].any()
+    np.testing.assert_allclose(np.abs(beside.triangles), np.abs(whole.triangles), atol=1e-6)
+    columns = np.flatnonzero(fewer.free)
+    one, other = (np.abs(found.subset(columns).triangles) for found in (alone, whole))
+    np.testing.assert_allclose(one[:, :-1], other[:, :-1], atol=1e-6 * one.max())
 
 
 def test_runs_kept_apart_are_predicted_without_the_errors_found() -> None:

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from types import SimpleNamespace
 
 import numpy as np
@@ -272,6 +273,21 @@ def test_a_start_that_follows_the_runs(monkeypatch, astray, power, follows) -> N
     monkeypatch.setattr(declared_model, "astray", lambda _: astray)
     monkeypatch.setattr(declared_model, "residual_powers", lambda *_: np.array([power]))
     assert declared_model._follows(None, np.ones(2)) == follows
+
+
+@pytest.mark.parametrize(
+    ("runs", "apart", "ends"), [(3, 0.45, True), (3, 0.55, False), (2, 0.45, False)]
+)
+def test_a_start_that_comes_where_another_was(runs, apart, ends) -> None:
+    """Half a deviation apart after the first stretch, with as many runs."""
+    earlier = declared_model._Watch([], 3)
+    earlier(np.ones(9), np.ones(9))
+    watch = declared_model._Watch([earlier], runs)
+    inertia = np.ones(9)
+    inertia[4] -= 0.2 * apart
+    with pytest.raises(declared_model._SameValleyError) if ends else nullcontext():
+        watch(inertia, np.full(9, 0.2))
+    assert watch.inertia is inertia
 
 
 @pytest.mark.parametrize(("chance", "lead", "no_worse"), [

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,7 @@ class Valley:
     slopes: Any
     linearised: int = 0
     moves: int = 0
+    most: list[float] = field(default_factory=list)
 
     def begun(self, state: State) -> State:
         return state
@@ -30,7 +31,7 @@ class Valley:
     def cost(self, state: State) -> float:
         return float(np.sum(self.residuals(*state.values) ** 2))
 
-    def linear(self, state: State, before: object = ()) -> Any:
+    def linear(self, state: State) -> Any:
         self.linearised += 1
         return Known(self.residuals(*state.values), self.slopes(*state.values))
 
@@ -44,8 +45,9 @@ class Valley:
             change, (), (), np.eye(2), sizes, 2, float(along @ along), longest, (), np.eye(2)
         )
 
-    def moved(self, state: State, step: Step, near: Any) -> State | None:
+    def moved(self, state: State, step: Step, near: Any, most: float) -> State | None:
         self.moves += 1
+        self.most.append(most)
         values = state.values + step.shared
         return replace(state, values=values) if np.isfinite(values).all() else None
 
@@ -86,6 +88,9 @@ def test_what_does_not_lead_on_is_damped_and_ends_no_worse() -> None:
     state, _, _, stop = minimised(valley, started(3.0, 0.5), 60, 1e-8)  # type: ignore[arg-type]
     np.testing.assert_allclose(state.values, [0.0, 0.0], atol=1e-3)
     assert stop.converged, stop
+    # A full step may climb; a damped one is of no use above the best cost there is.
+    assert valley.most[0] == np.inf
+    assert valley.cost(started(3.0, 0.5)) in valley.most
 
 
 @pytest.mark.parametrize(("start", "most"), [((0.7, 0.1), 2), ((1.0, 1.0), 1)])
@@ -125,7 +130,7 @@ class Told:
     def cost(self, state: State) -> float:
         return self.costs[int(state.values[0])]
 
-    def linear(self, state: State, before: object = ()) -> Any:
+    def linear(self, state: State) -> Any:
         return Known(None, None)
 
     def step(self, state: State, linear: Any, damping: float) -> Step:
@@ -135,7 +140,7 @@ class Told:
         length = self.lengths[min(place, len(self.lengths) - 1)]
         return Step(np.ones(1), (), (), np.eye(1), np.ones(1), 1, left, length, (), np.eye(1))
 
-    def moved(self, state: State, step: Step, near: Any) -> State | None:
+    def moved(self, state: State, step: Step, near: Any, most: float) -> State | None:
         return None if self.damped else replace(state, values=state.values + step.shared)
 
 
@@ -156,3 +161,24 @@ def test_a_search_climbs_three_steps_while_they_become_shorter(
     assert told.cost(state) == (1.0 if arrives else 10.0)
     assert (told.damped == 0) == arrives
     assert stop.converged == arrives
+
+
+@pytest.mark.parametrize(("left", "foreseen"), [(0.9, True), (1.1, False)])
+def test_a_search_that_foresees_ends_where_all_that_is_left_is_negligible(
+    left: float, foreseen: bool
+) -> None:
+    """Each step leaves a tenth of the gain before: 100, 10, 1, 0.1 ..; after the second 1.11."""
+    gains = 100.0 * 0.1 ** np.arange(8)
+    costs = [*(np.cumsum(gains[::-1])[::-1]), 0.0]
+    tolerance = gains[1] ** 2 / (gains[0] - gains[1]) / left
+    for foresees, places in ((False, 3), (True, 2 if foreseen else 3)):
+        told = Told(costs, [1.0])
+        search = minimised(told, started(0.0), 8, tolerance, foresees)  # type: ignore[arg-type]
+        assert search[0].values[0] == places
+        assert search[3].converged
+
+
+def test_a_gain_after_a_smaller_one_foresees_nothing() -> None:
+    told = Told([200.0, 199.0, 100.0, 50.0, 1.0, 1.0], [1.0])
+    state, *_ = minimised(told, started(0.0), 8, 1e-3, True)  # type: ignore[arg-type]
+    assert told.cost(state) == 1.0

@@ -9,6 +9,7 @@ import pytest
 
 from freeswing.cdpr.robot import POSE_COORDINATES
 from freeswing.ident.signals import derivatives, prepare
+from freeswing.ident.signals import jumps as module
 from freeswing.ident.signals.derivatives import SignalSettings, UnusableRunError
 from freeswing.ident.signals.motions import mean_lengths
 from freeswing.ident.signals.window import free_window
@@ -122,9 +123,20 @@ def test_a_tenth_of_a_second_after_letting_go_is_left_out() -> None:
 def test_a_jump_is_eight_times_the_usual_extrapolation_error(monkeypatch, size_m, jumps) -> None:
     sizes = np.full((101, 1), 0.01)
     sizes[50] = size_m
-    monkeypatch.setattr(derivatives, "jump_sizes", lambda _: (sizes, 1.0))
-    monkeypatch.setattr(derivatives, "white_noise_std", lambda _: np.zeros(1))
-    assert derivatives._jumps(sizes, ("x",), SignalSettings()).sum() == jumps
+    monkeypatch.setattr(module, "jump_sizes", lambda _: (sizes, 1.0))
+    monkeypatch.setattr(module, "white_noise_std", lambda _: np.zeros(1))
+    limit = np.array([SignalSettings().jump_limit_m])
+    assert module.jumps_in(sizes, limit).sum() == jumps
+
+
+@pytest.mark.parametrize(("size_m", "jumps"), [(0.38, 0), (0.42, 1)])
+def test_a_jump_is_eight_deviations_of_the_noise(monkeypatch, size_m, jumps) -> None:
+    """Noise of 10 mm that an extrapolation enlarges five times, about a run that hardly moves."""
+    sizes = np.full((101, 1), 0.01)
+    sizes[50] = size_m
+    monkeypatch.setattr(module, "jump_sizes", lambda _: (sizes, 5.0))
+    monkeypatch.setattr(module, "white_noise_std", lambda _: np.full(1, 0.01))
+    assert module.jumps_in(sizes, np.full(1, 1e-3)).sum() == jumps
 
 
 @pytest.mark.parametrize(("n", "enough"), [(9, False), (10, True)])

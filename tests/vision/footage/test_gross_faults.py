@@ -10,10 +10,19 @@ import numpy as np
 import pytest
 
 from freeswing.calib.camera.camera import Camera
+from freeswing.cdpr.files.trajectory_files import read_trajectory
 from freeswing.cdpr.measured.pose_errors import read_pose_errors
 from freeswing.cdpr.measured.target import read_target, write_target
 from freeswing.cdpr.rotation import exp_rotation, invert, transform
-from tests.vision.footage.sessions import errors_m, track, without_base_tags, write_session
+from tests.vision.footage.sessions import (
+    RATE_HZ,
+    errors_m,
+    frames_of,
+    track,
+    without_base_tags,
+    write_frames,
+    write_session,
+)
 
 UPSIDE_DOWN = np.diag([-1.0, -1.0, 1.0, 1.0])
 
@@ -124,3 +133,41 @@ def test_tags_in_another_convention_are_named(tmp_path, capsys) -> None:
     write_target(folder / "target.toml", replace(target, tags=tags))
     assert track(folder) == 1
     assert "target.toml's x, -y, -z" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("cameras", [("right",), ("left", "right")])
+def test_mirrored_pictures_are_named(tmp_path, capsys, cameras) -> None:
+    """A webcam that shows itself as a mirror does: its tags are none."""
+    folder = write_session(tmp_path)
+    for camera in cameras:
+        frames = [np.ascontiguousarray(image[:, ::-1]) for image in frames_of(camera)[:40]]
+        place = folder / "runs" / "swing-01"
+        stamps = (place / f"{camera}.csv").read_text()
+        write_frames(place / f"{camera}.mkv", frames, np.arange(40) / RATE_HZ)
+        (place / f"{camera}.csv").write_text(stamps)
+    assert track(folder) == 1
+    said = capsys.readouterr().err
+    assert "mirror" in said, said
+    assert cameras[0] in said, said
+
+
+def test_a_camera_that_saw_nothing_is_said_and_the_other_serves(tmp_path) -> None:
+    """A cap on the lens: poses of the left camera alone, at its own deviations."""
+    folder = write_session(tmp_path)
+    place = folder / "runs" / "swing-01"
+    for camera in ("left", "right"):
+        frames = frames_of(camera)[:40]
+        stamps = (place / f"{camera}.csv").read_text().splitlines()[:41]
+        if camera == "right":
+            noise = np.random.default_rng(1)
+            frames = [noise.integers(10, 30, image.shape, np.uint8) for image in frames]
+        write_frames(place / f"{camera}.mkv", frames, np.arange(40) / RATE_HZ)
+        (place / f"{camera}.csv").write_text("\n".join(stamps))
+    assert track(folder) == 0
+    run = json.loads((folder / "results" / "tracking.json").read_text())["runs"][0]
+    assert any("right: 40 of 40 frames: nothing found" in text for text in run["problems"]), run
+    found = read_trajectory(folder / "results" / "tracks" / "swing-01.csv")
+    deviations = found.standard_deviations()
+    assert deviations is not None
+    z = errors_m(folder, 0.0) / deviations[found.is_known, :3]
+    assert np.sqrt(np.mean(z**2)) < 2.0, np.sqrt(np.mean(z**2, axis=0))

@@ -74,17 +74,6 @@ def test_rates_that_cannot_both_be_true_are_refused(tmp_path, capsys) -> None:
     assert "20 frames a second, the session says 25" in said, said
 
 
-def test_stamps_in_milliseconds_are_named(tmp_path, capsys) -> None:
-    folder = write_session(tmp_path)
-    path = folder / "runs" / "swing-01" / "left.csv"
-    rows = [line.split(",") for line in path.read_text().splitlines()[1:]]
-    lines = ["frame,t_s", *(f"{frame},{1e3 * float(stamp)}" for frame, stamp in rows)]
-    path.write_text("\n".join(lines))
-    assert track(folder) == 2
-    said = capsys.readouterr().err
-    assert "milliseconds" in said, said
-
-
 @pytest.mark.parametrize(
     ("tick", "jitter_s", "even"), [(1e-3, 0.0, True), (1e-3, 3e-3, False), (1 / 90000, 5e-4, False)]
 )

@@ -1,0 +1,72 @@
+"""A platform without tags that swings on its cables: from frames to inertia and report."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from freeswing.cdpr.files.trajectory_files import read_trajectory
+from freeswing.main import main
+from tests.vision.untagged import swinging
+
+pytestmark = pytest.mark.slow
+pytest.importorskip("pycolmap")
+MOMENTS = ("Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")
+
+
+@pytest.fixture(scope="module")
+def swung(tmp_path_factory):
+    """The folder, the true body and motions, tracked without tags."""
+    folder = tmp_path_factory.mktemp("swung")
+    body, motions = swinging.make(folder, ("identify", "identify", "validate"), 0.1, 4)
+    assert main(["track", str(folder), "--no-tags", "--workers", "1", "--quiet"]) == 0
+    return folder, body, motions
+
+
+def test_positions_are_right_to_what_is_asked(swung) -> None:
+    folder, _, motions = swung
+    for name, motion in motions.items():
+        found = read_trajectory(folder / "results" / "tracks" / f"{name}.csv")
+        assert found.is_known.all()
+        rms = np.sqrt(np.mean((found.values[:, :3] - motion(found.times_s)[0]) ** 2, axis=0))
+        assert 1e3 * rms.max() < 0.3, (name, rms)
+
+
+def deviations_off(folder: Path, body) -> np.ndarray:
+    """How far all nine numbers are off, in their own deviations."""
+    assert main(["identify", str(folder), "--quiet"]) == 0
+    found = json.loads((folder / "results" / "identification.json").read_text())
+    rows = {row["name"]: row for row in found["estimates"]["ml_full"]["parameters"]}
+    names = [f"com_{axis}_m" for axis in "xyz"] + [f"{name}_m2" for name in MOMENTS]
+    true = [*body.com_m, *body.specific_inertia_m2]
+    return np.array(
+        [(rows[n]["value"] - v) / rows[n]["std"] for n, v in zip(names, true, strict=True)]
+    )
+
+
+def test_what_is_identified_counts_the_frame(swung) -> None:
+    """Without what all poses have wrong together some number would be wrong and sure."""
+    folder, body, _ = swung
+    off = deviations_off(folder, body)
+    assert np.abs(off).max() < 3.0, off
+    path = folder / "results" / "tracking.json"
+    whole = path.read_text()
+    document = json.loads(whole)
+    for run in document["runs"]:
+        del run["calibration_errors"]
+    path.write_text(json.dumps(document))
+    alone = deviations_off(folder, body)
+    path.write_text(whole)
+    assert np.abs(alone).max() > 4.0, alone
+
+
+def test_the_report_says_how_well_the_frame_is_known(swung) -> None:
+    folder, _, _ = swung
+    assert main(["identify", str(folder), "--quiet"]) == 0
+    assert main(["report", str(folder), "--quiet"]) == 0
+    page = (folder / "results" / "report.html").read_text(encoding="utf-8")
+    assert "its frame is known to" in page
+    assert "px for good" in page
