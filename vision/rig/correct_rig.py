@@ -178,7 +178,8 @@ def _missed(views: Sequence[CameraViews], watch: Watch, survey_std_m: float) -> 
     free = np.zeros((len(views), PER_CAMERA), dtype=bool)
     free[:, LINE] = True
     free[:, CLOCK] = np.arange(len(views)) != _reference(current)
-    iterated(current, watch, poses, fit, free, np.zeros_like(free, dtype=float), survey_std_m)
+    total = np.zeros_like(free, dtype=float)
+    iterated(current, watch, poses, fit, free, total, survey_std_m, told=False)
     poses, fit = fuse(current, watch, instants, start=poses, passes=2, rough=True, plain=True)
     squares = frame_squares_px2(current, watch, poses)
     clocks = [view.camera.clock_offset_s for view in current]
@@ -223,7 +224,8 @@ def _estimate(
     with_lines[:, LINE] = True
     poses, fit = fuse(current, watch, instants, start=poses, passes=2, rough=True)
     jitter = stamp_jitter_s(current, watch, poses, fit)
-    trial = rig_step(current, watch, poses, fit, with_lines, survey_std_m)
+    # Lines that are not in the views yet put stretches and tags apart: equations alone decide.
+    trial = rig_step(current, watch, poses, fit, with_lines, survey_std_m, told=False)
     trial = widened_step(trial, current, jitter)
     lines = trial.changes[:, LINE]
     real = is_real(lines, trial.deviations[:, LINE], LEAST_LINE_S)

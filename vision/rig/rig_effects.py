@@ -44,6 +44,9 @@ LEAST_CLOCK_S = 5e-5
 LEAST_LINE_S = 3e-7
 # twenty deviations: late clocks and knocks do so much, what does more is misread
 _KEEP_SCORE = 400.0
+# A quarter of a swing: what squeezed pictures do to a tag goes with its place and tilt.
+STRETCH_S = 0.25
+LEAST_PARTS = 4  # two cameras with two tags each; of fewer one part decides alone
 _STEPS, _MOST_STEPS = 3, 20
 _SETTLED = 0.3
 """Steps go on while one changes a number by more than this share of its deviation."""
@@ -180,12 +183,55 @@ def rig_step(
     fit: Fit,
     free: NDArray[np.bool_],
     survey_std_m: float = SURVEY_STD_M,
+    *,
+    told: bool = True,
 ) -> RigStep:
-    """Solves for the rig's numbers marked in `free` (n_c, 8), the poses eliminated."""
+    """Solves for the rig's numbers marked in `free` (n_c, 8), the poses eliminated.
+
+    Squeezed pictures err alike from frame to frame, each tag in its own way: deviations are those
+    of leaving out one stretch of the recording, or one tag of one camera, at a time where these
+    are larger; without `told` those of the equations alone.
+    """
     n_c = len(views)
     size = PER_CAMERA * n_c
-    sums = RigEquations(np.zeros((size, size)), np.zeros(size))
+    parts, others = _equations(views, watch, poses, fit, told)
+    normal = sum((part.normal for part in parts), np.zeros((size, size)))
+    right = sum((part.right for part in parts), np.zeros(size))
+    for index, view in enumerate(views):
+        more, also = base_equations(view, watch, survey_std_m)
+        span = slice(PER_CAMERA * index + POSE, PER_CAMERA * (index + 1))
+        normal[span, span] += more
+        right[span] += also
+    mask = free.ravel()
+    changes, deviations = np.zeros(size), np.zeros(size)
+    whole = np.zeros((size, size))
+    if mask.any():
+        chosen = np.ix_(mask, mask)
+        inverse = _inverse(normal[chosen])
+        changes[mask] = inverse @ right[mask]
+        excess = max(fit.total[0] / max(fit.total[1], 1), 1.0)
+        own = np.sqrt(np.diag(inverse) * excess)
+        larger = own
+        for left in (parts, others) if told else ():
+            without = [
+                _inverse((normal - one.normal)[chosen]) @ (right - one.right)[mask] for one in left
+            ]
+            larger = np.maximum(larger, leaving_out(np.array(without).reshape(-1, mask.sum())))
+        whole[chosen] = inverse * excess * np.outer(larger / own, larger / own)
+        deviations[mask] = larger
+    return RigStep(changes.reshape(n_c, PER_CAMERA), deviations.reshape(n_c, PER_CAMERA), whole)
+
+
+def _equations(
+    views: Sequence[CameraViews], watch: Watch, poses: Poses, fit: Fit, by_tags: bool
+) -> tuple[list[RigEquations], list[RigEquations]]:
+    """The rig's equations of each stretch, and what is lost of all without each camera's tag."""
+    size = PER_CAMERA * len(views)
     offsets = np.array([v.camera.T_camera_base[:3, 3] for v in views])
+    nothing = RigEquations(np.zeros((size, size)), np.zeros(size))
+    by_stretch: dict[int, RigEquations] = {}
+    by_tag: dict[tuple[int, int], RigEquations] = {}
+    stretch_of = stretches(poses.times_s)
     for block in blocks(views, watch, poses.times_s, poses):
         span = slice(block.first, block.first + len(block.starts) - 1)
         known = poses.known[span] & (np.abs(poses.motions[span]).sum(axis=1) > 0.0)
@@ -196,29 +242,57 @@ def rig_step(
             2 * block.counts
         )
         weights = np.where(known[instant], 1.0 / np.maximum(1.0, scores / _KEEP_SCORE) ** 2, 0.0)
-        seen = RigSightings(
-            block.starts, known, block.camera_of, block.counts, block.rows_px, white, weights
-        )
-        sums = add_rig_equations(sums, seen, linear, offsets)
-    normal, right = sums
-    for index, view in enumerate(views):
-        more, also = base_equations(view, watch, survey_std_m)
-        span = slice(PER_CAMERA * index + POSE, PER_CAMERA * (index + 1))
-        normal[span, span] += more
-        right[span] += also
-    mask = free.ravel()
-    changes, deviations = np.zeros(size), np.zeros(size)
-    whole = np.zeros((size, size))
-    if mask.any():
-        part = normal[np.ix_(mask, mask)]
-        scale = np.sqrt(np.maximum(np.diag(part), 1e-300))
-        inverse = np.linalg.pinv(part / np.outer(scale, scale), rcond=1e-10, hermitian=True)
-        inverse = inverse / np.outer(scale, scale)
-        changes[mask] = inverse @ right[mask]
-        excess = max(fit.total[0] / max(fit.total[1], 1), 1.0)
-        whole[np.ix_(mask, mask)] = inverse * excess
-        deviations[mask] = np.sqrt(np.diag(inverse) * excess)
-    return RigStep(changes.reshape(n_c, PER_CAMERA), deviations.reshape(n_c, PER_CAMERA), whole)
+        rows = block.camera_of, block.counts, block.rows_px, white
+        whole = nothing
+        for stretch in np.unique(stretch_of[span]).tolist():
+            there = known & (stretch_of[span] == stretch)
+            seen = RigSightings(block.starts, there, *rows, weights)
+            part = add_rig_equations(nothing, seen, linear, offsets)
+            by_stretch[stretch] = _sum(by_stretch.get(stretch, nothing), part)
+            whole = _sum(whole, part)
+        tags = {*zip(block.camera_of, block.things, strict=True)} if by_tags else set()
+        for camera, thing in sorted(tags):
+            own = (block.camera_of == camera) & (block.things == thing)
+            seen = RigSightings(block.starts, known, *rows, np.where(own, 0.0, weights))
+            rest = add_rig_equations(nothing, seen, linear, offsets)
+            lost = RigEquations(whole.normal - rest.normal, whole.right - rest.right)
+            name = int(camera), int(thing)
+            by_tag[name] = _sum(by_tag.get(name, nothing), lost)
+    return list(by_stretch.values()), list(by_tag.values())
+
+
+def _sum(one: RigEquations, other: RigEquations) -> RigEquations:
+    return RigEquations(one.normal + other.normal, one.right + other.right)
+
+
+def stretches(times_s: Array) -> NDArray[np.int64]:
+    """Which stretch of the recording each instant is in, (n,).
+
+    Source:
+        Kuensch 1989, The Jackknife and the Bootstrap for General Stationary Observations, sec. 2.
+    """
+    return np.floor((times_s - times_s.min(initial=np.inf)) / STRETCH_S).astype(np.int64)
+
+
+def leaving_out(without: Array) -> Array:
+    """Deviations of numbers by what they are without each of some parts, (g, k) to (k,).
+
+    Fewer than `LEAST_PARTS` tell nothing: zero.
+
+    Source:
+        Kuensch 1989, The Jackknife and the Bootstrap for General Stationary Observations, sec. 2.
+    """
+    count = len(without)
+    if count < LEAST_PARTS:
+        return np.zeros(without.shape[-1])
+    spread = without - without.mean(axis=0)
+    return np.sqrt((count - 1) / count * np.sum(spread**2, axis=0))
+
+
+def _inverse(normal: Array) -> Array:
+    scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    inverse = np.linalg.pinv(normal / np.outer(scale, scale), rcond=1e-10, hermitian=True)
+    return inverse / np.outer(scale, scale)
 
 
 def applied(view: CameraViews, change: Array) -> CameraViews:
@@ -240,19 +314,27 @@ def iterated(
     free: NDArray[np.bool_],
     total: Array,
     survey_std_m: float,
+    *,
+    told: bool = True,
 ) -> RigStep:
-    """Gauss-Newton over rig and poses in turn; `current` and `total` are brought up to date."""
-    step = rig_step(current, watch, poses, fit, free, survey_std_m)
-    for k in range(_MOST_STEPS):
+    """Gauss-Newton over rig and poses in turn; `current` and `total` are brought up to date.
+
+    Without `told` the deviations are those of the equations alone.
+    """
+    done = 0
+    while True:
+        step = rig_step(current, watch, poses, fit, free, survey_std_m, told=False)
+        done += 1
+        settled = bool((np.abs(step.changes) <= _SETTLED * step.deviations).all())
+        last = done == _MOST_STEPS or (settled and done >= _STEPS)
+        if last and told:
+            step = rig_step(current, watch, poses, fit, free, survey_std_m)
         for index, change in enumerate(step.changes):
             current[index] = applied(current[index], change)
         total += step.changes
-        settled = bool((np.abs(step.changes) <= _SETTLED * step.deviations).all())
-        if k + 1 == _MOST_STEPS or (settled and k + 1 >= _STEPS):
-            break
+        if last:
+            return step
         poses, fit = fuse(current, watch, poses.times_s, start=poses, passes=2, rough=True)
-        step = rig_step(current, watch, poses, fit, free, survey_std_m)
-    return step
 
 
 def frame_squares_px2(views: Sequence[CameraViews], watch: Watch, poses: Poses) -> dict[int, float]:

@@ -65,7 +65,7 @@ def untied_shifts(
     free[:, CLOCK] = np.arange(len(views)) != reference
     free[[k for k, own in enumerate(held) if not own and k != reference], POSE:] = True
     current, total = list(views), np.zeros(free.shape)
-    step = iterated(current, watch, poses, fit, free, total, survey_std_m)
+    step = iterated(current, watch, poses, fit, free, total, survey_std_m, told=False)
     sure = [
         k
         for k in np.flatnonzero(free[:, POSE]).tolist()

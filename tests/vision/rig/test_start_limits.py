@@ -117,7 +117,7 @@ def test_sightings_that_fit_badly_say_less_of_the_rig(monkeypatch) -> None:
     scores = np.array([9.0, 390.0, 800.0])
     block = stub(
         first=0, starts=np.array([0, 3]), camera_of=np.zeros(3, int), rows_px=None,
-        counts=np.ones(3, int),
+        counts=np.ones(3, int), things=np.arange(3),
     )  # fmt: skip
     residuals = np.sqrt(scores)[:, None] * np.ones(2)
     monkeypatch.setattr(rig_effects, "blocks", lambda *_: [block])
@@ -131,6 +131,53 @@ def test_sightings_that_fit_badly_say_less_of_the_rig(monkeypatch) -> None:
     free = np.zeros((1, 8), dtype=bool)
     rig_effects.rig_step([stub(camera=VIEW)], stub(), poses, stub(noise=None), free, 3e-4)
     assert np.allclose(seen[0].weights, [1.0, 1.0, 0.25], rtol=0.01)
+
+
+@pytest.mark.parametrize(("later_s", "stretch"), [(0.24, 0), (0.26, 1)])
+def test_stretches_are_a_quarter_of_a_second(later_s, stretch) -> None:
+    assert rig_effects.stretches(3.0 + np.array([0.0, later_s])).tolist() == [0, stretch]
+    assert len(rig_effects.stretches(np.zeros(0))) == 0
+
+
+def test_deviations_between_stretches_hold_what_they_err_by_alike(monkeypatch) -> None:
+    """Two numbers of a camera seen in 40 stretches, each with an error of its own beside noise.
+
+    The equations know the noise alone, 0.1 a stretch; the stretches' errors are ten times that.
+    """
+
+    def told(apart: float, seed: int) -> tuple[np.ndarray, np.ndarray]:
+        rng = np.random.default_rng(seed)
+        seen = apart * rng.normal(size=(40, 2)) + 0.1 * rng.normal(size=(40, 2))
+        parts = []
+        for one in seen:
+            normal, right = np.zeros((8, 8)), np.zeros(8)
+            normal[:2, :2] = np.diag([1e2, 1e2])
+            right[:2] = 1e2 * one
+            parts.append(rig_effects.RigEquations(normal, right))
+        monkeypatch.setattr(rig_effects, "_equations", lambda *_: (parts, []))
+        monkeypatch.setattr(
+            rig_effects, "base_equations", lambda *_: (np.zeros((6, 6)), np.zeros(6))
+        )
+        free = np.zeros((1, 8), dtype=bool)
+        free[0, :2] = True
+        fit = stub(total=(1.0, 1))
+        step = rig_effects.rig_step([stub(camera=VIEW)], stub(), stub(), fit, free, 3e-4)
+        assert np.sqrt(np.diag(step.covariance))[:2] == pytest.approx(step.deviations[0, :2])
+        return step.changes[0, :2], step.deviations[0, :2]
+
+    found = [told(1.0, seed) for seed in range(50)]
+    z = np.array([change / std for change, std in found])
+    assert 0.8 < np.sqrt(np.mean(z**2)) < 1.2, "deviations are those of the errors"
+    quiet = np.array([told(0.0, seed)[1] for seed in range(50)])
+    assert (quiet >= 0.1 / np.sqrt(40) * (1 - 1e-9)).all()
+    assert quiet.mean() < 1.2 * 0.1 / np.sqrt(40)
+
+
+@pytest.mark.parametrize(("parts", "told"), [(3, False), (4, True)])
+def test_four_parts_tell_how_far_they_differ(parts, told) -> None:
+    found = rig_effects.leaving_out(np.arange(float(parts))[:, None] * np.ones(3))
+    assert (found > 1.0).tolist() == [told] * 3
+    assert rig_effects.leaving_out(np.zeros((0, 2))).tolist() == [0.0, 0.0]
 
 
 def jitter(monkeypatch, frames: int, late_s: float, noise_px: float, speed_px_s: float) -> float:
