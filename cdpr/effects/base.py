@@ -7,6 +7,7 @@ mass (m/s^2), torques likewise (m^2/s^2): free motion cannot tell the mass.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Protocol
 
@@ -172,8 +173,8 @@ class Readings:
 class Clues(Protocol):
     """What a residual tells an effect about where its shape parameters start."""
 
-    def common_frequency_hz(self) -> float:
-        """The frequency at which all runs' residuals stand out of their surroundings most."""
+    def common_frequencies_hz(self) -> Sequence[float]:
+        """Those at which all runs' residuals stand out of their surroundings, most so first."""
         ...
 
 
@@ -281,9 +282,9 @@ class Effect:
         """
         return None
 
-    def shape_guess(self, clues: Clues) -> dict[str, float]:
-        """Where shape parameters start on a residual, by name; others at their `start`."""
-        return {}
+    def shape_guesses(self, clues: Clues) -> Sequence[dict[str, float]]:
+        """Where shape parameters may start on a residual, by name; others at their `start`."""
+        return ()
 
 
 def each(robot: Robot, stem: str, unit: str, low: float, high: float, scale: float):

@@ -119,11 +119,25 @@ def _joined(
     name, chosen = effect_of(key), inside(before.robot, key)
     if name in before.effects:
         return before, unknowns.estimating(name, chosen)
-    model = with_effects(before, (name,))
+    model = _about(with_effects(before, (name,)), name, values)
     count = sum(p.per_run for p in model.parameters[model.place_of(name)])
     return model, unknowns.joined(
         *effect_blocks(model, name, values, chosen, np.zeros((runs, count)))
     )
+
+
+def _about(model: Model, name: str, values: Array) -> Model:
+    """The model with an effect's shape (a frequency) known about where it starts, as widely.
+
+    An effect that does nothing yet says nothing of its shape: a step would take it to the middle
+    of its plausible range, away from the line that the residual shows.
+    """
+    where, parameters = model.place_of(name), list(model.parameters)
+    parameters[where] = [
+        one if one.amplitude else replace(one, start=float(value))
+        for one, value in zip(parameters[where], values, strict=True)
+    ]
+    return replace(model, parameters=tuple(parameters))
 
 
 def displaced(

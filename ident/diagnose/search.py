@@ -195,8 +195,8 @@ class Search:
         run because they are eliminated with the runs' states.
         """
         clues = Residual(found, self.noise_scales)
-        guesses = {n: effect_named(n).shape_guess(clues) for n in map(effect_of, keys)}
-        shapes = {name: guess for name, guess in guesses.items() if guess}
+        guesses = {n: effect_named(n).shape_guesses(clues) for n in map(effect_of, keys)}
+        shapes = {name: guess[0] for name, guess in guesses.items() if guess}
         screens: dict[str, Screen] = {}
         robot = found.model.robot
         for kind in ((False, False), (True, False), (False, True)):
@@ -204,6 +204,10 @@ class Search:
             if group:
                 together = screen(found, group, self.noise_scales, shapes, colour)
                 screens |= dict.fromkeys(group, together)
+        for key in keys:
+            for shape in guesses[effect_of(key)][1:]:
+                other = screen(found, [key], self.noise_scales, {effect_of(key): shape}, colour)
+                screens[key] = min(screens[key], other, key=partial(_cost, key))
         return screens
 
     def _refits(
@@ -244,6 +248,11 @@ class Search:
         return ProcessPoolExecutor(
             self.workers, get_context("fork"), initializer=tie_to, initargs=(os.getpid(),)
         )
+
+
+def _cost(key: str, one: Screen) -> float:
+    """What a screen leaves with a candidate in it."""
+    return score(one.with_candidate(key)).cost
 
 
 def _kind(name: str, robot: Robot) -> tuple[bool, bool]:

@@ -15,6 +15,11 @@ from freeswing.ident.signals import band
 
 # Runs of 20 s hold three periods of it: what is slower is a drift and has no frequency.
 LOWEST_HZ = 0.15
+# A mode that the fit could not follow stands out in all runs too, and may do so more than a fan:
+# there are three modes at most beside it.
+LINES = 4
+# Over a run's length: half of the width of a line under a Hann window.
+HANN_WIDTH = 2.0
 # No calibration or survey can be trusted below this: nothing is sought in such a residual.
 SMALLEST_RESIDUAL_M = 2e-5
 SMALLEST_RESIDUAL_RAD = 1e-4
@@ -82,14 +87,33 @@ def _transformed(series: Array, times_s: Array, count: int, step_hz: float) -> N
     return found.reshape(-1, series.shape[1])[:count]
 
 
-def common_frequency(fit: LikelihoodFit, noise_scales: Array) -> float:
-    """The frequency at which all runs' residuals are strongest against their surroundings, Hz."""
+def common_frequencies(
+    fit: LikelihoodFit, noise_scales: Array, count: int = LINES
+) -> tuple[float, ...]:
+    """Where all runs' residuals are strongest against their surroundings, Hz, strongest first.
+
+    Each is a line by itself: two stand apart by at least what a run's length can resolve.
+
+    Args:
+        fit: whose residuals.
+        noise_scales: of metres and radians, (2,).
+        count: at most so many.
+
+    Source:
+        Percival, Walden 1993, Spectral Analysis for Physical Applications, ch. 6: a line under a
+        Hann window is four resolutions wide.
+    """
     frequencies, power = mean_log_spectrum(fit, noise_scales)
+    apart = HANN_WIDTH / min(run.span_s[1] - run.span_s[0] for run in fit.samples)
     width = max(5, len(frequencies) // 20) | 1
     padded = np.pad(np.log(power), width // 2, mode="edge")
     around = np.median(np.lib.stride_tricks.sliding_window_view(padded, width), axis=-1)
     prominence = np.log(power) - around
-    return float(frequencies[int(np.argmax(prominence))])
+    found: list[float] = []
+    while len(found) < count and np.isfinite(prominence).any():
+        found.append(float(frequencies[int(np.nanargmax(prominence))]))
+        prominence[np.abs(frequencies - found[-1]) < apart] = np.nan
+    return tuple(found)
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,9 +128,9 @@ class Residual:
     fit: LikelihoodFit
     noise_scales: Array
 
-    def common_frequency_hz(self) -> float:
-        """The frequency at which all runs' residuals stand out of their surroundings most."""
-        return common_frequency(self.fit, self.noise_scales)
+    def common_frequencies_hz(self) -> tuple[float, ...]:
+        """Those at which all runs' residuals stand out of their surroundings, most so first."""
+        return common_frequencies(self.fit, self.noise_scales)
 
 
 def too_small(fit: LikelihoodFit) -> bool:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from freeswing.cdpr.robot import Array
-from freeswing.ident.diagnose.spectrum import common_frequency, mean_log_spectrum, too_small
+from freeswing.ident.diagnose.spectrum import common_frequencies, mean_log_spectrum, too_small
 from freeswing.ident.likelihood.fit_swings import LikelihoodFit
 from freeswing.ident.likelihood.run_residuals import predicted, residuals
 from freeswing.ident.signals.prepare import PreparedRun
@@ -73,7 +73,7 @@ def unexplained(
     )
     strongest = float(frequencies[int(np.argmax(spectrum))])
     follows = _follows(fit, white, worst)
-    hint = _hint(fit, runs, full, common_frequency(fit, noise_scales))
+    hint = _hint(fit, runs, full, common_frequencies(fit, noise_scales, 1)[0])
     evidence |= {
         "coordinate": names[worst],
         "rms": size,

@@ -308,7 +308,7 @@ HELD = (
     Held("ident/diagnose/removal.py", ("LARGEST_RISE",), RESIDUALS),
     Held(
         "ident/diagnose/spectrum.py",
-        ("LOWEST_HZ", "SMALLEST_RESIDUAL_M", "SMALLEST_RESIDUAL_RAD"),
+        ("LOWEST_HZ", "LINES", "HANN_WIDTH", "SMALLEST_RESIDUAL_M", "SMALLEST_RESIDUAL_RAD"),
         RESIDUALS,
     ),
     Held(

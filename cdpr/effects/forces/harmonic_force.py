@@ -35,9 +35,9 @@ class HarmonicForce(Effect):
         force = values[0:3] * ca.cos(phase) + values[3:6] * ca.sin(phase)
         return instant.force_at(0 * force, force)
 
-    def shape_guess(self, clues: Clues) -> dict[str, float]:
-        """The line that all residuals share: a fan's, while modes differ from run to run."""
-        return {"frequency_hz": clues.common_frequency_hz()}
+    def shape_guesses(self, clues: Clues) -> tuple[dict[str, float], ...]:
+        """Lines that all residuals share: a fan's, while modes differ from run to run."""
+        return tuple({"frequency_hz": one} for one in clues.common_frequencies_hz())
 
 
 EFFECT = HarmonicForce()

@@ -232,7 +232,7 @@ def left(monkeypatch, power: float, colour: float) -> bool:
     monkeypatch.setattr(rest, "predicted", lambda *_: np.zeros((100, 6)))
     monkeypatch.setattr(rest, "_follows", lambda *_: {"time": 1.0})
     monkeypatch.setattr(rest, "_hint", lambda *_: [])
-    monkeypatch.setattr(rest, "common_frequency", lambda *_: 1.0)
+    monkeypatch.setattr(rest, "common_frequencies", lambda *_: (1.0,))
     samples = SimpleNamespace(
         coordinates=("x",), times_s=np.arange(100), columns=[0], values=np.zeros((100, 1))
     )

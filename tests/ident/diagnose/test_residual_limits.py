@@ -32,7 +32,38 @@ def test_what_is_slower_than_a_seventh_of_a_hertz_is_a_drift(monkeypatch, slow_h
     monkeypatch.setattr(spectrum, "residuals", lambda *_: wave[:, None])
     run = SimpleNamespace(times_s=times, span_s=(0.0, 200.0))
     fit = SimpleNamespace(samples=[run], motions=[None])
-    assert spectrum.common_frequency(fit, np.ones(2)) == pytest.approx(found_hz, abs=0.01)
+    assert spectrum.common_frequencies(fit, np.ones(2))[0] == pytest.approx(found_hz, abs=0.01)
+
+
+def lines(monkeypatch, *waves):
+    """Frequencies that are found in ten runs of 10 s with waves of (Hz, size) in white noise."""
+    times = np.arange(1000) / 100.0
+    off = 0.5 * np.random.default_rng(0).standard_normal((10, 1000, 1))
+    for hz, size in waves:
+        off[..., 0] += size * np.sin(2.0 * np.pi * hz * times)
+    monkeypatch.setattr(spectrum, "residuals", lambda run, *_: off[run])
+    runs = [SimpleNamespace(times_s=times, span_s=(0.0, 10.0))] * 10
+    fit = SimpleNamespace(samples=runs, motions=range(10))
+    return spectrum.common_frequencies(fit, np.ones(2))
+
+
+def test_a_fan_is_looked_for_beside_three_modes_that_stand_out_more(monkeypatch) -> None:
+    modes = [(3.0, 40.0), (6.0, 20.0), (11.0, 10.0), (14.0, 5.0), (17.0, 2.0)]
+    found = lines(monkeypatch, *modes)
+    assert len(found) == 4
+    assert found == pytest.approx((3.0, 6.0, 11.0, 14.0), abs=0.03)
+
+
+def test_the_shoulder_of_a_line_is_no_line_of_its_own(monkeypatch) -> None:
+    """A weak one elsewhere is."""
+    assert lines(monkeypatch, (5.0, 1.1), (9.0, 0.07))[:2] == pytest.approx((5.0, 9.0), abs=0.03)
+
+
+def test_two_lines_that_runs_resolve_are_two(monkeypatch) -> None:
+    """Of 10 s: two tenths of a hertz apart."""
+    found = sorted(lines(monkeypatch, (5.0, 8.0), (5.23, 8.0))[:2])
+    assert found[1] - found[0] < 0.245, found
+    assert found == pytest.approx([5.0, 5.23], abs=0.03)
 
 
 @pytest.mark.parametrize(("rise", "leaves"), [(9.3, True), (10.7, False)])
