@@ -11,6 +11,7 @@ import numpy as np
 
 from freeswing.cdpr.files.documents import InputError
 from freeswing.cdpr.robot import Robot
+from freeswing.excite.bench_plan import BenchCase
 from freeswing.ident.bench.runs import Bench, BenchRun, Signal
 
 LONGEST = 50.0  # wires over their distance from the middle: 12 m at 0.25 m
@@ -38,6 +39,26 @@ def refuse_wrong_units(bench: Bench, robot: Robot) -> None:
     if told:
         more = f"; and {len(told) - 3} more" if len(told) > 3 else ""
         raise InputError(f"{'; '.join(told[:3])}{more}: write m, kg, s and rad")
+
+
+def refuse_wrong_plan(case: BenchCase) -> None:
+    """Refuse masses and an inertia of a plan that must be in another unit.
+
+    Raises:
+        InputError: naming the option or key, the number and what it is held against.
+    """
+    told = []
+    for what, mass in (("--load-kg", case.load_kg), ("--known-kg", case.known_kg)):
+        if mass > HEAVIEST * case.mass_kg or case.mass_kg > LIGHTEST * mass:
+            told.append(f"{what} {mass:.4g} on a platform of {case.mass_kg:.4g} kg")
+    gyration = float(np.sqrt(case.load_izz_kg_m2 / case.load_kg))
+    if gyration > FARTHEST * case.radius_m:
+        told.append(
+            f"--load-izz-kg-m2 {case.load_izz_kg_m2:.4g} of {case.load_kg:.4g} kg is a radius of "
+            f"gyration of {gyration:.3g} m, on wires {case.radius_m:.3g} m from their middle"
+        )
+    if told:
+        raise InputError(f"{'; '.join(told)}: write kg and kg m2")
 
 
 def _refuse_too_few(bench: Bench) -> None:

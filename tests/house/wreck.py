@@ -769,7 +769,7 @@ HELD = (
     ),
     Held("vision/planar/fit_plane.py", ("FOCAL_STD", "BEND_STD", "LEAN_STD"), PLANAR),
     Held("vision/planar/fit_plane.py", ("PRINT_STD_M", "DOT_STD_M"), PLANAR),
-    Held("vision/planar/track_planar.py", ("LEAST_FRAMES",), PLANAR),
+    Held("vision/planar/track_planar.py", ("LEAST_FRAMES", "FARTHEST_M"), PLANAR),
 )  # fmt: skip
 
 

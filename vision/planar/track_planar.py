@@ -53,6 +53,7 @@ Array = NDArray[np.float64]
 COORDINATES = ("x", "y", "chi")
 PROVENANCE = "one camera from above"
 USUAL_FOCAL = 0.8  # of the longer side: phones' main cameras, as they film
+FARTHEST_M = 10.0  # of a tag or dot from P: no bench is as wide
 LEAST_FRAMES = 40  # with the platform in them: two seconds of a phone
 LONGEST_WAIT = 0.9  # of the progress goes into the images
 
@@ -180,6 +181,8 @@ def _first(film: Recording) -> list[NDArray[np.uint8]]:
 
 def _watch(target: Target | None) -> Watch:
     """What to look for: tags alone where there are any, else dots."""
+    if target is not None:
+        _check_places(target)
     if target is not None and target.tags:
         return Watch.of(replace(target, markers=()))
     if target is not None and target.markers:
@@ -188,6 +191,20 @@ def _watch(target: Target | None) -> Watch:
         return Watch.of(target)
     none = np.zeros((0, 4, 3))
     return Watch((), none, (), none, COLUMNS, np.zeros((2, 3)), np.zeros(2))
+
+
+def _check_places(target: Target) -> None:
+    """Refuse tags and dots that lie beyond any platform.
+
+    Raises:
+        InputError: naming the first one.
+    """
+    places = [(f"tag {tag.family} {tag.id}", tag.T_platform_tag[:3, 3]) for tag in target.tags]
+    places += [(f"marker {marker.name}", marker.position_m) for marker in target.markers]
+    for name, place in places:
+        far = float(np.linalg.norm(place))
+        if far > FARTHEST_M:
+            raise InputError(f"target.toml: {name} is {far:.4g} m from P: write metres, not mm")
 
 
 def _two_dots(

@@ -37,6 +37,7 @@ def add_bench_arguments(parser: ArgumentParser) -> None:
 def run_bench(robot: Robot, options: Namespace, console: Console) -> None:
     """The bench's one table."""
     from freeswing.cdpr.system.confine import results_folder
+    from freeswing.doctor.bench_units import refuse_wrong_plan
     from freeswing.excite.bench_plan import bench_case, planned
     from freeswing.excite.bench_table import bench_document, bench_words
     from freeswing.results.planning import BenchPlan
@@ -45,6 +46,7 @@ def run_bench(robot: Robot, options: Namespace, console: Console) -> None:
     case = bench_case(robot, options.load_kg, options.load_izz_kg_m2)
     asked = {"known_kg": options.known_kg, "gain_std": options.gain_std}
     case = replace(case, **{name: value for name, value in asked.items() if value is not None})
+    refuse_wrong_plan(case)
     told = bench_document(*planned(case, tuple(options.keep)))
     for line in bench_words(told):
         console.say(line)

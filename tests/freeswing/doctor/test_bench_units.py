@@ -10,7 +10,8 @@ import pytest
 
 from freeswing.cdpr.files.documents import InputError
 from freeswing.cdpr.robot import Platform
-from freeswing.doctor.bench_units import refuse_wrong_units
+from freeswing.doctor.bench_units import refuse_wrong_plan, refuse_wrong_units
+from freeswing.excite.bench_plan import BenchCase
 from freeswing.ident.bench.runs import Bench, BenchRun, KnownBody, Load, Signal
 from tests.ident.bench.test_swing_slopes import trifilar
 
@@ -90,3 +91,24 @@ def test_many_are_counted() -> None:
     bench = bench_of(lengths_m=np.full(3, 120.0))
     with pytest.raises(InputError, match="and 2 more: write"):
         refuse_wrong_units(replace(bench, runs=bench.runs * 5), ROBOT)
+
+
+@pytest.mark.parametrize(
+    ("fields", "says"),
+    [
+        ({"known_kg": 239.0}, ""),
+        ({"known_kg": 241.0}, "--known-kg 241 on a platform of 1.2 kg"),
+        ({"load_kg": 0.00121, "load_izz_kg_m2": 1e-5}, ""),
+        ({"load_kg": 0.00119, "load_izz_kg_m2": 1e-5}, "--load-kg 0.00119 on"),
+        ({"load_izz_kg_m2": 0.8 * 2.4**2}, ""),
+        ({"load_izz_kg_m2": 0.8 * 2.6**2}, "gyration of 2.6 m"),
+    ],
+)
+def test_a_plan_in_other_units(fields: dict[str, float], says: str) -> None:
+    case = replace(BenchCase(1.2, 0.04, 0.8, 0.0093, 0.25, 1.2, 0.4), **fields)
+    if not says:
+        refuse_wrong_plan(case)
+        return
+    with pytest.raises(InputError, match="write kg and kg m2") as told:
+        refuse_wrong_plan(case)
+    assert says in str(told.value)

@@ -11,10 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from freeswing.cdpr.files.documents import DataError
+from freeswing.cdpr.files.documents import DataError, InputError
+from freeswing.cdpr.measured.target import Target
 from freeswing.vision.planar import dots as dots_module
 from freeswing.vision.planar import examine, fit_plane, plane, track_planar
 from freeswing.vision.planar.dots import Spots, followed, side_of_dots
+from tests.vision.planar.benches_from_above import plate_tag
 
 
 def stub(**attributes: Any) -> Any:
@@ -220,3 +222,12 @@ def test_points_that_lie_aside_pull_as_much_as_they_miss() -> None:
     pulls = (fit_plane._normal([other], prior)[1] - fit_plane._normal([run], prior)[1]) / 2e-6
     expected = fit_plane._pull(run, shift / 2e-6)
     np.testing.assert_allclose(expected, pulls, atol=1e-3 * np.abs(pulls).max())
+
+
+@pytest.mark.parametrize(("far_m", "refused"), [(9.9, False), (10.1, True)])
+def test_a_tag_beyond_any_platform_is_in_mm(far_m: float, refused: bool) -> None:
+    target = Target((plate_tag(at_m=(far_m, 0.0, 0.0)),), ())
+    with (
+        pytest.raises(InputError, match=r"tag tag36h11 3 is 10\.1 m") if refused else nullcontext()
+    ):
+        track_planar._watch(target)
