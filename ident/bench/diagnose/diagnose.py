@@ -18,7 +18,7 @@ from freeswing.ident.bench.diagnose.shown import Shown, shown
 from freeswing.ident.bench.diagnose.weigh import Fit
 from freeswing.ident.bench.held_uncertain import considered
 from freeswing.ident.bench.identify_bench import BenchResult, identify_bench
-from freeswing.ident.bench.mass_verdict import CONTRADICTED, MassVerdict
+from freeswing.ident.bench.mass_verdict import CONTRADICTED, MassVerdict, doubt
 from freeswing.ident.bench.modal import ModalSwing
 from freeswing.ident.bench.runs import Bench
 from freeswing.ident.bench.solve import FINE, Solved
@@ -186,6 +186,9 @@ def _counted(solved: Solved, one: Fit, rounds: Sequence[Round] = ()) -> Solved:
         mass = MassVerdict(mass.declared_kg, value, std, off)
     if not one.causes:  # with a cause the runs no longer want what they wanted without
         found = with_change(found, solved.doubts)
+    elif mass is not None and mass.contradicted:
+        change = doubt(found, mass)
+        found = replace(found, covariance=found.covariance + np.outer(change, change))
     pairs = [
         (step.winner.solution, rival.solution)
         for step in rounds
