@@ -11,6 +11,7 @@ from freeswing.cdpr.effects import Recorded, catalogue
 from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.model.equations import Model, build_model
 from freeswing.cdpr.robot import Robot
+from freeswing.cdpr.system.threads import side_by_side
 from freeswing.ident.estimate import Estimate
 from freeswing.ident.fidim.fidim_stage import How, Weighting, fidim_estimates
 from freeswing.ident.inertia_starts import likelihood_starts
@@ -322,12 +323,13 @@ def _validated(
         again = prepare_runs(swings, build_model(told), settings.signals)
         held_out = list(again.runs)
     runs = [run for run in held_out if (run.full if full else run.free) is not None]
-    found = []
-    for i, run in enumerate(runs):
-        if progress:
-            progress("validation", i / len(runs))
-        found.append(validate_run(model, run, estimate.values, full, settings.predict))
-    return tuple(found)
+    if progress and runs:
+        progress("validation", 0.0)
+
+    def confronted(run: PreparedRun) -> ValidatedRun:
+        return validate_run(model, run, estimate.values, full, settings.predict)
+
+    return tuple(side_by_side(confronted, runs))
 
 
 def session_notes(model: Model, prepared: PreparedRuns, failures: dict[str, str]) -> list[str]:

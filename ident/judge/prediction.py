@@ -27,7 +27,7 @@ from freeswing.ident.signals.prepare import PreparedRun
 
 # Ten samples a period at the 5 Hz where swings of a platform end (`band.LOWEST_PASS_HZ`).
 PREDICTED_HZ = 50.0
-# A fit that only weighs the next one is not followed further: the errors differ by 4e-4 of them.
+# A fit that only weighs the next one is not followed further: errors differ by 0.3 %.
 _WEIGHED_DECREASE = 0.5
 _AS_GOOD = 1.1  # times the error under a model before: no reason for another, careful start
 _ASTRAY = 0.05  # residual over motion beyond which a fit deserves a second, careful start

@@ -66,7 +66,10 @@ def run(options: Namespace, console: Console) -> None:
 
 def make(session: Session, console: Console, settings: dict[str, Any], crew: Crew) -> Made:
     """identification.json and motion.json as documents."""
+    import os
+
     from freeswing.cdpr.files.documents import InputError
+    from freeswing.cdpr.system.threads import threads
     from freeswing.doctor.quaternions import refuse_mistaken_quaternions
     from freeswing.ident.identify import IdentifySettings, identify
     from freeswing.ident.likelihood.cable_ends import GeometryPriors
@@ -85,8 +88,10 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
     if is_bench(session, robot):
         return _make_bench(session, console, robot)
     target = load_target(session)
-    markers = read_marker_runs(session, target)
-    swings = load_swings(session, robot, target, markers)
+    count = crew.processes or os.cpu_count() or 1
+    with threads(count):
+        markers = read_marker_runs(session, target)
+        swings = load_swings(session, robot, target, markers)
     refuse_repeated(swings)
     refuse_mistaken_quaternions(swings, robot)
     refuse_exchanged_lengths(swings, robot)
@@ -101,7 +106,8 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
         consistent=settings.get("consistent", False),
         geometry=geometry,
     )
-    found = identify(list(swings), robot, chosen, console.progress)
+    with threads(count):
+        found = identify(list(swings), robot, chosen, console.progress)
     noted = _recording_notes(session, swings, markers)
     told = found.document()
     document = Identification.from_json(
