@@ -100,7 +100,7 @@ def solved(model: Model, bench: Bench, start: Assembled) -> Solved:
     found = fit(swings, found.unknowns, FINE)
     swings = rescaled(swings, found, fastest_hz, coloured=True)
     first, more = start.unknowns, None
-    if rolls_unseen(model, held):
+    if rolls_unseen(model, held, any(run.coordinates for run in start.runs)):
         more = freed(model, swings, _without_scatter(found.unknowns), held, first)
     if more is not None:
         held, first = {}, more.first

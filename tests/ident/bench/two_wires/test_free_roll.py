@@ -46,13 +46,18 @@ def of_izz(height: float, width: float) -> float:
 
 
 @pytest.mark.parametrize(
-    ("wires", "held", "free"),
-    [(2, {"platform": HELD}, True), (3, {"platform": HELD}, False), (2, {}, False),
-     (2, {"platform": np.arange(10) == 0}, False)],
-)  # fmt: skip
-def test_roll_shows_what_two_wires_leave_unseen(wires, held, free) -> None:
+    ("wires", "held", "scaled", "free"),
+    [
+        (2, {"platform": HELD}, True, True),
+        (2, {"platform": HELD}, False, False),
+        (3, {"platform": HELD}, True, False),
+        (2, {}, True, False),
+        (2, {"platform": np.arange(10) == 0}, True, False),
+    ],
+)
+def test_roll_shows_what_two_wires_leave_unseen(wires, held, scaled, free) -> None:
     model = SimpleNamespace(robot=SimpleNamespace(n_cables=wires))
-    assert rolls_unseen(model, held) == free
+    assert rolls_unseen(model, held, scaled) == free
 
 
 def test_moments_across_are_those_of_a_body_with_this_izz() -> None:
