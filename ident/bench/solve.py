@@ -19,7 +19,12 @@ from freeswing.ident.bench.priors.wire_priors import UNSTATED_LENGTH_STD_M
 from freeswing.ident.bench.runs import Bench
 from freeswing.ident.bench.scatter import WIDE_SCATTER, scatter_block, scatter_std
 from freeswing.ident.bench.swing import COMMON, IZZ, BenchSwing
-from freeswing.ident.bench.two_wires.free_roll import freed, rolls_unseen
+from freeswing.ident.bench.two_wires.free_roll import (
+    freed,
+    levelled_as,
+    rolls_unseen,
+    unlevelled,
+)
 from freeswing.ident.likelihood.fit import Solution, fit
 from freeswing.ident.likelihood.fit_blocks import Dense
 from freeswing.ident.likelihood.unknowns import Unknowns
@@ -83,7 +88,8 @@ def solved(model: Model, bench: Bench, start: Assembled) -> Solved:
     Raises:
         ValueError: when a run's start cannot be simulated, naming it.
     """
-    swings, held = start.swings, unseen(bench, start.runs, start.unknowns)
+    held = unseen(bench, start.runs, start.unknowns)
+    swings = unlevelled(start.swings, held)
     unknowns = holding(start.unknowns, held)
     unknowns = holding(unknowns, gauge(bench, start.runs, unknowns))
     sway = sees_sway(bench, start.runs)
@@ -101,7 +107,9 @@ def solved(model: Model, bench: Bench, start: Assembled) -> Solved:
     swings = rescaled(swings, found, fastest_hz, coloured=True)
     first, more = start.unknowns, None
     if rolls_unseen(model, held, any(run.coordinates for run in start.runs)):
-        more = freed(model, swings, _without_scatter(found.unknowns), held, first)
+        levelled = levelled_as(swings, start.swings)
+        more = freed(model, levelled, _without_scatter(found.unknowns), held, first)
+        swings = swings if more is None else levelled
     if more is not None:
         held, first = {}, more.first
         swings = rescaled(swings, more.solution, fastest_hz, coloured=True)

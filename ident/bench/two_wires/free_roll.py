@@ -55,6 +55,28 @@ def rolls_unseen(model: Model, held: Held, scaled: bool) -> bool:
     return scaled and model.robot.n_cables == 2 and any(m[1:].any() for m in held.values())
 
 
+def unlevelled(swings: tuple[BenchSwing, ...], held: Held) -> tuple[BenchSwing, ...]:
+    """The swings without what a level showed where centres of mass are held.
+
+    Held centres cannot follow it: masses would, a platform's above all.
+    """
+    if not any(mask[1:4].any() for mask in held.values()):
+        return swings
+    known = [getattr(swing, "level_std_rad", None) for swing in swings]
+    return tuple(
+        swing if level is None else replace(swing, level_std_rad=None)
+        for swing, level in zip(swings, known, strict=True)
+    )
+
+
+def levelled_as(
+    swings: Sequence[BenchSwing], others: Sequence[BenchSwing]
+) -> tuple[BenchSwing, ...]:
+    """The swings with what a level showed of others."""
+    both = zip(swings, others, strict=True)
+    return tuple(replace(swing, level_std_rad=other.level_std_rad) for swing, other in both)
+
+
 def freed(
     model: Model, swings: Sequence[BenchSwing], found: Unknowns, held: Held, first: Unknowns
 ) -> Freed | None:

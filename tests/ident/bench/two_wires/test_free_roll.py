@@ -163,6 +163,10 @@ def test_a_level_on_the_platform_is_an_observation() -> None:
     assert len(rows[1]) == len(rows[0]) + 1
     rolled = lean(start.swings[0].total(values), robot)[0]
     assert rows[1][-1] == pytest.approx(rolled / 0.003, rel=1e-9)
+    still = free_roll.unlevelled(start.swings, {"platform": HELD})
+    assert still[0].level_std_rad is None
+    assert free_roll.levelled_as(still, start.swings)[0].level_std_rad == 0.003
+    assert free_roll.unlevelled(start.swings, {"platform": np.arange(10) == 4}) is start.swings
     slopes_are_those_of_differences(Bench((level,), (), load), robot)
     with pytest.raises(DataError, match=r"level_std_rad .* hangs on 3"):
         identify_bench(Bench((replace(level, loads=()),)), trifilar())
