@@ -18,10 +18,24 @@ def prior_whitener(model: Model) -> Array:
         Golub, Van Loan 2013, Matrix Computations, sec. 4.2: the Cholesky factor; Bishop
         2006, Pattern Recognition and Machine Learning, sec. 2.3.
     """
-    scaled = np.diag([1.0 / parameter.prior_std for parameter in model.parameters])
-    if model.correlations is None:
+    stds = np.array([parameter.prior_std for parameter in model.parameters])
+    return whitener(stds, model.correlations)
+
+
+def whitener(stds: Array, correlations: Array | None) -> Array:
+    """Turns distances from means into independent ones of unit deviation, (k, k).
+
+    Args:
+        stds: infinite where nothing is known, (k,).
+        correlations: (k, k); None: independent.
+
+    Source:
+        Golub, Van Loan 2013, Matrix Computations, sec. 4.2: the Cholesky factor.
+    """
+    scaled = np.diag(1.0 / stds)
+    if correlations is None:
         return scaled
-    return np.linalg.solve(np.linalg.cholesky(model.correlations), scaled)
+    return np.linalg.solve(np.linalg.cholesky(correlations), scaled)
 
 
 def with_known(

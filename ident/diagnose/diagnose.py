@@ -342,7 +342,7 @@ def _with_own_noise(found: LikelihoodFit) -> LikelihoodFit:
 
     Its scales follow its residuals, and errors of the cameras' calibration are unknowns too.
     """
-    return with_calibration(fit(found.swings, found.unknowns, FreeSwing(grow=False))).fit
+    return with_calibration(fit(found.swings, found.unknowns, FreeSwing(grow=False)))
 
 
 def _share_explained(search: Search, last: Refit) -> float:

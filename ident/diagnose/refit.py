@@ -195,7 +195,7 @@ def freed(one: Refit, noise_scales: Array) -> Refit:
     step = one.score.change[len(one.score.change) - common :]
     if np.abs(step).max(initial=0.0) < CONVERGED:
         return one
-    samples = freed_samples(found, step)
+    samples = freed_samples(found.swings, step)
     scales = noise_scales * np.sqrt(colour_of(found, noise_scales))
     exact = fit(replace(found.swings, samples=samples, scales=scales), found.unknowns, SEARCHED)
     return rescored(exact, noise_scales, colour_of(exact, noise_scales))

@@ -26,6 +26,7 @@ from freeswing.ident.likelihood.unknowns import Gaussian, Mask, Unknown, Unknown
 from freeswing.ident.runs import Payload
 
 STARTS = "starts"  # [zeta; rates] of each run
+MODES = "camera modes"  # amplitudes of the errors that a calibration does to all poses together
 
 
 def each_run(effect: str) -> str:
@@ -44,9 +45,9 @@ def shared_size(model: Model) -> int:
 
 
 def free_of(unknowns: Unknowns, model: Model) -> Mask:
-    """Which of the shared unknowns are estimated: inertia, a model's effects, payloads."""
-    payloads = (PAYLOADS,) if PAYLOADS in unknowns else ()
-    names = (INERTIA, *model.effects, *payloads)
+    """Which of the shared unknowns are estimated: inertia, a model's effects, payloads, modes."""
+    more = tuple(name for name in (PAYLOADS, MODES) if name in unknowns)
+    names = (INERTIA, *model.effects, *more)
     return np.concatenate([unknowns.block(name).mask for name in names])
 
 
@@ -107,7 +108,7 @@ def model_unknowns(model: Model, loads: Loads, state: State, free: Mask) -> Unkn
         added = loads.start() if state.loads is None else state.loads
         blocks.append(payload_block(loads, added, payloads))
     blocks.append(Unknown(STARTS, starts, np.full(starts.shape[1], STATE_UNIT), each_run=True))
-    return Unknowns(tuple(blocks))
+    return Unknowns(tuple(blocks)).known_together(model.effects, model.correlations)
 
 
 def first_unknowns(
@@ -153,7 +154,17 @@ def with_effect_values(unknowns: Unknowns, model: Model, values: Array) -> Unkno
         own = unknowns.block(each_run(name)).value if each_run(name) in unknowns else None
         for one in effect_blocks(model, name, values[where], block.mask, own):
             unknowns = unknowns.exchanged(one)
-    return unknowns
+    return unknowns.known_together(model.effects, model.correlations)
+
+
+def as_known(unknowns: Unknowns, model: Model, before: Unknowns) -> Unknowns:
+    """The same with what others say is known of a model's effects beforehand."""
+    for name in model.effects:
+        unknowns = unknowns.known(name, before.block(name).prior)
+    if before.correlations is None:
+        return unknowns.known_together(model.effects, None)
+    places = before.columns(*model.effects)
+    return unknowns.known_together(model.effects, before.correlations[np.ix_(places, places)])
 
 
 def state_of(unknowns: Unknowns, model: Model, scales: Array) -> State:
@@ -182,11 +193,12 @@ def state_of(unknowns: Unknowns, model: Model, scales: Array) -> State:
 def refuse_others(unknowns: Unknowns, model: Model, loads: Loads) -> None:
     """Raises ValueError where a block is not what the model and the payloads make of it.
 
-    What is known of effects is a joint Gaussian that the model has (`with_known`), and starts and
+    What is known of effects is what their blocks say. Of inertia nothing is known, and starts and
     each run's own values are always estimated: a block that says otherwise would not be heard.
     """
     state = state_of(unknowns, model, np.ones(2))
     made = model_unknowns(model, loads, state, free_of(unknowns, model))
+    made = as_known(made, model, unknowns)
     for block in unknowns.blocks:
         if block.name not in made:
             raise ValueError(f"no free swing has an unknown called {block.name!r}")

@@ -22,75 +22,132 @@ from freeswing.cdpr.rotation import angle_rate_matrix, matrix_from_angles
 from freeswing.cdpr.simulation.free_swing import Motion
 from freeswing.cdpr.simulation.sensitivity import linearise
 from freeswing.cdpr.system.threads import side_by_side
-from freeswing.ident.likelihood.blocks import state_of
+from freeswing.ident.likelihood.blocks import MODES, free_of, state_of
 from freeswing.ident.likelihood.fit import fit
-from freeswing.ident.likelihood.fit_swings import FreeSwing, LikelihoodFit
+from freeswing.ident.likelihood.fit_swings import (
+    FreeSwing,
+    LikelihoodFit,
+    Swings,
+    correlation_factor,
+)
 from freeswing.ident.likelihood.joint_problem import Problem
 from freeswing.ident.likelihood.run_residuals import Samples, reduce_run
+from freeswing.ident.likelihood.unknowns import Gaussian, Unknown, Unknowns
 from freeswing.ident.runs import SwingRun
+from freeswing.ident.signals.residual_colour import enlargement
 
 ROUNDS = 3
-MODES = "camera modes"
 CONVERGED = 0.02  # of a standard deviation of the amplitudes
 UNLIKELY = 4.5  # deviations: seven in a million by chance, for each of some tens of modes
 
 
 @dataclass(frozen=True, slots=True)
-class Calibrated:
-    """A fit with the calibration's errors among its unknowns.
+class BesideModes:
+    """How to fit free swings with camera modes among the unknowns: the two by turns.
+
+    The motions of a fit never know of the modes: their amplitudes are solved beside a fit that
+    stands, with all other unknowns to first order, and taken out of its samples.
 
     Attributes:
-        fit: to the samples without the errors found; its covariance holds what is left of them.
-        amplitudes: of the modes, in standard deviations of the calibration, (r,).
-        std: their standard deviations after the fit, (r,).
+        consistent: hold the inertia, of which all is then free, to what a body can have.
     """
 
-    fit: LikelihoodFit
-    amplitudes: Array
-    std: Array
+    consistent: bool = False
 
-    def document(self) -> dict[str, Any]:
-        """For the estimate's entry in the result file; empty where nothing was known."""
-        if not len(self.amplitudes):
-            return {}
-        modes = {"amplitudes": self.amplitudes.tolist(), "std": self.std.tolist()}
-        return {"calibration_modes": modes}
+    def fitted(self, swings: Swings, unknowns: Unknowns) -> LikelihoodFit:
+        """All unknowns; the modes stand last in the covariance, which holds what is left of them.
 
-    def notes(self) -> tuple[str, ...]:
-        """What a reader should know."""
-        largest = float(np.abs(self.amplitudes).max(initial=0.0))
-        if largest <= UNLIKELY:
-            return ()
-        return (
-            f"the swings ask for errors of all poses together of {largest:.1f} standard deviations "
-            f"(more than {UNLIKELY:g} is unlikely): the cameras' calibration, the base tags' "
-            "survey, tags' or markers' places on the platform or the robot's geometry may be off",
+        Args:
+            swings: with the motions of a fit; their samples may be free of some errors already,
+                by the amplitudes where the block starts.
+            unknowns: those of that fit, and `modes_block` of the samples.
+
+        Raises:
+            ValueError: when the modes are not those of the samples, no motions are given, or a
+                refit breaks down.
+        """
+        _refuse_other_modes(swings, unknowns.block(MODES))
+        found, step = self._turn(swings, unknowns.without(MODES))
+        for _ in range(ROUNDS - 1):
+            if np.abs(step).max() < CONVERGED:
+                break
+            found, step = self._turn(found.swings, found.unknowns)
+        joint, block = _solved(found.swings, found.unknowns), modes_block(found.samples)
+        return replace(
+            found,
+            unknowns=found.unknowns.joined(block),
+            covariance=joint.covariance,
+            singular_values=joint.singular_values,
+            rank=found.rank + block.size,
+            between=np.append(found.between, np.zeros(block.size)),
         )
 
+    def _turn(self, swings: Swings, rest: Unknowns) -> tuple[LikelihoodFit, Array]:
+        """Amplitudes beside a fit, then the fit beside these; and their change, (r,)."""
+        step = _solved(swings, rest).step
+        freer = replace(swings, samples=freed_samples(swings, step))
+        return fit(freer, rest, FreeSwing(grow=False, consistent=self.consistent)), step
 
-def with_calibration(found: LikelihoodFit, consistent: bool = False) -> Calibrated:
+
+def with_calibration(found: LikelihoodFit, consistent: bool = False) -> LikelihoodFit:
     """Goes on from a fit with the amplitudes of the calibration's errors as further unknowns.
 
     Args:
         found: converged; its samples state the errors and may be free of some already.
         consistent: hold the inertia to what a body can have.
 
+    Returns:
+        The fit to the samples without the errors found, `MODES` among its unknowns; the fit as it
+        is where nothing is known of the errors, or its own unknowns are not determined.
+
     Raises:
         ValueError: when the runs' errors have different numbers of modes, or a refit breaks down.
     """
-    amplitudes = amplitudes_of(found.samples)
-    if not len(amplitudes) or found.rank < int(found.free.sum()):
-        return Calibrated(found, np.zeros(0), np.zeros(0))
-    current = found
-    for _ in range(ROUNDS):
-        step = _solved(current).step
-        swings = replace(current.swings, samples=freed_samples(current, step))
-        current = fit(swings, current.unknowns, FreeSwing(grow=False, consistent=consistent))
-        if np.abs(step).max() < CONVERGED:
-            break
-    joint = _solved(current)
-    amplitudes = amplitudes_of(current.samples)
-    return Calibrated(replace(current, covariance=joint.shared), amplitudes, joint.spread)
+    block = modes_block(found.samples)
+    if not block.size or found.rank < int(found.free.sum()):
+        return found
+    return fit(found.swings, found.unknowns.joined(block), BesideModes(consistent))
+
+
+def modes_block(samples: Sequence[Samples]) -> Unknown:
+    """Amplitudes of the modes, in standard deviations of the calibration: as many as are stated.
+
+    Raises:
+        ValueError: when the runs' errors have different numbers of modes.
+    """
+    amplitudes = amplitudes_of(samples)
+    ones = np.ones(len(amplitudes))
+    prior = Gaussian(0.0 * ones, ones, "the calibration of the cameras")
+    return Unknown(MODES, amplitudes, ones, prior)
+
+
+def _refuse_other_modes(swings: Swings, block: Unknown) -> None:
+    if not swings.motions:
+        raise ValueError(f"unknown {MODES}: is fitted beside motions, and these swings have none")
+    made = modes_block(swings.samples)
+    if not block.is_known_as(made) or not np.array_equal(block.value, made.value):
+        raise ValueError(f"unknown {MODES}: value, bounds, prior or mask are not the samples'")
+
+
+def modes_document(found: LikelihoodFit) -> dict[str, Any]:
+    """For the estimate's entry in the result file; empty where nothing was known."""
+    if MODES not in found.unknowns:
+        return {}
+    modes = {"amplitudes": found.value(MODES).tolist(), "std": found.std(MODES).tolist()}
+    return {"calibration_modes": modes}
+
+
+def modes_notes(found: LikelihoodFit) -> tuple[str, ...]:
+    """What a reader should know of the modes."""
+    asked = found.value(MODES) if MODES in found.unknowns else np.zeros(0)
+    largest = float(np.abs(asked).max(initial=0.0))
+    if largest <= UNLIKELY:
+        return ()
+    return (
+        f"the swings ask for errors of all poses together of {largest:.1f} standard deviations "
+        f"(more than {UNLIKELY:g} is unlikely): the cameras' calibration, the base tags' "
+        "survey, tags' or markers' places on the platform or the robot's geometry may be off",
+    )
 
 
 def amplitudes_of(samples: Sequence[Samples]) -> Array:
@@ -108,21 +165,21 @@ def amplitudes_of(samples: Sequence[Samples]) -> Array:
     return np.zeros(counts.pop() if counts else 0) if known is None else known
 
 
-def freed_samples(found: LikelihoodFit, step: Array) -> tuple[Samples, ...]:
-    """A fit's samples with so much more of the errors that they share taken out.
+def freed_samples(swings: Swings, step: Array) -> tuple[Samples, ...]:
+    """Samples with so much more of the errors that they share taken out.
 
     Args:
-        found: the fit, at whose motions the errors are taken.
+        swings: those of a fit, at whose motions the errors are taken.
         step: of the amplitudes, (r,).
     """
-    amplitudes = amplitudes_of(found.samples) + step
+    amplitudes = amplitudes_of(swings.samples) + step
     return tuple(
         replace(
             run,
             values=run.values - motion_shifts(motion, run, len(step))[:, run.columns] @ step,
             freed=amplitudes,
         )
-        for motion, run in zip(found.motions, found.samples, strict=True)
+        for motion, run in zip(swings.motions, swings.samples, strict=True)
     )
 
 
@@ -135,7 +192,7 @@ def freed(run: SwingRun, amplitudes: Array) -> SwingRun:
 
     Args:
         run: as recorded.
-        amplitudes: of its modes, `Calibrated.amplitudes`, (r,); (0,) where none were fitted.
+        amplitudes: of its modes, the value of `MODES`, (r,); (0,) where none were fitted.
 
     Raises:
         ValueError: when the run has another number of modes.
@@ -195,33 +252,34 @@ class _Joint:
 
     Attributes:
         step: change of the amplitudes, (r,).
-        spread: their standard deviations, (r,).
-        shared: covariance of the others, (p, p).
+        covariance: of the others and of the amplitudes, (p + r, p + r).
+        singular_values: of the scaled triangle, descending.
     """
 
     step: Array
-    spread: Array
-    shared: Array
+    covariance: Array
+    singular_values: Array
 
 
-def _solved(current: LikelihoodFit) -> _Joint:
+def _solved(swings: Swings, rest: Unknowns) -> _Joint:
     """All runs, the priors, and amplitudes of unit deviation about zero.
 
     Coloured residuals say less than their number: the samples count by `correlation`.
     """
-    problem = Problem(current.model, current.samples, current.free)
-    amplitudes = amplitudes_of(current.samples)
+    model, samples, motions, scales = swings.model, swings.samples, swings.motions, swings.scales
+    problem = Problem(model, samples, free_of(rest, model), known=rest.known_of(*model.effects))
+    amplitudes = amplitudes_of(samples)
     n_modes, n_shared = len(amplitudes), problem.layout.size
     layout = problem.layout.joined(MODES, n_modes)
-    state = state_of(current.unknowns, current.model, current.scales)
-    weight = 1.0 / np.sqrt(current.enlargement)
+    state = state_of(rest, model, scales)
+    weight = 1.0 / np.sqrt(enlargement(correlation_factor(motions, samples, scales)))
 
     def reduced(motion: Motion, run: Samples) -> Array:
         linear = linearise(motion, wanted=problem.wanted)
-        return reduce_run(linear, run, current.scales, motion_shifts(motion, run, n_modes)).rows
+        return reduce_run(linear, run, scales, motion_shifts(motion, run, n_modes)).rows
 
     rows = []
-    for found in side_by_side(reduced, current.motions, current.samples):
+    for found in side_by_side(reduced, motions, samples):
         shared = problem.shared_map(len(rows), state)
         by_shared = found[:-1, : len(shared)] @ shared
         rows.append(weight * np.hstack([by_shared, found[:-1, len(shared) :]]))
@@ -238,6 +296,4 @@ def _solved(current: LikelihoodFit) -> _Joint:
     covariance[np.ix_(kept, kept)] = inverse @ inverse.T
     step = np.zeros(layout.size)
     step[kept] = -inverse @ (Q.T @ right)
-    modes = layout.place(MODES)
-    spread = np.sqrt(np.diag(covariance)[modes])
-    return _Joint(step[modes], spread, covariance[:n_shared, :n_shared])
+    return _Joint(step[layout.place(MODES)], covariance, np.linalg.svd(R, compute_uv=False))

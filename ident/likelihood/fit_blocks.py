@@ -201,7 +201,10 @@ def _simulated(swings: Sequence[Swing], unknowns: Unknowns) -> list[Any]:
 
 
 def _cost(swings: Sequence[Swing], unknowns: Unknowns, made: Sequence[Any]) -> float:
-    total = sum(float(np.sum(block.pull(block.value)[0] ** 2)) for block in unknowns.blocks)
+    alone = unknowns.blocks if unknowns.correlations is None else unknowns.own
+    total = sum(float(np.sum(block.pull(block.value)[0] ** 2)) for block in alone)
+    if unknowns.correlations is not None:
+        total += float(np.sum(_shared_priors(unknowns)[:, -1] ** 2))
     for run, (swing, one) in enumerate(zip(swings, made, strict=True)):
         total += float(np.sum(swing.residuals(unknowns.of_run(run), one) ** 2))
     return total
@@ -237,7 +240,7 @@ def _step(parts: list[Part], unknowns: Unknowns, damping: float) -> _Step:
     n_own = sum(block.size for block in unknowns.own)
     held = np.where(_joined([block.mask for block in unknowns.own]), 0.0, 1.0)
     reduced, triangles = [], []
-    curvature = _shared_priors(unknowns)[:, :-1].diagonal() ** 2
+    curvature = np.sum(_shared_priors(unknowns)[:, :-1] ** 2, axis=0)
     for residuals, own, shared in parts:
         rows = np.column_stack([own, shared, residuals])
         more = np.zeros((2 * n_own, rows.shape[1]))
@@ -283,8 +286,14 @@ def _solved(triangle: Array, right: Array) -> Array:
 
 
 def _shared_priors(unknowns: Unknowns) -> Array:
-    pulls = [block.pull(block.value) for block in unknowns.shared]
-    scales = _joined([block.scale for block in unknowns.shared])
+    """What is known of the shared unknowns, a row a number, over [scaled unknowns; distance]."""
+    shared = unknowns.shared
+    scales = _joined([block.scale for block in shared])
+    if unknowns.correlations is not None:
+        means, whitened = unknowns.known_of(*(block.name for block in shared))
+        values = _joined([block.value for block in shared])
+        return np.column_stack([whitened * scales, whitened @ (values - means)])
+    pulls = [block.pull(block.value) for block in shared]
     slopes = np.diag(_joined([pull[1] for pull in pulls]) * scales)
     return np.column_stack([slopes, _joined([pull[0] for pull in pulls])])
 

@@ -20,6 +20,7 @@ from freeswing.cdpr.simulation.free_swing import Motion
 from freeswing.cdpr.simulation.nearby import obeys
 from freeswing.ident.likelihood.between_runs import jackknife_std
 from freeswing.ident.likelihood.blocks import (
+    as_known,
     effect_values,
     free_of,
     model_unknowns,
@@ -203,18 +204,18 @@ class FreeSwing:
                 simulated, with the reason.
         """
         refuse_others(unknowns, swings.model, swings.loads)
-        free = free_of(unknowns, swings.model)
         state = replace(state_of(unknowns, swings.model, swings.scales), motions=swings.motions)
         if self.grow:
-            state = _grown(swings, state, free, self)
+            state = _grown(swings, state, unknowns, self)
         else:
             self.tell(WHOLE, 0.0)
-        problem = _problem(swings.model, swings.samples, free, self, self.accuracy_m)
+        problem = _problem(swings.model, swings.samples, unknowns, self, self.accuracy_m)
         state, step, taken, stop = minimised(
             problem, state, self.steps, self.tolerance, self.foresees
         )
         self.tell("maximum likelihood", 1.0)
-        return _packed(problem, state, step, taken, stop)
+        found = _packed(problem, state, step, taken, stop)
+        return replace(found, unknowns=as_known(found.unknowns, swings.model, unknowns))
 
     def tell(self, label: str, fraction: float) -> None:
         """How far the fit is, to whom it may concern."""
@@ -225,27 +226,27 @@ class FreeSwing:
 ONWARD = FreeSwing(grow=False, own_noise=False)  # from where another fit stands, its noise told
 
 
-def _grown(swings: Swings, state: State, free: Mask, how: FreeSwing) -> State:
+def _grown(swings: Swings, state: State, unknowns: Unknowns, how: FreeSwing) -> State:
     """Near enough to fit whole runs: fitted to growing stretches, lengths let down in stages."""
     model, samples = swings.model, swings.samples
     stages = stretches(samples)
-    total, none = len(stages) + 1, np.zeros_like(free)
+    total, held = len(stages) + 1, unknowns.all_held()
     for index, end_s in enumerate(stages):
         how.tell(f"maximum likelihood: first {end_s:.1f} s", index / total)
         parts = [run.until(run.span_s[0] + end_s).loosened(LOOSE_LENGTH_STD_M) for run in samples]
         if index == 0:
             for first_s in (FIRST_STATES_S, end_s):
                 short = [run.until(run.span_s[0] + first_s) for run in parts]
-                states_alone = Problem(model, short, none, how.own_noise)
+                states_alone = _problem(model, short, held, replace(how, consistent=False))
                 state = minimised(states_alone, state, STEPS, ROUGH_DECREASE)[0]
-        problem = _problem(model, parts, free, how)
+        problem = _problem(model, parts, unknowns, how)
         state, step, *_ = minimised(problem, state, STEPS, ROUGH_DECREASE)
         if index == 0 and how.begun:
             how.begun(state.inertia, _inertia_stds(problem, step))
     how.tell(WHOLE, (total - 1) / total)
     for std in (LOOSE_LENGTH_STD_M, TIGHTER_LENGTH_STD_M):
         if any(run.lengths_m is not None and run.lengths_std_m < std for run in samples):
-            problem = _problem(model, [run.loosened(std) for run in samples], free, how)
+            problem = _problem(model, [run.loosened(std) for run in samples], unknowns, how)
             state = minimised(problem, state, STEPS, ROUGH_DECREASE)[0]
     return state
 
@@ -260,11 +261,12 @@ def _inertia_stds(problem: Problem, step: Step) -> Array:
 def _problem(
     model: Model,
     samples: Sequence[Samples],
-    free: Mask,
+    unknowns: Unknowns,
     how: FreeSwing,
     accuracy_m: float = TOLERANCE_M,
 ) -> Problem:
-    return Problem(model, samples, free, how.own_noise, accuracy_m, how.consistent)
+    free, known = free_of(unknowns, model), unknowns.known_of(*model.effects)
+    return Problem(model, samples, free, how.own_noise, accuracy_m, how.consistent, known)
 
 
 def stretches(samples: Sequence[Samples]) -> list[float]:

@@ -118,6 +118,8 @@ class Problem:
         estimate_scales: whether noise scales follow the residuals.
         tolerance_m: local error of the simulated motions.
         consistent: whether the inertia is held to what a body can have; all nine are then free.
+        known: means (k,) of the effects' values and what whitens distances from them, (k, k); None:
+            as the model knows them.
     """
 
     def __init__(
@@ -128,6 +130,7 @@ class Problem:
         estimate_scales: bool = True,
         tolerance_m: float = TOLERANCE_M,
         consistent: bool = False,
+        known: tuple[Array, Array] | None = None,
     ) -> None:
         parameters = model.parameters
         self.model = model
@@ -145,8 +148,8 @@ class Problem:
         self.consistent = consistent
         self.estimate_scales = estimate_scales
         self.tolerance_m = tolerance_m
-        self.prior_centre = model.start_values
-        self.prior_whitener = prior_whitener(model)
+        self.prior_centre, whitened = known or (model.start_values, prior_whitener(model))
+        self.prior_whitener = whitened.copy()
         self.prior_whitener[model.own_values] = 0.0
         self.unit = np.concatenate([INERTIA_UNIT, [p.scale for p in parameters], self.loads.unit])
         far = [3.0 * INERTIA_UNIT, [(p.high - p.low) / 3.0 for p in parameters], self.loads.unit]

@@ -13,9 +13,13 @@ from freeswing.ident.fidim.fidim import WELL_IDENTIFIED_PERCENT, near_zero
 from freeswing.ident.judge.consistency import consistency, is_possible, nearest_possible
 from freeswing.ident.judge.free_swing_law import unexplained_motion
 from freeswing.ident.likelihood.between_runs import widened
-from freeswing.ident.likelihood.blocks import INERTIA, PAYLOADS, first_unknowns
+from freeswing.ident.likelihood.blocks import INERTIA, MODES, PAYLOADS, first_unknowns
 from freeswing.ident.likelihood.cable_ends import geometry_document, weighed_against_priors
-from freeswing.ident.likelihood.calibration_modes import with_calibration
+from freeswing.ident.likelihood.calibration_modes import (
+    modes_document,
+    modes_notes,
+    with_calibration,
+)
 from freeswing.ident.likelihood.fit import fit
 from freeswing.ident.likelihood.fit_swings import FreeSwing, LikelihoodFit, Swings
 from freeswing.ident.likelihood.guess_run_start import first_state
@@ -78,13 +82,13 @@ def ml_estimate(
     ):  # which are weighed against coloured residuals by themselves
         found = weighed_against_priors(found, consistent=cost is not None)
     told = with_calibration(found, consistent=cost is not None)
-    entry = _entry(told.fit, dropped + more, cost)
+    entry = _entry(told, dropped + more, cost)
     return replace(
         entry,
-        notes=entry.notes + told.notes(),
-        calibration=told.amplitudes,
-        extra={**entry.extra, **told.document()},
-    ), told.fit
+        notes=entry.notes + modes_notes(told),
+        calibration=told.value(MODES) if MODES in told.unknowns else np.zeros(0),
+        extra={**entry.extra, **modes_document(told)},
+    ), told
 
 
 def from_starts(

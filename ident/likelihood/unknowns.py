@@ -5,12 +5,13 @@ No index arithmetic outside this file: a block is asked for by its name.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from freeswing.cdpr.model.known_values import whitener
 from freeswing.cdpr.robot import Array
 
 Mask = NDArray[np.bool_]
@@ -150,14 +151,26 @@ class Layout:
 
 @dataclass(frozen=True, slots=True)
 class Unknowns:
-    """All blocks of a fit, their names all different."""
+    """All blocks of a fit, their names all different.
+
+    Attributes:
+        blocks: in the order of the shared unknowns' vector.
+        correlations: of what was known before of the shared numbers, in their order, (p, p); None:
+            every number is known by itself.
+    """
 
     blocks: tuple[Unknown, ...]
+    correlations: Array | None = None
 
     def __post_init__(self) -> None:
         names = [block.name for block in self.blocks]
         if len(set(names)) < len(names):
             raise ValueError(f"unknowns: a name is there twice in {names}")
+        if self.correlations is not None:
+            together, size = _frozen(self.correlations), sum(block.size for block in self.shared)
+            if together.shape != (size, size):
+                raise ValueError(f"unknowns: correlations {together.shape} of {size} numbers")
+            object.__setattr__(self, "correlations", together)
 
     def __contains__(self, name: object) -> bool:
         return any(block.name == name for block in self.blocks)
@@ -202,17 +215,27 @@ class Unknowns:
 
     def columns(self, *names: str) -> NDArray[np.int64]:
         """Where some blocks stand among the shared unknowns, one after the other."""
-        return np.concatenate([np.r_[self.place(name)] for name in names])
+        nothing = np.zeros(0, dtype=np.int64)
+        return np.concatenate([nothing, *(np.r_[self.place(name)] for name in names)])
 
     def joined(self, *more: Unknown) -> Unknowns:
-        """These and further blocks."""
-        return Unknowns((*self.blocks, *more))
+        """These and further blocks, known by themselves."""
+        fewer, all_of = self.correlations, Unknowns((*self.blocks, *more))
+        if fewer is None:
+            return all_of
+        together = np.eye(sum(block.size for block in all_of.shared))
+        together[: len(fewer), : len(fewer)] = fewer
+        return replace(all_of, correlations=together)
 
     def without(self, *names: str) -> Unknowns:
         """The same without some blocks."""
         for name in names:
             self.block(name)
-        return Unknowns(tuple(block for block in self.blocks if block.name not in names))
+        kept = Unknowns(tuple(block for block in self.blocks if block.name not in names))
+        if self.correlations is None:
+            return kept
+        places = self.columns(*(block.name for block in kept.shared))
+        return replace(kept, correlations=self.correlations[np.ix_(places, places)])
 
     def exchanged(self, *others: Unknown) -> Unknowns:
         """The same with other blocks of some names."""
@@ -233,8 +256,44 @@ class Unknowns:
         return self._changed({name: replace(block, estimated=block.mask | mask)})
 
     def known(self, name: str, prior: Gaussian | None) -> Unknowns:
-        """The same with another prior of a block."""
+        """The same with another prior of a block; correlations with others stay."""
         return self._changed({name: replace(self.block(name), prior=prior)})
+
+    def known_together(self, names: Sequence[str], correlations: Array | None) -> Unknowns:
+        """The same with what is known of some shared blocks correlated: with these numbers alone.
+
+        Args:
+            names: of the blocks.
+            correlations: of their numbers, block after block, (q, q); None: none.
+        """
+        if correlations is None and self.correlations is None:
+            return self
+        size = sum(block.size for block in self.shared)
+        together = np.eye(size) if self.correlations is None else self.correlations.copy()
+        places = self.columns(*names)
+        together[places] = together[:, places] = 0.0
+        together[np.ix_(places, places)] = (
+            np.eye(len(places)) if correlations is None else correlations
+        )
+        return replace(self, correlations=together)
+
+    def known_of(self, *names: str) -> tuple[Array, Array]:
+        """Means (q,) of some shared blocks, and what whitens distances from them, (q, q).
+
+        Source:
+            Bishop 2006, Pattern Recognition and Machine Learning, sec. 2.3: the Gaussian.
+        """
+        means, stds = [np.zeros(0)], [np.zeros(0)]
+        for block in map(self.block, names):
+            nothing = Gaussian(np.zeros(block.size), np.full(block.size, np.inf), "nobody")
+            prior = block.prior or nothing
+            means.append(prior.mean)
+            stds.append(prior.std)
+        together = self.correlations
+        if together is not None:
+            places = self.columns(*names)
+            together = together[np.ix_(places, places)]
+        return np.concatenate(means), whitener(np.concatenate(stds), together)
 
     def moved(self, values: Mapping[str, Array]) -> Unknowns:
         """The same with other values of some blocks, led back inside their bounds."""
@@ -251,7 +310,8 @@ class Unknowns:
         }
 
     def _changed(self, changed: Mapping[str, Unknown]) -> Unknowns:
-        return Unknowns(tuple(changed.get(block.name, block) for block in self.blocks))
+        blocks = tuple(changed.get(block.name, block) for block in self.blocks)
+        return replace(self, blocks=blocks)
 
 
 def _frozen(values: object) -> Array:

@@ -26,6 +26,7 @@ from freeswing.ident.likelihood.fit_swings import ONWARD, Swings
 from freeswing.ident.likelihood.joint_problem import State
 from freeswing.ident.likelihood.payload_runs import Loads
 from freeswing.ident.likelihood.raw_samples import prepare
+from freeswing.ident.likelihood.unknowns import Gaussian
 from freeswing.ident.runs import Payload
 from tests.ident.swings import TRUE_INERTIA, paper_model, recorded, swing
 
@@ -140,7 +141,7 @@ def test_what_is_known_says_by_whom(found):
 @pytest.mark.parametrize(
     ("changed", "said"),
     [
-        (lambda u: u.known(EFFECTS[1], None), "prior"),
+        (lambda u: u.known(INERTIA, Gaussian(np.zeros(9), np.ones(9), "a guess")), "prior"),
         (lambda u: u.held(STARTS), "mask"),
         (lambda u: u.exchanged(replace(u.block(INERTIA), low=np.zeros(9))), "bounds"),
         (lambda u: u.joined(replace(u.block(INERTIA), name="sway")), "sway"),
@@ -165,3 +166,48 @@ def test_all_that_runs_share_is_held_and_their_own_is_not(found):
     held = found.unknowns.all_held()
     assert not free_of(held, found.model).any()
     assert all(block.mask.all() for block in held.own)
+
+
+def test_what_a_block_knows_is_heard(found):
+    """Drag that is known to be nothing stays so; where nothing is known it moves farther."""
+    name = EFFECTS[1]
+    start = found.unknowns.estimating(name, np.array([True, False]))
+    known = Gaussian(np.array([0.0, 0.5]), np.array([1e-9, 0.5]), "a wind tunnel")
+    asked = (start.known(name, known), start, start.known(name, None))
+    told, usual, free = (fit(found.swings, one, replace(ONWARD, steps=4)) for one in asked)
+    rates = [abs(float(one.value(name)[0])) for one in (told, usual, free)]
+    assert rates[0] < 1e-8 < rates[1] < rates[2], rates
+    stds = [float(one.std(name)[0]) for one in (told, usual, free)]
+    assert stds[0] < 1.01e-9 * told.enlargement < stds[1] < stds[2], stds
+    prior = told.unknowns.block(name).prior
+    assert prior is not None
+    assert prior.source == "a wind tunnel"
+    assert free.unknowns.block(name).prior is None
+
+
+def test_what_is_known_jointly_is_a_matter_of_the_unknowns(found):
+    """The model's joint Gaussian and the same said of the blocks: the same fit, bit for bit."""
+    model, size = found.model, len(found.values)
+    spread = np.array([p.prior_std for p in model.parameters])
+    chosen = np.array([size - 2, size - 1])
+    covariance = np.outer(spread[chosen], spread[chosen]) * np.array([[1.0, 0.9], [0.9, 1.0]])
+    told = with_known(model, chosen, model.start_values[chosen], covariance, BY_LENGTHS)
+    asked = found.unknowns.estimating(EFFECTS[1], np.ones(2, dtype=bool))
+    by_model = with_effect_values(asked, told, found.values)
+    by_hand = asked.known_together(model.effects, told.correlations)
+    assert by_model.correlations is not None
+    np.testing.assert_array_equal(by_model.correlations, by_hand.correlations)
+    fits = [
+        fit(replace(found.swings, model=told, motions=()), by_model, replace(ONWARD, steps=2)),
+        fit(replace(found.swings, motions=()), by_hand, replace(ONWARD, steps=2)),
+    ]
+    np.testing.assert_array_equal(fits[0].values, fits[1].values)
+    np.testing.assert_array_equal(fits[0].covariance, fits[1].covariance)
+    alone = fit(replace(found.swings, motions=()), asked, replace(ONWARD, steps=2))
+    # Where the drag's centre is told by its rate alone: conditioning of Gaussians.
+    known, told_of = spread[chosen], fits[1].std(EFFECTS[1]) / np.sqrt(fits[1].enlargement)
+    left = known[1] * np.sqrt(1.0 - 0.9**2 + (0.9 * told_of[0] / known[0]) ** 2)
+    assert told_of[1] == pytest.approx(left, rel=0.02)
+    alone = alone.std(EFFECTS[1])[1] / np.sqrt(alone.enlargement)
+    assert alone == pytest.approx(known[1], rel=0.02)
+    assert fits[1].unknowns.correlations is not None

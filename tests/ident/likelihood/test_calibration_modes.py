@@ -15,7 +15,15 @@ from freeswing.ident.fidim.calibration_share import calibration_share
 from freeswing.ident.fidim.shares import Stack
 from freeswing.ident.identify import identify
 from freeswing.ident.judge.prediction import predict
-from freeswing.ident.likelihood.calibration_modes import freed, mode_shifts, with_calibration
+from freeswing.ident.likelihood.blocks import INERTIA, MODES
+from freeswing.ident.likelihood.calibration_modes import (
+    BesideModes,
+    freed,
+    mode_shifts,
+    with_calibration,
+)
+from freeswing.ident.likelihood.fit import fit
+from freeswing.ident.likelihood.fit_swings import ONWARD
 from freeswing.ident.likelihood.session_estimates import ml_estimate
 from freeswing.ident.runs import SwingRun
 from freeswing.ident.signals.derivatives import SignalSettings
@@ -108,9 +116,40 @@ def test_a_calibration_that_must_be_far_off_is_said(estimates) -> None:
 
 def test_without_known_errors_nothing_changes(estimates) -> None:
     _, fitted = estimates[1]
-    same = with_calibration(fitted)
-    assert same.fit is fitted, "another fit"
-    assert len(same.amplitudes) == 0, same.amplitudes
+    assert with_calibration(fitted) is fitted, "another fit"
+
+
+def test_camera_modes_are_a_block_of_the_solution(estimates) -> None:
+    """By name beside all others, their covariance with these in it; others' is as it was."""
+    told, found = estimates[0]
+    assert MODES in found.unknowns
+    assert found.covariance.shape == (16, 16)
+    assert found.rank == found.free.sum() == len(found.singular_values) == 16
+    np.testing.assert_array_equal(found.value(MODES), told.calibration)
+    assert told.extra["calibration_modes"]["std"] == found.std(MODES).tolist()
+    # What the swings leave open of the inertia goes with what they leave open of the modes.
+    both = found.covariance_of(INERTIA, MODES)
+    sizes = np.sqrt(np.diag(both))
+    assert np.abs(both / np.outer(sizes, sizes))[:9, 9:].max() > 0.3
+    assert np.linalg.eigvalsh(both / np.outer(sizes, sizes)).min() > 0.0
+
+
+def test_camera_modes_of_other_samples_are_refused(estimates) -> None:
+    _, found = estimates[0]
+    asked = found.unknowns.moved({MODES: np.zeros(7)})
+    with pytest.raises(ValueError, match="camera modes: value"):
+        fit(found.swings, asked, BesideModes())
+    with pytest.raises(ValueError, match="these swings have none"):
+        fit(replace(found.swings, motions=()), found.unknowns, BesideModes())
+    with pytest.raises(ValueError, match="called 'camera modes'"):
+        fit(found.swings, found.unknowns, ONWARD)
+
+
+def test_a_fit_goes_on_from_its_own_camera_modes(estimates) -> None:
+    _, found = estimates[0]
+    again = fit(found.swings, found.unknowns, BesideModes())
+    moved = (again.value(MODES) - found.value(MODES)) / found.std(MODES)
+    assert np.abs(moved).max() < 0.05, moved
 
 
 @pytest.mark.slow

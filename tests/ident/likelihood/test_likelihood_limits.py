@@ -11,9 +11,11 @@ import pytest
 from freeswing.cdpr.robot import POSE_COORDINATES
 from freeswing.ident.likelihood import session_estimates
 from freeswing.ident.likelihood.between_runs import jackknife_std, widened
-from freeswing.ident.likelihood.calibration_modes import Calibrated
+from freeswing.ident.likelihood.blocks import MODES
+from freeswing.ident.likelihood.calibration_modes import modes_notes
 from freeswing.ident.likelihood.payload_runs import Loads, mass_of
 from freeswing.ident.likelihood.raw_samples import prepare
+from freeswing.ident.likelihood.unknowns import Unknown, Unknowns
 from freeswing.ident.runs import Payload, SwingRun
 from freeswing.ident.signals import residual_colour
 from freeswing.ident.signals.residual_colour import low_band_factor
@@ -22,8 +24,9 @@ from tests.ident.swings import recorded, swing
 
 @pytest.mark.parametrize(("largest", "said"), [(4.4, 0), (-4.6, 1)])
 def test_cameras_are_off_from_four_and_a_half_deviations(largest, said):
-    modes = np.array([0.1, largest, 2.0])
-    assert len(Calibrated(None, modes, np.ones(3)).notes()) == said
+    modes = Unknown(MODES, np.array([0.1, largest, 2.0]), np.ones(3))
+    found = SimpleNamespace(unknowns=Unknowns((modes,)), value=lambda name: modes.value)
+    assert len(modes_notes(found)) == said
 
 
 @pytest.mark.parametrize(("correlation", "by"), [(1.18, 1.0), (1.22, 1.22)])

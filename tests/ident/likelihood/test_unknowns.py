@@ -97,6 +97,44 @@ def test_a_held_block_stays_and_one_nothing_depends_on_loses_rank() -> None:
     np.testing.assert_allclose(found.std("idle"), 3.0, rtol=1e-9)
 
 
+def test_what_was_known_together_moves_together() -> None:
+    """An unknown that no run sees follows another as far as both were known together.
+
+    Conditioning of Gaussians: its mean by the regression on the other, its variance likewise.
+    """
+    mean, std, rho = np.array([0.4, 2.0]), np.array([0.01, 0.5]), 0.8
+    idle = Unknown("idle", np.zeros(1), np.ones(1), Gaussian(mean[1:], std[1:], "a guess"))
+    blocks = start(Gaussian(mean[:1], std[:1], "a guess")).joined(idle)
+    together = blocks.known_together(("rate", "idle"), np.array([[1.0, rho], [rho, 1.0]]))
+    found = fit(decays(STD), together, Dense(tolerance=1e-12))
+    slope = rho * std[1] / std[0]
+    assert found.value("idle")[0] == pytest.approx(2.0 + slope * (found.value("rate")[0] - 0.4))
+    spread = np.hypot(std[1] * np.sqrt(1.0 - rho**2), slope * found.std("rate")[0])
+    assert found.std("idle")[0] == pytest.approx(spread, rel=1e-6)
+    alone = fit(decays(STD), together.known_together(("rate", "idle"), None), Dense())
+    assert alone.value("idle")[0] == pytest.approx(2.0, rel=1e-9)
+
+
+def test_correlations_follow_their_blocks() -> None:
+    """Blocks that come are known by themselves, those that go take what was known with them."""
+    a, b, c = (Unknown(name, np.zeros(k), np.ones(k)) for name, k in (("a", 1), ("b", 2), ("c", 1)))
+    pair = np.array([[1.0, 0.5], [0.5, 1.0]])
+    blocks = Unknowns((a, b)).known_together(("b",), pair)
+    more = blocks.joined(c)
+    assert more.correlations is not None
+    assert more.correlations[3].tolist() == [0.0, 0.0, 0.0, 1.0]
+    assert more.correlations[1, 2] == 0.5
+    fewer = more.without("a")
+    assert fewer.correlations is not None
+    assert fewer.correlations[0, 1] == 0.5
+    assert fewer.correlations.shape == (3, 3)
+    held = fewer.held("b").moved({"c": np.ones(1)})
+    assert held.correlations is not None
+    assert held.correlations.tolist() == fewer.correlations.tolist()
+    with pytest.raises(ValueError, match="of 3 numbers"):
+        Unknowns((a, b), pair)
+
+
 def test_a_bound_holds() -> None:
     blocks = start()
     low = Unknown("rate", np.array([0.9]), np.array([0.1]), low=np.array([0.8]))
