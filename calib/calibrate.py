@@ -47,8 +47,7 @@ from freeswing.calib.verdict.trust import Verdict, judge
 from freeswing.calib.verdict.truth_checks import check_truth, widened
 from freeswing.cdpr.files.documents import DataError, InputError
 from freeswing.cdpr.robot import STANDARD_GRAVITY_M_S2
-
-Progress = Callable[[str, float], None]
+from freeswing.cdpr.system.progress import Progress
 
 DEFAULT_MODEL = "OPENCV"
 KEPT_BOARDS = ".boards"  # below the results

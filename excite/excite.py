@@ -8,7 +8,6 @@ gradients, and its cost computed once more from the motions themselves.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +18,7 @@ from freeswing.cdpr.model.equations import build_model
 from freeswing.cdpr.model.free_motion import choose_free_coordinates
 from freeswing.cdpr.model.statics import random_poses
 from freeswing.cdpr.robot import Array, Robot
+from freeswing.cdpr.system.progress import Progress
 from freeswing.excite.choose_swings import (
     Choice,
     choose,
@@ -39,8 +39,6 @@ from freeswing.excite.swing import Bench, Swing, SwingLimits
 from freeswing.excite.winch_release import WinchRelease, winch_release
 
 __all__ = ["ExcitationOptions", "Plan", "SwingLimits", "excite", "make_bench", "plan_swings"]
-
-Progress = Callable[[str, float], None]
 
 
 def excite(

@@ -6,17 +6,15 @@ is not: the subproblem keeps the eigenvalues. A swing whose step breaks a limit 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from freeswing.cdpr.robot import Array
+from freeswing.cdpr.system.progress import Progress
 from freeswing.excite.choose_swings import excitation_cost, excited_directions, reduced
 from freeswing.excite.swing import Bench, Swing, keeps_limits, swing_from
 from freeswing.excite.swing_gradient import Differentiator, SwingSlopes
-
-Progress = Callable[[str, float], None]
 
 _SHARPNESS = 12.0
 _SCALE = np.array([0.1, 0.1, 0.1, 0.2, 0.2, 0.2])

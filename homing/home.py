@@ -7,13 +7,13 @@ the changes of swivel angles and cable lengths, with the equilibrium of each pos
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.cdpr.files.documents import DataError
+from freeswing.cdpr.system.progress import Progress
 from freeswing.homing.best_fit import best_fit, model_for
 from freeswing.homing.doubted_geometry import with_geometry_in_doubt
 from freeswing.homing.fit_start_pose import StartFit, StartProblem
@@ -26,7 +26,6 @@ from freeswing.homing.homing_files import Homing, read_homing
 from freeswing.homing.many_starts import many_starts
 
 Array = NDArray[np.float64]
-Progress = Callable[[str, float], None]
 
 
 def home(path: Path | str, progress: Progress | None = None) -> dict:

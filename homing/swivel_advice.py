@@ -8,7 +8,6 @@ the procedure's own set-points.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
@@ -19,6 +18,7 @@ from numpy.typing import NDArray
 from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.files.robot_file import read_robot
 from freeswing.cdpr.robot import Cable, Robot
+from freeswing.cdpr.system.progress import Progress
 from freeswing.homing.acquisition import default_tensions
 from freeswing.homing.arrow_least_squares import covariance
 from freeswing.homing.fit_start_pose import StartProblem
@@ -32,7 +32,6 @@ from freeswing.homing.homing_files import Homing, ReadingNoise, Readings
 from freeswing.homing.rest_readings import RestModel
 
 Array = NDArray[np.float64]
-Progress = Callable[[str, float], None]
 
 _POSES = 25
 _SMALLEST_ARM_RADII = 3.0  # a cable nearer to its swivel axis jumps round the pulley

@@ -11,6 +11,7 @@ from freeswing.cdpr.effects import Recorded, catalogue
 from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.model.equations import Model, build_model
 from freeswing.cdpr.robot import Robot
+from freeswing.cdpr.system.progress import Progress
 from freeswing.cdpr.system.threads import side_by_side
 from freeswing.ident.estimate import Estimate
 from freeswing.ident.fidim.fidim_stage import How, Weighting, fidim_estimates
@@ -30,7 +31,6 @@ from freeswing.ident.signals.prepare import (
     LARGEST_AMPLIFICATION,
     PreparedRun,
     PreparedRuns,
-    Progress,
     fittable,
     left_out,
     length_differences,

@@ -10,8 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from freeswing.cdpr.system.lifeline import tie_to
-
-Progress = Callable[[str, float], None]
+from freeswing.cdpr.system.progress import Progress
 
 _POLL_S = 0.5
 

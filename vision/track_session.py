@@ -14,7 +14,7 @@ where one that was killed goes on.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -26,6 +26,7 @@ from freeswing.calib.footage.condition import condition_of, torn_text
 from freeswing.calib.footage.frame_times import frame_times, needed
 from freeswing.cdpr.files.documents import DataError, InputError
 from freeswing.cdpr.measured.trajectory import Trajectory
+from freeswing.cdpr.system.progress import Progress
 from freeswing.vision.fuse.calibration_share import read_calibration_noise
 from freeswing.vision.fuse.tag_layout import layout_change, with_layout
 from freeswing.vision.jobs import Job, run_jobs
@@ -35,8 +36,6 @@ from freeswing.vision.look.watched_target import Watch
 from freeswing.vision.settings import Settings
 from freeswing.vision.track_run import RunTrack, track_run
 from freeswing.vision.tracking_report import tracking_document
-
-Progress = Callable[[str, float], None]
 
 _LAYOUT_ROUNDS = 3
 _FOLLOWING = 0.85  # share of the time that goes into the images

@@ -22,8 +22,7 @@ from freeswing.calib.camera.lens_models import Array
 from freeswing.calib.footage.frame_times import frame_times
 from freeswing.calib.rig.views import Views, make_views
 from freeswing.cdpr.files.documents import DataError
-
-Progress = Callable[[str, float], None]
+from freeswing.cdpr.system.progress import Progress
 
 _WORKERS = 2
 _LOOKED_AT_AGAIN, _EVERY = 6, 5

@@ -32,8 +32,6 @@ from freeswing.calib.rig.rig_start import BaseTie, board_groups, place_in_base, 
 from freeswing.calib.rig.survey_noise import survey_std
 from freeswing.calib.rig.views import FixedPoints, Views, joined_views
 
-Progress = Callable[[str, float], None]
-
 _MOST_SWEEPS = 3
 _SURVEY_ROUNDS = 3
 

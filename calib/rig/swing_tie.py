@@ -17,13 +17,14 @@ import numpy as np
 from freeswing.calib.board.board_motion import NONE, REST, Timeline
 from freeswing.calib.board.platform_tags import PlatformTags
 from freeswing.calib.board.recordings import find_recordings
-from freeswing.calib.board.sightings import Progress, Sightings, gather, see_platform
+from freeswing.calib.board.sightings import Sightings, gather, see_platform
 from freeswing.calib.camera.camera import Camera
 from freeswing.calib.camera.intrinsics import CameraStart
 from freeswing.calib.camera.lens_models import Array
 from freeswing.calib.rig.coarse_clocks import coarse_clocks
 from freeswing.calib.rig.rig_start import board_groups, pose_from_points
 from freeswing.calib.rig.views import Views, joined_views
+from freeswing.cdpr.system.progress import Progress
 
 _GAP_S = 100.0  # between recordings on the common timeline
 _MOST_MISS_PX = 3.0  # lenses known roughly leave a pixel or two, a tag misread tens

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from freeswing.calib.calibrate import CalibrationResult, Progress
+from freeswing.calib.calibrate import CalibrationResult
 from freeswing.calib.rig.solve_rig import Rig
 from freeswing.calib.rig.views import FixedPoints
 from freeswing.calib.scene.lab_map import LabMap, map_of
@@ -41,6 +41,7 @@ from freeswing.calib.tags.base_tags import SurveyedTag
 from freeswing.calib.verdict.calibration_result import FORMAT, camera_entries, covariance_entry
 from freeswing.calib.verdict.survey_check import SurveyCheck, check_survey
 from freeswing.cdpr.files.documents import DataError, InputError
+from freeswing.cdpr.system.progress import Progress
 
 KEPT_SCENE = ".scene"  # below the results
 

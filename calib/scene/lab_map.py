@@ -9,7 +9,7 @@ import shutil
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,8 +21,7 @@ from freeswing.calib.scene.colmap_job import MAP
 from freeswing.calib.scene.stills import Still
 from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.system.arrays import whole_arrays
-
-Progress = Callable[[str, float], None]
+from freeswing.cdpr.system.progress import Progress
 
 # An image takes seconds, a pair a tenth of one; ten times as long is a machine that is stuck.
 _SECONDS_AN_IMAGE, _SECONDS_A_PAIR, _SECONDS_AT_LEAST = 30.0, 2.0, 300.0

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +9,7 @@ import numpy as np
 from freeswing.cdpr.files.documents import dump_toml, write_json
 from freeswing.cdpr.files.robot_file import write_robot
 from freeswing.cdpr.measured.target import write_target
+from freeswing.cdpr.system.progress import Progress
 from freeswing.demo.mocap import run_table, truth_document
 from freeswing.demo.rig import (
     BOARD,
@@ -31,7 +31,7 @@ FILMED = ("swing-01", "swing-02", "swing-03", "check-01")
 def write_filmed_session(
     folder: Path,
     seed: int = 1,
-    progress: Callable[[str, float], None] | None = None,
+    progress: Progress | None = None,
     filmed: tuple[str, ...] = FILMED,
     effect_values: tuple[float, float] = EFFECT_VALUES,
 ) -> Path:

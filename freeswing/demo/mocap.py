@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +13,7 @@ from freeswing.cdpr.measured.marker_recording import MarkerRecording, recording_
 from freeswing.cdpr.measured.target import Marker, Target, write_target
 from freeswing.cdpr.measured.trajectory import Trajectory
 from freeswing.cdpr.robot import INERTIA_NAMES
+from freeswing.cdpr.system.progress import Progress
 from freeswing.demo.truth import (
     EFFECT,
     EFFECT_VALUES,
@@ -36,9 +36,7 @@ MARKERS_M = {
 }
 
 
-def write_mocap_session(
-    folder: Path, seed: int = 1, progress: Callable[[str, float], None] | None = None
-) -> Path:
+def write_mocap_session(folder: Path, seed: int = 1, progress: Progress | None = None) -> Path:
     """Make the session and its `truth.json`; gives the path of session.toml.
 
     The same seed gives the same files.

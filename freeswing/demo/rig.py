@@ -15,12 +15,12 @@ from freeswing.cdpr.measured.target import Tag, Target
 from freeswing.cdpr.measured.trajectory import Trajectory
 from freeswing.cdpr.robot import POSE_COORDINATES, Array
 from freeswing.cdpr.rotation import exp_rotation
+from freeswing.cdpr.system.progress import Progress
 from freeswing.demo.truth import Swing
 from freeswing.vision.render.patterns import Patch, charuco_patch, tag_patch
 from freeswing.vision.render.record import record
 from freeswing.vision.render.render_scene import Look, Motion, Scene, motion_of
 
-Progress = Callable[[str, float], None]
 Shot = Callable[[], None]  # one camera's recording of one scene, taken when called
 
 SIZE_PX = (640, 480)

@@ -8,6 +8,7 @@ from typing import TypeVar
 from freeswing.cdpr.files.documents import DataError, InputError
 from freeswing.cdpr.measured.target import Target
 from freeswing.cdpr.robot import Robot
+from freeswing.cdpr.system.progress import Progress
 from freeswing.doctor.bench_runs import bench_findings
 from freeswing.doctor.finding import Finding
 from freeswing.doctor.geometry import robot_findings
@@ -25,7 +26,6 @@ from freeswing.session.load_swings import load_robot, load_swing, load_target, t
 from freeswing.session.marker_runs import MarkerRuns, read_marker_runs
 from freeswing.session.session_file import Run, Session
 
-Progress = Callable[[str, float], None]
 Loaded = TypeVar("Loaded")
 
 

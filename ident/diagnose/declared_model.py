@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +11,7 @@ from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.measured.slow_errors import BESIDE_STATED
 from freeswing.cdpr.model.equations import Model, build_model
 from freeswing.cdpr.robot import Array, Robot
+from freeswing.cdpr.system.progress import Progress
 from freeswing.ident.diagnose.outstanding_runs import tempered
 from freeswing.ident.diagnose.spectrum import residual_powers
 from freeswing.ident.judge.consistency import is_possible
@@ -25,8 +26,6 @@ from freeswing.ident.likelihood.fit_swings import (
 )
 from freeswing.ident.likelihood.session_estimates import astray, begun
 from freeswing.ident.signals.prepare import PreparedRun
-
-Progress = Callable[[str, float], None]
 
 # One run is left out at a time: two others have to agree.
 LEAST_RUNS = 3

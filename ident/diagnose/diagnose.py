@@ -13,6 +13,7 @@ from freeswing.cdpr.effects import Recorded, catalogue, effect_named
 from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.model.equations import build_model
 from freeswing.cdpr.robot import POSE_COORDINATES, Array, Robot
+from freeswing.cdpr.system.progress import Progress
 from freeswing.ident.diagnose.answer.decay import swing_decay
 from freeswing.ident.diagnose.answer.deviations import honest_covariance
 from freeswing.ident.diagnose.answer.entries import (
@@ -52,8 +53,6 @@ from freeswing.ident.likelihood.raw_samples import UNIT_NOISE_M, UNIT_NOISE_RAD
 from freeswing.ident.runs import SwingRun
 from freeswing.ident.signals.derivatives import SignalSettings
 from freeswing.ident.signals.prepare import PreparedRun, prepare_runs
-
-Progress = Callable[[str, float], None]
 
 FORMAT = "freeswing-diagnosis/1"
 NOTHING_TO_CHECK = (

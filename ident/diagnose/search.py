@@ -9,7 +9,7 @@ range, and large enough to matter. Candidates that held-out runs cannot tell fro
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
@@ -19,6 +19,7 @@ from multiprocessing import get_context
 from freeswing.cdpr.effects import effect_named
 from freeswing.cdpr.robot import Array, Robot
 from freeswing.cdpr.system.lifeline import tie_to
+from freeswing.cdpr.system.progress import Progress
 from freeswing.ident.diagnose.decision import (
     LARGEST_EXCESS_LEFT,
     LEAST_EXCESS_LATER,
@@ -46,8 +47,6 @@ from freeswing.ident.diagnose.screen import Screen, screen
 from freeswing.ident.diagnose.spectrum import Residual, too_small
 from freeswing.ident.diagnose.variants import effect_of, inside, variants
 from freeswing.ident.likelihood.fit_swings import LikelihoodFit
-
-Progress = Callable[[str, float], None]
 
 # A day in the laboratory had five effects at once: four rounds never looked for the fifth.
 MOST_ROUNDS = 8

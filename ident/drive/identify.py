@@ -13,6 +13,7 @@ from freeswing.cdpr.driven.model import DrivenModel
 from freeswing.cdpr.driven.motion import DrivenMotion
 from freeswing.cdpr.driven.sensitivity import N_POSE
 from freeswing.cdpr.driven.slopes import moved
+from freeswing.cdpr.system.progress import Progress
 from freeswing.ident.drive.inverse_dynamics import Regression, inverse_dynamics
 from freeswing.ident.drive.joint import Estimate, Premise, carried_over, estimate
 from freeswing.ident.drive.kinematics import (
@@ -36,7 +37,6 @@ from freeswing.ident.drive.slack import before_slack, first_slack
 from freeswing.ident.drive.unknowns import Asked
 
 Array = NDArray[np.float64]
-Progress = Callable[[str, float], None]
 
 HEAD_S = 0.3  # of a run: what a wrong start does is largest there
 ELASTIC_STEPS = 4  # of Gauss and Newton; millimetres of stretch become micrometres in three

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.cdpr.effects import driven_catalogue
+from freeswing.cdpr.system.progress import Progress
 from freeswing.ident.drive.diagnose.candidates import weighs
 from freeswing.ident.drive.diagnose.refit import MOST_STEPS, weighted
 from freeswing.ident.drive.diagnose.screen import jump_start
@@ -18,7 +19,6 @@ from freeswing.ident.drive.identify import (
     SECOND_START,
     DriveIdentification,
     DriveSession,
-    Progress,
     apart,
     as_declared,
     clear_of_slack,

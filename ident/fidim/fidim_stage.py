@@ -10,6 +10,7 @@ import numpy as np
 from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.model.regressor import regressor
 from freeswing.cdpr.robot import Array
+from freeswing.cdpr.system.progress import Progress
 from freeswing.ident.estimate import Estimate, fidim_entry
 from freeswing.ident.fidim.bias import noise_bias, smoothing_bias
 from freeswing.ident.fidim.calibration_share import calibration_share
@@ -34,7 +35,6 @@ from freeswing.ident.signals.derivatives import SignalSettings
 from freeswing.ident.signals.prepare import (
     PreparedRun,
     PreparedRuns,
-    Progress,
     left_out,
     motion_of,
     signals_used,

@@ -10,6 +10,7 @@ import numpy as np
 
 from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.robot import Array
+from freeswing.cdpr.system.progress import Progress
 from freeswing.ident.estimate import Estimate
 from freeswing.ident.judge.free_swing_law import (
     LawlessError,
@@ -21,7 +22,7 @@ from freeswing.ident.judge.prediction import predict
 from freeswing.ident.likelihood.fit_swings import LikelihoodFit
 from freeswing.ident.likelihood.session_estimates import Asked, from_starts, is_refuted
 from freeswing.ident.runs import DroppedRun
-from freeswing.ident.signals.prepare import PreparedRun, Progress
+from freeswing.ident.signals.prepare import PreparedRun
 
 # Times the worst run: one bad run may take others with it, which leave together.
 AS_BAD = 0.95

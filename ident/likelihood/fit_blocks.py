@@ -151,7 +151,7 @@ class _Blocks:
 
 
 @dataclass(frozen=True, slots=True)
-class Linear:
+class LinearProblem:
     """A fit's linear problem about some unknowns, run by run, in units of their scales.
 
     Attributes:
@@ -173,7 +173,7 @@ class Linear:
         return np.asarray(moved - own @ np.linalg.lstsq(own, moved, rcond=RANK_LIMIT)[0])
 
 
-def linear_problem(swings: Sequence[Swing], unknowns: Unknowns) -> Linear:
+def linear_problem(swings: Sequence[Swing], unknowns: Unknowns) -> LinearProblem:
     """Linearise a fit about some unknowns.
 
     Raises:
@@ -193,7 +193,7 @@ def linear_problem(swings: Sequence[Swing], unknowns: Unknowns) -> Linear:
         parts.append((residuals, own, shared))
         triangles.append(_triangle(rows)[own.shape[1] :, own.shape[1] :][:size])
     priors = _shared_priors(unknowns)[:, np.append(free, True)]
-    return Linear(tuple(parts), np.array(triangles), priors)
+    return LinearProblem(tuple(parts), np.array(triangles), priors)
 
 
 def _simulated(swings: Sequence[Swing], unknowns: Unknowns) -> list[Any]:

@@ -18,6 +18,7 @@ from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.robot import Array
 from freeswing.cdpr.simulation.free_swing import Motion
 from freeswing.cdpr.simulation.nearby import obeys
+from freeswing.cdpr.system.progress import Progress
 from freeswing.ident.likelihood.between_runs import jackknife_std
 from freeswing.ident.likelihood.blocks import (
     as_known,
@@ -35,7 +36,6 @@ from freeswing.ident.likelihood.run_residuals import Samples, differences, predi
 from freeswing.ident.likelihood.unknowns import Mask, Unknowns
 from freeswing.ident.signals.residual_colour import enlargement, low_band_factor
 
-Progress = Callable[[str, float], None]
 Begun = Callable[[Array, Array], None]
 WHOLE = "maximum likelihood: whole runs"
 

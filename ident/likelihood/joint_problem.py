@@ -67,7 +67,7 @@ class State:
 
 
 @dataclass(frozen=True, slots=True)
-class Linear:
+class FirstOrder:
     """All runs to first order at a state.
 
     Attributes:
@@ -246,7 +246,7 @@ class Problem:
         """Independent distances of unit deviation from what is known of the values, (k,)."""
         return self.prior_whitener @ (values - self.prior_centre)
 
-    def linear(self, state: State) -> Linear:
+    def linear(self, state: State) -> FirstOrder:
         """The motions of a state to first order."""
 
         def one(motion: Motion, samples: Samples) -> tuple[Reduced, Surroundings]:
@@ -255,9 +255,9 @@ class Problem:
 
         found = side_by_side(one, state.motions, self.samples)
         reduced, surroundings = zip(*found, strict=True)
-        return Linear(reduced, surroundings)
+        return FirstOrder(reduced, surroundings)
 
-    def step(self, state: State, linear: Linear, damping: float) -> Step:
+    def step(self, state: State, linear: FirstOrder, damping: float) -> Step:
         """A damped Gauss-Newton step from a state with its motions to first order."""
         reduced = linear.reduced
         maps = [self.shared_map(run, state) for run in range(len(reduced))]

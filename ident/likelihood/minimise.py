@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from freeswing.cdpr.descent import Stop, Undamped, Watchdog
-from freeswing.ident.likelihood.joint_problem import Linear, Problem, State, Step
+from freeswing.ident.likelihood.joint_problem import FirstOrder, Problem, State, Step
 
 FIRST_DAMPING = 1e-7  # of the largest curvature: below, a damped step is the full one
 LARGEST_DAMPING = 1e2  # a step so damped goes nowhere
@@ -62,7 +62,7 @@ class _Place:
         return self.problem.cost(self.state)
 
     @cached_property
-    def linear(self) -> Linear:
+    def linear(self) -> FirstOrder:
         return self.problem.linear(self.state)
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.robot import Array
+from freeswing.cdpr.system.progress import Progress
 from freeswing.ident.estimate import Estimate
 from freeswing.ident.fidim.fidim import WELL_IDENTIFIED_PERCENT, near_zero
 from freeswing.ident.judge.consistency import consistency, is_possible, nearest_possible
@@ -27,7 +28,7 @@ from freeswing.ident.likelihood.payload_runs import Loads, mass_of
 from freeswing.ident.likelihood.raw_samples import prepare
 from freeswing.ident.likelihood.run_residuals import Samples
 from freeswing.ident.runs import DroppedRun
-from freeswing.ident.signals.prepare import PreparedRun, Progress
+from freeswing.ident.signals.prepare import PreparedRun
 
 _ASTRAY = 0.5  # a lost swing is out of phase with its samples
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,6 +16,7 @@ from freeswing.cdpr.model.free_motion import (
 )
 from freeswing.cdpr.model.regressor import SwingMotion
 from freeswing.cdpr.robot import POSE_COORDINATES, Array, Robot
+from freeswing.cdpr.system.progress import Progress
 from freeswing.ident.likelihood.rest_pose import rest_near
 from freeswing.ident.runs import DroppedRun, Payload, SwingRun
 from freeswing.ident.signals.derivatives import (
@@ -26,8 +26,6 @@ from freeswing.ident.signals.derivatives import (
     signals_of,
 )
 from freeswing.ident.signals.motions import free_motion, full_motion
-
-Progress = Callable[[str, float], None]
 
 # Poses move this many times more than the free coordinates: noise of 0.1 mm becomes 2 mm, a tenth
 # of a usual swing.

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from freeswing.cdpr.driven.model import DrivenModel
+from freeswing.cdpr.system.progress import Progress
 from freeswing.servo.design.controller import Controller
 from freeswing.servo.design.draws import DRAWS, Cloud
 from freeswing.servo.design.offer import Order
@@ -32,7 +33,6 @@ RAY_POINTS = 101  # of a ray, for what tensions hold: to a hundredth of it
 # A margin gained that no one would see in a step: 0.41 and 0.49 overshoot alike.
 WORTH = 0.1
 PLACES = 7  # an axis of the box about all that tensions can hold
-Progress = Callable[[str, float], None]
 Row = dict[str, Any]
 
 

@@ -23,6 +23,7 @@ from freeswing.cdpr.files.documents import DataError, InputError
 from freeswing.cdpr.files.signal_csv import SignalTable
 from freeswing.cdpr.measured.target import Target
 from freeswing.cdpr.measured.trajectory import Trajectory
+from freeswing.cdpr.system.progress import Progress
 from freeswing.vision.fuse.run_views import CameraViews
 from freeswing.vision.jobs import Job, run_jobs
 from freeswing.vision.look.sightings import collect_sightings
@@ -46,7 +47,7 @@ from freeswing.vision.planar.plane import Items
 from freeswing.vision.planar.report import planar_run, signal_run
 from freeswing.vision.planar.two_dots import COLUMNS, channel_block, dot_signals
 from freeswing.vision.track_run import camera_count
-from freeswing.vision.track_session import Progress, examined, sightings_folder
+from freeswing.vision.track_session import examined, sightings_folder
 
 Array = NDArray[np.float64]
 

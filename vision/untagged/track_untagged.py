@@ -18,6 +18,7 @@ from freeswing.calib.board.recordings import Image, Recording, find_recordings, 
 from freeswing.calib.camera.camera import Camera
 from freeswing.cdpr.files.documents import InputError
 from freeswing.cdpr.measured.target import Untagged
+from freeswing.cdpr.system.progress import Progress
 from freeswing.vision.fuse.calibration_share import read_calibration_noise
 from freeswing.vision.fuse.poses import Poses
 from freeswing.vision.fuse.run_views import CameraViews
@@ -28,7 +29,6 @@ from freeswing.vision.rig.correct_rig import correct_rig
 from freeswing.vision.settings import Settings
 from freeswing.vision.track_run import RunTrack, track_run
 from freeswing.vision.track_session import (
-    Progress,
     RecordedRun,
     Tracked,
     empty_run,

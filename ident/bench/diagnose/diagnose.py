@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from freeswing.cdpr.files.problems import DataError
 from freeswing.cdpr.robot import Array, Robot
+from freeswing.cdpr.system.progress import Progress
 from freeswing.ident.bench.diagnose.causes import Cause, causes_of, dressed
 from freeswing.ident.bench.diagnose.channels_only import ByChannels, by_channels
 from freeswing.ident.bench.diagnose.errors import Errors, errors_of
@@ -30,8 +31,6 @@ from freeswing.ident.bench.told.kinds_doubt import (
 )
 from freeswing.ident.bench.told.scatter_by_kind import is_systematic
 from freeswing.ident.likelihood.fit import fit
-
-Progress = Callable[[str, float], None]
 
 LEAST_RUNS = 3  # of two, either is predicted by the other alone, drag, wires and all
 FEW = (

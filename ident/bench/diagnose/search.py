@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from freeswing.cdpr.robot import Array
+from freeswing.cdpr.system.progress import Progress
 from freeswing.ident.bench.diagnose.causes import Cause, dressed, wanting
 from freeswing.ident.bench.diagnose.weigh import Fit, chances
 from freeswing.ident.bench.noise import rescaled
@@ -153,7 +154,7 @@ def _cost(rows: Array, columns: Array) -> float:
 
 
 def searched(
-    ground: Ground, start: Fit, causes: Sequence[Cause], told: Callable[[str, float], None]
+    ground: Ground, start: Fit, causes: Sequence[Cause], told: Progress
 ) -> tuple[Fit, list[Round]]:
     """Causes one after the other, until none is accepted.
 
@@ -174,9 +175,7 @@ def searched(
     return current, rounds
 
 
-def _round(
-    ground: Ground, current: Fit, causes: Sequence[Cause], told: Callable[[str, float], None]
-) -> Round:
+def _round(ground: Ground, current: Fit, causes: Sequence[Cause], told: Progress) -> Round:
     if not causes:
         return Round((), None)
     gains = promised(ground, current, causes)

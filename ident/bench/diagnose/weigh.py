@@ -15,7 +15,7 @@ from freeswing.ident.bench.swing import BenchSwing
 from freeswing.ident.diagnose.leave_one_out import Evidence, Score, score
 from freeswing.ident.diagnose.model_probabilities import Rival, model_probabilities
 from freeswing.ident.likelihood.fit import Solution
-from freeswing.ident.likelihood.fit_blocks import Linear, linear_problem
+from freeswing.ident.likelihood.fit_blocks import LinearProblem, linear_problem
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Fit:
     causes: tuple[Cause, ...] = ()
 
     @cached_property
-    def linear(self) -> Linear:
+    def linear(self) -> LinearProblem:
         """The linear problem about it."""
         return linear_problem(self.swings, self.solution.unknowns)
 

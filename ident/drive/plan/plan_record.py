@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,12 +9,12 @@ from numpy.typing import NDArray
 
 from freeswing.cdpr.driven.excitation import prbs
 from freeswing.cdpr.driven.motion import DrivenMotion
+from freeswing.cdpr.system.progress import Progress
 from freeswing.ident.drive.kinematics import StaticPoses
 from freeswing.ident.drive.plan.deviations import Bench, moved_by, relative_deviations
 from freeswing.ident.drive.plan.references import References, changed, drawn
 
 Array = NDArray[np.float64]
-Progress = Callable[[str, float], None]
 
 MOST_TRIES = 60  # plans simulated for one that keeps within the limits
 DRAWN_SHARE = 0.4  # of the scored plans: the rest change the best so far
