@@ -58,7 +58,8 @@ class RunShare:
     Attributes:
         std: median standard deviations of position and small rotation, (6,).
         errors: one mode for each independent cause in the calibration.
-        spread: root mean square of each of the errors' terms along the run, (13,).
+        spread: root of the mean products of the errors' terms along the run, (13, k): terms that go
+            together in a short swing count by what they do together.
     """
 
     std: Array
@@ -125,7 +126,7 @@ def run_share(
     return RunShare(
         np.median(np.sqrt(np.sum(slopes**2, axis=2)), axis=0),
         PoseErrors(origin, turn, modes),
-        np.sqrt(np.mean(terms**2, axis=0)),
+        np.linalg.qr(terms / np.sqrt(len(terms)))[1].T,
     )
 
 
@@ -161,7 +162,7 @@ def common_errors(shares: Sequence[RunShare | None]) -> list[PoseErrors | None]:
         return [None] * len(shares)
     most = max(len(s.errors.modes) for s in seen)  # a run without doubt has a cause fewer
     weighted = [
-        np.moveaxis(_padded(s.errors.modes, most) * s.spread, 0, 2).reshape(-1, most) for s in seen
+        np.moveaxis(_padded(s.errors.modes, most) @ s.spread, 0, 2).reshape(-1, most) for s in seen
     ]
     _, sizes, mixes = np.linalg.svd(np.concatenate(weighted), full_matrices=False)
     left = 1.0 - np.cumsum(sizes**2) / max(float(np.sum(sizes**2)), 1e-300)

@@ -61,7 +61,7 @@ def test_causes_that_are_a_trace_of_the_variance_are_dropped(share, modes) -> No
     independent = np.zeros((2, 6, TERMS))
     independent[0, 0, 0], independent[1, 1, 0] = np.sqrt(1.0 - share), np.sqrt(share)
     errors = PoseErrors(np.zeros(3), np.eye(3), independent)
-    (found,) = common_errors([RunShare(np.ones(6), errors, np.ones(TERMS))])
+    (found,) = common_errors([RunShare(np.ones(6), errors, np.eye(TERMS))])
     assert found is not None
     assert len(found.modes) == modes
 
