@@ -69,6 +69,8 @@ class Solved:
         held: what no run tells, by block.
         fastest_hz: highest frequency of the first run's small oscillations.
         doubts: what each shared block would change by, were it the other mass.
+        held_scatter: covariance of what held numbers add to the runs' scatter, (r, r), or None
+            without one.
     """
 
     solution: Solution
@@ -80,6 +82,7 @@ class Solved:
     held: Held = field(default_factory=dict)
     fastest_hz: float = 1.0
     doubts: Mapping[str, Array] = field(default_factory=dict)
+    held_scatter: Array | None = None
 
 
 def solved(model: Model, bench: Bench, start: Assembled) -> Solved:
@@ -130,13 +133,17 @@ def solved(model: Model, bench: Bench, start: Assembled) -> Solved:
     found, mass = weighed_mass(bench, model, swings, found, start, FINE)
     change = doubt(unweighed, mass)
     right = _who_is_right(found, wires) + np.outer(change, change)
+    alone = found
     found = considered(swings, found, held)
+    held_scatter = None
+    if "scatter" in found.unknowns:
+        held_scatter = found.covariance_of("scatter") - alone.covariance_of("scatter")
     if more is not None:
         right = right + _padded(more.between, len(right))
     found = replace(found, covariance=found.covariance + right)
     names = (block.name for block in unweighed.unknowns.shared)
     doubts = {name: change[unweighed.unknowns.columns(name)] for name in names}
-    return Solved(found, swings, first, tau, mass, wires, held, fastest_hz, doubts)
+    return Solved(found, swings, first, tau, mass, wires, held, fastest_hz, doubts, held_scatter)
 
 
 def stretched(swings: tuple[BenchSwing, ...], unknowns: Unknowns) -> Unknowns:

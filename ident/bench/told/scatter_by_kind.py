@@ -17,11 +17,13 @@ def is_systematic(solved: Solved) -> bool:
     """Whether scatter between runs goes with what they carry, more surely than chance has it.
 
     Rehanging and twisting scatter runs of one kind as much as kinds. What the model lacks (a hold
-    of yaw, a radius, a mass) is the same in all runs of a kind.
+    of yaw, a radius, a mass) is the same in all runs of a kind; so is what held numbers are off by,
+    which may be as much as is believed of them and is counted in every deviation.
     """
     if not solved.scatter_std > 0.0 or "scatter" not in solved.solution.unknowns:
         return False
-    return by_kind(solved.solution.value("scatter"), kinds(solved.swings)) > ACCEPTED
+    values, believed = solved.solution.value("scatter"), solved.held_scatter
+    return by_kind(values, kinds(solved.swings), believed) > ACCEPTED
 
 
 def kinds(swings: Sequence[BenchSwing]) -> list[int]:
@@ -37,27 +39,35 @@ def kinds(swings: Sequence[BenchSwing]) -> list[int]:
     return [names.setdefault(one, len(names)) for one in carried]
 
 
-def by_kind(values: Array, kinds: Sequence[int]) -> float:
+def by_kind(values: Array, kinds: Sequence[int], believed: Array | None = None) -> float:
     """Probability that chance spreads the kinds' means less than they are; 0: it cannot be told.
 
     Args:
         values: of the runs, (r,).
         kinds: which of them are alike, (r,).
+        believed: covariance of what numbers held as believed add to the values, (r, r), or None.
 
     Source:
-        Fisher 1925, Statistical Methods for Research Workers, ch. 7: analysis of variance.
+        Fisher 1925, Statistical Methods for Research Workers, ch. 7: analysis of variance; with
+        `believed`, Hotelling's T-squared of the kinds' means beside their common one (Anderson
+        2003, An Introduction to Multivariate Statistical Analysis, sec. 5.3).
     """
-    which = np.asarray(kinds)
-    groups = [values[which == kind] for kind in np.unique(which)]
+    groups, which = np.unique(np.asarray(kinds), return_inverse=True)
     between, within = len(groups) - 1, len(values) - len(groups)
     if between < 1 or within < 1:
         return 0.0
-    mean = float(values.mean())
-    spread = sum(len(one) * (float(one.mean()) - mean) ** 2 for one in groups) / between
-    left = sum(float(np.sum((one - one.mean()) ** 2)) for one in groups) / within
-    if not left > 0.0:
-        return float(spread > 0.0)
-    return float(fdtr(between, within, spread / left))
+    member = np.eye(len(groups))[which]  # (r, k)
+    means = member / member.sum(axis=0)
+    left = float(np.sum((values - member @ (means.T @ values)) ** 2)) / within
+    apart = (means[:, 1:] - means[:, :1]).T
+    covariance = left * apart @ apart.T
+    if believed is not None:
+        covariance = covariance + apart @ believed @ apart.T
+    differences = apart @ values
+    if not np.linalg.det(covariance) > 0.0:
+        return float(np.any(differences != 0.0))
+    squared = float(differences @ np.linalg.solve(covariance, differences))
+    return float(fdtr(between, within, squared / between))
 
 
 def scatter_sentence(solved: Solved) -> str:
