@@ -217,7 +217,8 @@ def rig_step(
                 _inverse((normal - one.normal)[chosen]) @ (right - one.right)[mask] for one in left
             ]
             larger = np.maximum(larger, leaving_out(np.array(without).reshape(-1, mask.sum())))
-        whole[chosen] = inverse * excess * np.outer(larger / own, larger / own)
+        times = np.divide(larger, own, out=np.ones_like(own), where=own > 0.0)  # 0: saw nothing
+        whole[chosen] = inverse * excess * np.outer(times, times)
         deviations[mask] = larger
     return RigStep(changes.reshape(n_c, PER_CAMERA), deviations.reshape(n_c, PER_CAMERA), whole)
 
