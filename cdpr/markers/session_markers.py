@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from freeswing.cdpr.files.problems import DataError, InputError
 from freeswing.cdpr.markers.common_frame import common_frame
+from freeswing.cdpr.markers.contradicting_samples import stand_outs
 from freeswing.cdpr.markers.distances import pairs_of, typical_distances
 from freeswing.cdpr.markers.exchanged_labels import renamed
 from freeswing.cdpr.markers.jumps import Jump, Mended, mended
 from freeswing.cdpr.markers.layout import Alignment, SessionLayout, align, session_layout
-from freeswing.cdpr.markers.rigidity import Rigidity, marker_weights, rigidity
 from freeswing.cdpr.markers.slow_residuals import slow_share
-from freeswing.cdpr.markers.stand_outs import stand_outs
+from freeswing.cdpr.markers.spoiling_markers import Rigidity, marker_weights, rigidity
 from freeswing.cdpr.markers.units import unit_between
 from freeswing.cdpr.measured.marker_recording import MarkerRecording
 from freeswing.cdpr.measured.pose_errors import PoseErrors

@@ -55,7 +55,7 @@ class Model:
         cables: (zeta, values) -> l, sigma, psi (n,) each and their Jacobians by zeta (n, 6).
         cable_rates: (zeta, rates, values) -> d/dt of these three Jacobians (n, 6).
         domain: (zeta, values) -> distances of A from the swivel axes (n,), squares of the straight
-            lengths (n,), negative inside a pulley, and radii (n,); see `cdpr.model.domain`.
+            lengths (n,), negative inside a pulley, and radii (n,): `cdpr.model.undefined_poses`.
         twist_map: (zeta, rates) -> D (6, 6) with twist v = D zeta_dot (eq. 2), and dD/dt (6, 6).
         acceleration: (t, zeta, rates, inertia, values) -> zeta_ddot (6,), tau / m (n,).
         pulled: (t, zeta, rates, tensions, inertia, values) -> zeta_ddot (6,) under given specific

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from freeswing.cdpr.model.batch import Bound, evaluate, only
-from freeswing.cdpr.model.domain import check_domain, domain_problems
 from freeswing.cdpr.model.equations import Model
+from freeswing.cdpr.model.undefined_poses import check_domain, domain_problems
 from freeswing.cdpr.robot import Array, finite
 from freeswing.cdpr.simulation.collocation import Table, interpolation, of_segments, table
 

@@ -17,7 +17,7 @@ from freeswing.cdpr.files.problems import InputError
 from freeswing.cdpr.files.robot_file import read_robot
 from freeswing.cdpr.mesh.nominal_inertia import _check_body, _check_size
 from freeswing.cdpr.mesh.separate_bodies import _touches
-from freeswing.cdpr.model.domain import domain_problems
+from freeswing.cdpr.model.undefined_poses import domain_problems
 from freeswing.cdpr.simulation import nearby
 from tests.cdpr.driven_robots import INCA
 
@@ -101,7 +101,7 @@ def test_three_quarters_of_a_turn_are_inside(height, inside):
 
 @pytest.mark.parametrize(("cosine", "named"), [(1.05e-3, 0), (0.95e-3, 1)])
 def test_angles_end_six_hundredths_of_a_degree_before_ninety(monkeypatch, cosine, named):
-    monkeypatch.setattr("freeswing.cdpr.model.domain._cable_problems", lambda *_: [])
+    monkeypatch.setattr("freeswing.cdpr.model.undefined_poses._cable_problems", lambda *_: [])
     pose = np.array([[0.0, 0.0, 0.0, 0.0, np.arccos(cosine), 0.0]])
     assert len(domain_problems(SimpleNamespace(), pose, np.zeros(0))) == named
 

@@ -102,7 +102,7 @@ HELD = (
         ("LABELS_FIT_M", "RENAMED_BETTER", "FEWEST_TO_EXCHANGE"),
         SPOTS,
     ),
-    Held("cdpr/markers/rigidity.py", ("SPOILS", "LEAST_SPOILT_M"), SPOTS),
+    Held("cdpr/markers/spoiling_markers.py", ("SPOILS", "LEAST_SPOILT_M"), SPOTS),
     Held("cdpr/markers/slow_residuals.py", ("CHANCE",), SPOTS),
     Held("cdpr/markers/layout.py", ("CLEAR", "DIFFERENT_M"), SPOTS),
     Held("cdpr/markers/session_markers.py", ("MOST_OPEN_M",), SPOTS),
@@ -344,9 +344,9 @@ HELD = (
         "tests/ident/likelihood/test_between_runs.py",
     ),
     Held(
-        "cdpr/markers/stand_outs.py",
+        "cdpr/markers/contradicting_samples.py",
         ("STANDS_OUT_M",),
-        "tests/cdpr/markers/test_stand_outs.py",
+        "tests/cdpr/markers/test_contradicting_samples.py",
     ),
     Held(
         "ident/diagnose/unexplained.py",
@@ -360,13 +360,13 @@ HELD = (
         DECISION,
     ),
     Held(
-        "cdpr/measured/sound_samples.py",
+        "cdpr/measured/held_doubled_wild.py",
         (
             "FEWEST_HELD", "ABOVE_RESOLUTION", "DOUBLED_SHARE", "LONGEST_DOUBLE",
             "WILD_DEVIATIONS", "HALF_WITHIN", "STEP_DEVIATIONS", "BACK_WITHIN",
             "LONGEST_WILD_S", "LONGEST_STEP_S",
         ),
-        "tests/cdpr/measured/test_sound_samples.py",
+        "tests/cdpr/measured/test_held_doubled_wild.py",
     ),
     Held("ident/bench/solve.py", ("LEAST_FOR_SCATTER",), BENCH),
     Held(
@@ -472,14 +472,14 @@ HELD = (
     Held("vision/fuse/tag_layout.py", ("_REJECT",), FUSE),
     Held("vision/look/detect.py", ("_LEAST_PERIMETER_RATE",), LOOK),
     Held("vision/look/markers.py", ("_EDGE_LEVEL", "_CENTRE_FLOOR_PX"), LOOK),
-    Held("vision/untagged/refine.py", ("_REST_STD_PX",), UNTAGGED),
+    Held("vision/untagged/adjusted_points.py", ("_REST_STD_PX",), UNTAGGED),
     Held("calib/camera/impossible_lenses.py", ("SHORTEST_FOCAL", "LONGEST_FOCAL",), BOARD),
     Held(
         "calib/scene/scene_verdict.py",
         ("LEAST_POINTS", "GOOD_POINTS"),
         "tests/calib/scene/test_scene_decisions.py::test_few_points_warn_and_very_few_refuse",
     ),
-    Held("cdpr/measured/sound_samples.py", ("LEAST_STEP_M", "LEAST_STEP_RAD"), MEASURED),
+    Held("cdpr/measured/held_doubled_wild.py", ("LEAST_STEP_M", "LEAST_STEP_RAD"), MEASURED),
     Held("cdpr/mesh/nominal_inertia.py", ("DOUBTED_STATED", "DOUBTED_UNSTATED"), CDPR),
     Held(
         "ident/diagnose/lengths/length_rows.py", ("DRIFT_M", "DRIFT_RAD", "RUN_OUT_M"), PLACES
@@ -672,7 +672,7 @@ HELD = (
     Held("calib/scene/stills.py", ("LEAST_IMAGES", "_AT_REST_GREY",), SCENE),
     Held("vision/untagged/features.py", ("RATIO", "MOST_ANGLE_COS",), UNTAGGED),
     Held("vision/untagged/look.py", ("LEAST_MATCHES", "INLIER_PX", "FEATURE_STD_PX",), UNTAGGED),
-    Held("vision/untagged/refine.py", ("_FAR",), UNTAGGED),
+    Held("vision/untagged/adjusted_points.py", ("_FAR",), UNTAGGED),
     Held("vision/untagged/feature_bias.py", ("LEAST_FRAMES",), FEATURES),
     Held(
         "vision/untagged/rest_model.py",
@@ -708,14 +708,14 @@ HELD = (
     Held("cdpr/files/drive_file.py", ("COULOMB_WIDTH_RAD_S",), CDPR),
     Held("cdpr/mesh/nominal_inertia.py", ("LARGEST_PLATFORM_M",), CDPR),
     Held("cdpr/mesh/separate_bodies.py", ("_INSIDE",), CDPR),
-    Held("cdpr/model/domain.py", ("LEAST_COSINE",), CDPR),
+    Held("cdpr/model/undefined_poses.py", ("LEAST_COSINE",), CDPR),
     Held("cdpr/simulation/nearby.py", ("LARGEST_RATIO",), CDPR),
     Held(
         "cdpr/markers/layout.py",
         ("FREEDOM", "RUN_STD_M", "TARGET_LEAST_STD_M", "WRONG_BY_M", "WRONG_SHARE", "TARGET_CLEAR"),
         SPOTS,
     ),
-    Held("cdpr/markers/rigidity.py", ("LEAST_VARIANCE_SHARE",), SPOTS),
+    Held("cdpr/markers/spoiling_markers.py", ("LEAST_VARIANCE_SHARE",), SPOTS),
     Held("cdpr/markers/session_markers.py", ("FEWEST_SAMPLES",), SPOTS),
     Held(
         "cdpr/measured/quaternion_readings.py",

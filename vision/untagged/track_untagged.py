@@ -37,9 +37,9 @@ from freeswing.vision.track_session import (
     unmatched,
 )
 from freeswing.vision.tracking_report import tracking_document
+from freeswing.vision.untagged.adjusted_points import bias_of_features, refined_points
 from freeswing.vision.untagged.feature_bias import PlatformErrors
 from freeswing.vision.untagged.look import collect_points
-from freeswing.vision.untagged.refine import bias_of_features, refined_points
 from freeswing.vision.untagged.rest_model import rest_model
 
 Array = NDArray[np.float64]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from freeswing.cdpr.files.problems import DataError
-from freeswing.cdpr.markers import exchanged_labels, layout, rigidity, session_markers
+from freeswing.cdpr.markers import exchanged_labels, layout, session_markers, spoiling_markers
 from freeswing.cdpr.markers.distances import distances, pairs_of
 from freeswing.cdpr.markers.jumps import mended
 from freeswing.cdpr.markers.slow_residuals import slow_share
@@ -85,10 +85,10 @@ def test_another_order_fits_ten_times_better(monkeypatch, times, renamed):
 )
 def test_a_marker_spoils_a_run(monkeypatch, level, without, left):
     sizes = iter([(3, without), (-1, without)])
-    monkeypatch.setattr(rigidity, "_level", lambda *_: level)
-    monkeypatch.setattr(rigidity, "_best_without", lambda *_: next(sizes))
+    monkeypatch.setattr(spoiling_markers, "_level", lambda *_: level)
+    monkeypatch.setattr(spoiling_markers, "_best_without", lambda *_: next(sizes))
     points = np.vstack([SQUARE, [[0.1, 0.1, 0.1]]])
-    found = rigidity.rigidity(points, np.tile(points, (20, 1, 1)))
+    found = spoiling_markers.rigidity(points, np.tile(points, (20, 1, 1)))
     assert len(found.left_out) == left
 
 
@@ -186,7 +186,7 @@ def test_without_its_own_noise_a_marker_is_taken_for_half_as_uncertain_as_the_ot
     rng = np.random.default_rng(3)
     points = np.tile(ball(7), (300, 1, 1))
     points[:, 1:] += 1e-4 * rng.normal(size=(300, 6, 3))
-    std = rigidity.rigidity(ball(7), points).std_m
+    std = spoiling_markers.rigidity(ball(7), points).std_m
     usual = np.median(np.r_[0.0, std[1:] ** 2])
     assert std[0] ** 2 / usual == pytest.approx(0.25, rel=0.02)
 

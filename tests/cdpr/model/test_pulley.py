@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from freeswing.cdpr.model.batch import evaluate
-from freeswing.cdpr.model.domain import check_domain, domain_problems
 from freeswing.cdpr.model.equations import build_model
+from freeswing.cdpr.model.undefined_poses import check_domain, domain_problems
 from freeswing.cdpr.robot import Robot
 from freeswing.cdpr.rotation import angle_rate_matrix, matrix_from_angles
 from tests.cdpr.model_cases import ROBOTS, differences, random_states, ring, robot_named

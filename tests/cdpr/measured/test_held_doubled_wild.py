@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from freeswing.cdpr.files.problems import InputError
-from freeswing.cdpr.measured.sound_samples import (
+from freeswing.cdpr.measured.held_doubled_wild import (
     NORMAL_BY_MAD,
     _doubled,
     _is_finer,

@@ -3,9 +3,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from freeswing.cdpr.markers.rigidity import Rigidity
+from freeswing.cdpr.markers.contradicting_samples import stand_outs
 from freeswing.cdpr.markers.session_markers import fit_session
-from freeswing.cdpr.markers.stand_outs import stand_outs
+from freeswing.cdpr.markers.spoiling_markers import Rigidity
 from tests.cdpr.markers.made import drift, recording, target
 
 SHORT = slice(100, 102)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.cdpr.markers.jumps import JUMP_DEVIATIONS, Jump
-from freeswing.cdpr.markers.rigidity import Rigidity
+from freeswing.cdpr.markers.spoiling_markers import Rigidity
 
 # Below this it is the common drift of half-hidden markers, which the covariances hold.
 STANDS_OUT_M = 5e-4
