@@ -79,7 +79,8 @@ def refuse_gross(
 
 _UNEXPLAINED = (
     ". None of the usual mistakes explains it (cameras exchanged, turned, unit, inverted pose, "
-    "axes, size of the tags): calibrate again"
+    "axes, size of the tags): calibrate again, unless what this run holds of the cameras are "
+    "recordings of different swings"
 )
 
 

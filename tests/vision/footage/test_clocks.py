@@ -126,5 +126,5 @@ def test_cameras_that_filmed_different_swings_are_refused(tmp_path, capsys, text
         shutil.copy(folder / "runs" / "swing-02" / name, folder / "runs" / "swing-01" / name)
     assert track(folder) == 1
     said = capsys.readouterr().err
-    assert re.search("camera (left|right) sees the platform|swing-01", said), said
+    assert re.search("camera (left|right) sees the platform|different swings", said), said
     assert main(["identify", str(folder), "--quiet"]) != 0
