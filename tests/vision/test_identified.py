@@ -40,9 +40,17 @@ def errors(folder: Path, estimate: str) -> tuple[np.ndarray, np.ndarray]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("estimate", ["ml_full", "ml_free"])
-def test_every_essential_parameter_is_within_three_claimed_deviations(session, estimate) -> None:
+def test_the_essential_parameters_are_off_as_far_as_is_claimed(session, estimate) -> None:
+    """In deviations: root mean square of the nine, and the worst.
+
+    Of honest claims nine go beyond 1.6 by root mean square six times in a thousand, and one of
+    the 36 here beyond three deviations once in ten; seeds 3 to 8 have 0.94 over all and one of 108
+    beyond three, at 3.1. Claims that were two times too small would give 2.
+    """
     error, std = errors(session, estimate)
-    assert np.abs(error / std).max() < 3.0, f"z = {np.round(error / std, 2)}"
+    z = error / std
+    assert np.sqrt(np.mean(z**2)) < 1.6, f"z = {np.round(z, 2)}"
+    assert np.abs(z).max() < 4.0, f"z = {np.round(z, 2)}"
 
 
 @pytest.mark.slow
