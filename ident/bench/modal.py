@@ -15,7 +15,7 @@ import numpy as np
 
 from freeswing.cdpr.model.batch import evaluate, only
 from freeswing.cdpr.model.equations import Model
-from freeswing.cdpr.model.statics import equilibrium_at_lengths
+from freeswing.cdpr.model.statics import Equilibrium, equilibrium_at_lengths
 from freeswing.cdpr.robot import Array
 from freeswing.cdpr.simulation.parallel_wires import bending
 from freeswing.ident.bench.objects import specific
@@ -110,6 +110,21 @@ class SmallMotion:
         return np.asarray(small.bent * turn**2 * square * (spent + crept))
 
 
+def stable_rest(model: Model, rest: Array, lengths_m: Array, inertia: Array) -> Equilibrium:
+    """The rest pose that wires of lengths (n,) m have near a pose (6,); inertia (9,), specific.
+
+    Raises:
+        ValueError: where there is none that is stable.
+
+    Source:
+        FIDIM 2022, eq. (38).
+    """
+    found = equilibrium_at_lengths(model, lengths_m, rest, inertia)
+    if found is None or not found.stable:
+        raise ValueError(f"no stable rest pose at wires of {np.round(lengths_m, 4)} m")
+    return found
+
+
 def small_oscillations(
     model: Model, rest: Array, free: Array, lengths_m: Array, inertia: Array, drag: Array
 ) -> Small:
@@ -129,9 +144,7 @@ def small_oscillations(
     Source:
         FIDIM 2022, eqs. (38), (39).
     """
-    found = equilibrium_at_lengths(model, lengths_m, rest, inertia)
-    if found is None or not found.stable:
-        raise ValueError(f"no stable rest pose at wires of {np.round(lengths_m, 4)} m")
+    found = stable_rest(model, rest, lengths_m, inertia)
     values = model.start_values
     jacobian = evaluate(only(model.cables, 3), found.zeta, values)[0]
     null = np.linalg.svd(jacobian)[2][len(lengths_m) :].T

@@ -15,8 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from freeswing.cdpr.model.equations import Model
-from freeswing.cdpr.model.statics import equilibrium_at_lengths, modes
+from freeswing.cdpr.model.statics import modes
 from freeswing.cdpr.robot import INERTIA_NAMES, Array
+from freeswing.ident.bench.modal import stable_rest
 from freeswing.ident.bench.objects import specific
 from freeswing.ident.bench.swing import BenchSwing
 
@@ -65,9 +66,7 @@ def yaw_period(model: Model, lengths_m: Array, rest: Array, inertia: Array) -> f
     Source:
         FIDIM 2022, eqs. (38), (39).
     """
-    found = equilibrium_at_lengths(model, lengths_m, rest, inertia)
-    if found is None or not found.stable:
-        raise ValueError(f"no stable rest pose at wires of {np.round(lengths_m, 4)} m")
+    found = stable_rest(model, rest, lengths_m, inertia)
     told = modes(model, found, inertia)  # shapes have unit modal mass: yaw's is the largest turn
     return float(1.0 / told.frequencies_hz[int(np.argmax(np.abs(told.shapes[CHI])))])
 
