@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from freeswing.cdpr.measured.leaving_out import leaving_out_std
 from freeswing.cdpr.robot import Array
 from freeswing.ident.diagnose.own_values import OwnValues
 
@@ -84,8 +85,7 @@ def score(evidence: Evidence) -> Score:
         others = np.delete(evidence.triangles, k, axis=0).reshape(-1, size)
         changes[k] = _solve(others, evidence.prior_rows, scale)[0]
         held_out[k] = np.sum((evidence.triangles[k] @ np.append(changes[k], 1.0)) ** 2)
-    spread = changes - changes.mean(axis=0)
-    jackknife = np.sqrt((r - 1) / r * np.sum(spread**2, axis=0))
+    jackknife = leaving_out_std(changes)
     fitted = evidence.triangles.reshape(-1, size) @ np.append(whole[0], 1.0)
     return Score(whole[0], whole[1], jackknife, float(fitted @ fitted), held_out, whole[2])
 

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from freeswing.cdpr.measured.leaving_out import leaving_out_std
 from freeswing.cdpr.robot import Array
 from freeswing.ident.fidim.shares import Stack
 from freeswing.ident.likelihood.between_runs import widened
@@ -40,6 +41,4 @@ def scattered(covariance: Array, stack: Stack, times_s: Sequence[Array]) -> Arra
     found = found[np.isfinite(found).all(axis=1)]
     if len(found) < 2:
         return covariance
-    spread = found - found.mean(axis=0)
-    std = np.sqrt((len(found) - 1) / len(found) * np.sum(spread**2, axis=0))
-    return widened(covariance, std, len(found))
+    return widened(covariance, leaving_out_std(found), len(found))

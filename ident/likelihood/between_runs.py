@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.special import chdtri
 
+from freeswing.cdpr.measured.leaving_out import leaving_out_std
 from freeswing.cdpr.robot import Array
 
 LEAST_RUNS = 3  # of two, leaving out one leaves one: nothing it could be compared with
@@ -43,8 +44,7 @@ def jackknife_std(runs: Sequence[Array], priors: Array, free: np.ndarray, unit: 
     known = priors[:, places] * scales
     total = grams.sum(axis=0) + known.T @ known
     changes = np.array([_solved(total - gram) for gram in grams])
-    spread = changes - changes.mean(axis=0)
-    found[free] = unit[free] * np.sqrt((count - 1) / count * np.sum(spread**2, axis=0))
+    found[free] = unit[free] * leaving_out_std(changes)
     return found
 
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from freeswing.calib.camera.camera import Camera
 from freeswing.calib.tags.base_tags import SURVEY_STD_M
+from freeswing.cdpr.measured.leaving_out import leaving_out_std
 from freeswing.cdpr.rotation import exp_rotation
 from freeswing.vision.fuse.blocks import blocks
 from freeswing.vision.fuse.fuse_cameras import Fit, fuse
@@ -283,11 +284,9 @@ def leaving_out(without: Array) -> Array:
     Source:
         Kuensch 1989, The Jackknife and the Bootstrap for General Stationary Observations, sec. 2.
     """
-    count = len(without)
-    if count < LEAST_PARTS:
+    if len(without) < LEAST_PARTS:
         return np.zeros(without.shape[-1])
-    spread = without - without.mean(axis=0)
-    return np.sqrt((count - 1) / count * np.sum(spread**2, axis=0))
+    return leaving_out_std(without)
 
 
 def _inverse(normal: Array) -> Array:
