@@ -49,6 +49,12 @@ STANDARD_GRAVITY_M_S2 = 9.80665
 Array = NDArray[Any]
 
 
+def spread_of(points: Array) -> float:
+    """How far points (n, 3) lie from their middle, root mean square, in their unit."""
+    off = points - points.mean(axis=0)
+    return float(np.sqrt(np.mean(np.sum(off**2, axis=1))))
+
+
 def frozen_array(values: object, shape: tuple[int, ...], what: str) -> Array:
     """A read-only float copy of `values`, of the given shape and finite.
 

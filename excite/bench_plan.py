@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from freeswing.cdpr.files.documents import DataError
-from freeswing.cdpr.robot import Array, Robot
+from freeswing.cdpr.robot import Array, Robot, spread_of
 from freeswing.cdpr.simulation.parallel_wires import bending
 
 GRAVITY_M_S2 = 9.80665
@@ -239,8 +239,7 @@ def bench_case(robot: Robot, load_kg: float | None, load_izz: float | None) -> B
     mass = robot.platform.mass_kg
     if mass is None:
         raise DataError("mass_kg of the platform is not given: weigh it with all that hangs on it")
-    ends = robot.attachments_m - robot.attachments_m.mean(axis=0)
-    radius = float(np.sqrt(np.mean(np.sum(ends**2, axis=1))))
+    radius = spread_of(robot.attachments_m)
     length = float(np.mean(np.linalg.norm(robot.entries_m - robot.attachments_m, axis=1)))
     given = robot.platform.specific_inertia_m2
     izz = mass * (HOOP * radius**2 if given is None else float(given[2]))

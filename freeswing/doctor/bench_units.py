@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from freeswing.cdpr.files.documents import InputError
-from freeswing.cdpr.robot import Robot
+from freeswing.cdpr.robot import Robot, spread_of
 from freeswing.excite.bench_plan import BenchCase
 from freeswing.ident.bench.runs import Bench, BenchRun, Signal
 
@@ -30,8 +30,7 @@ def refuse_wrong_units(bench: Bench, robot: Robot) -> None:
     Raises:
         InputError: naming run, key or column, number and what it is held against.
     """
-    ends = robot.attachments_m - robot.attachments_m.mean(axis=0)
-    radius = float(np.sqrt(np.mean(np.sum(ends**2, axis=1))))
+    radius = spread_of(robot.attachments_m)
     _refuse_too_few(bench)
     told = [*_of_loads(bench, robot, radius), *_of_platform(bench, robot)]
     for run in bench.runs:

@@ -13,7 +13,7 @@ import numpy as np
 
 from freeswing.cdpr.files.problems import DataError
 from freeswing.cdpr.model.equations import Model, build_model
-from freeswing.cdpr.robot import POSE_COORDINATES, Array, Robot
+from freeswing.cdpr.robot import POSE_COORDINATES, Array, Robot, spread_of
 from freeswing.ident.bench.runs import Bench, BenchRun
 from freeswing.ident.likelihood.rest_pose import rest_near
 from freeswing.ident.signals.prepare import guessed_inertia
@@ -87,6 +87,6 @@ def _off(model: Model, run: BenchRun, shown: Sequence[str], lengths_m: Array) ->
     except (ValueError, np.linalg.LinAlgError):
         return np.inf
     leans = [k for k, name in enumerate(run.coordinates) if name in shown]
-    ends = model.robot.attachments_m - model.robot.attachments_m.mean(axis=0)
-    reach = float(np.sqrt(np.mean(np.sum(ends**2, axis=1))))
-    return reach * float(np.linalg.norm((rest.zeta[columns] - middle)[leans]))
+    return spread_of(model.robot.attachments_m) * float(
+        np.linalg.norm((rest.zeta[columns] - middle)[leans])
+    )

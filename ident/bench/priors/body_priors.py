@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from freeswing.cdpr.robot import Array, Robot
+from freeswing.cdpr.robot import Array, Robot, spread_of
 from freeswing.ident.bench.runs import Bench, BenchRun, Load
 from freeswing.ident.bench.swing import IZZ
 from freeswing.ident.likelihood.unknowns import Gaussian, Unknown
@@ -21,8 +21,7 @@ WIDE_MASS = 0.5  # of the declared mass, where payloads are to say it
 
 def extent(robot: Robot) -> float:
     """How far the attachments spread, root mean square, at least 5 cm."""
-    off = robot.attachments_m - robot.attachments_m.mean(axis=0)
-    return max(0.05, float(np.sqrt(np.mean(np.sum(off**2, axis=1)))))
+    return max(0.05, spread_of(robot.attachments_m))
 
 
 def platform_block(robot: Robot, bench: Bench, runs: Sequence[BenchRun], body: Array) -> Unknown:
