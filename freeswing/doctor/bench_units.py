@@ -19,6 +19,8 @@ SHORTEST = 0.1  # the same: 25 mm at 0.25 m
 FARTHEST = 10.0  # a known mass, or an object's centre, over the wires' distance from the middle
 HEAVIEST = 200.0  # what lies on a platform over the platform
 LIGHTEST = 1000.0  # a platform over the heaviest that lies on it, of which no swing shows more
+LOOSEST = 0.05  # of the wires' length: what it may be off by; a step's length is wrong by less
+BENEATH = 0.5  # of it: how far upper ends may lie under P, where a frame hangs at the ceiling
 WIDEST = 2.0  # a platform's motion over its wires' length: it goes round
 FEWEST = 20  # samples: two swings of ten, from which a start and its rates can be told
 SLOWEST = 0.25  # of a pendulum's period between samples: yaw may be four times as fast
@@ -27,11 +29,14 @@ SLOWEST = 0.25  # of a pendulum's period between samples: yaw may be four times 
 def refuse_wrong_units(bench: Bench, robot: Robot) -> None:
     """Refuse lengths, masses, places, positions and times that must be in another unit.
 
+    And gravity that would have the platform stand on its wires.
+
     Raises:
         InputError: naming run, key or column, number and what it is held against.
     """
     radius = spread_of(robot.attachments_m)
     _refuse_too_few(bench)
+    _refuse_upside_down(bench, robot)
     told = [*_of_loads(bench, robot, radius), *_of_platform(bench, robot)]
     for run in bench.runs:
         told += [f"run {run.name}: {one}" for one in _of_run(run, robot, radius)]
@@ -76,6 +81,27 @@ def _refuse_too_few(bench: Bench) -> None:
                 )
 
 
+def _refuse_upside_down(bench: Bench, robot: Robot) -> None:
+    """Refuse gravity that points from the platform to its wires' upper ends: yaw shows no sign.
+
+    Raises:
+        InputError: naming gravity_m_s2, and how far the ends lie on the wrong side.
+    """
+    up = -robot.gravity_m_s2 / np.linalg.norm(robot.gravity_m_s2)
+    for run in bench.runs:
+        if run.lengths_m is None:
+            continue
+        heights = [float(np.nanmean(s.values)) for s in run.signals if s.column == "z"]
+        p_m = up[2] * heights[0] if heights else 0.0
+        below = p_m - float(np.mean(robot.entries_m @ up))
+        if below > BENEATH * float(np.mean(run.lengths_m)):
+            raise InputError(
+                f"robot.toml: gravity_m_s2 = {robot.gravity_m_s2.tolist()} pulls towards the "
+                f"wires' upper ends (entry_m), which lie {below:.4g} m below P: the platform would "
+                "stand on its wires; turn its sign, or put the base frame's origin beneath entry_m"
+            )
+
+
 def _of_loads(bench: Bench, robot: Robot, radius_m: float) -> Iterator[str]:
     for load in bench.loads:
         yield from _of_mass(f"loads {load.name}: mass_kg", load.mass_kg, robot)
@@ -107,6 +133,11 @@ def _of_run(run: BenchRun, robot: Robot, radius_m: float) -> Iterator[str]:
             f"(robot.toml) lie {radius_m:.4g} m from their middle: one of them is in another unit"
         )
         return
+    if run.lengths_std_m is not None and run.lengths_std_m > LOOSEST * length:
+        yield (
+            f"cable_lengths_std_m = {run.lengths_std_m:.4g} m on wires of {length:.4g} m: is it in "
+            "mm? A tape is right to a millimetre or two"
+        )
     for signal in run.signals:
         yield from _of_positions(signal, length)
     yield from _of_times(run, length)

@@ -21,6 +21,7 @@ from freeswing.ident.bench.told.classic import (
     classic_runs,
     held_sentences,
     leaning_sentence,
+    unchecked_lengths,
 )
 from freeswing.ident.bench.told.contradicted import contradictions, exchange_sentence
 from freeswing.ident.bench.told.envelope import Envelope, envelopes, law_chances
@@ -172,7 +173,8 @@ def _windowed(run: BenchRun) -> BenchRun:
     if inside.sum() < 20:
         raise DataError(
             f"run {run.name}: {int(inside.sum())} samples in window_s {list(run.window_s)}; it "
-            f"lasts from {run.times_s[0]:.10g} to {run.times_s[-1]:.10g} s"
+            f"lasts from {run.times_s[0]:.10g} to {run.times_s[-1]:.10g} s: correct window_s, or "
+            "leave it out"
         )
     return replace(
         run,
@@ -190,6 +192,7 @@ def _notes(found: Solved, bench: Bench, robot: Robot) -> list[str]:
     fitted = [run for run in bench.runs if run.role == "identify"]
     notes = contradictions(found)
     notes += filter(None, [exchange_sentence(fitted)])
+    notes += filter(None, [unchecked_lengths(found, fitted)])
     notes += held_sentences(found)
     if bench.loads and found.mass is None and bench.mass_std_kg is None:
         notes.append(

@@ -164,8 +164,8 @@ def check_swings(run: BenchRun) -> None:
     if mine and len(mine) == len(run.signals) and not any(_moves(one.values) for one in mine):
         names = ", ".join(signal.column for signal in mine)
         raise DataError(
-            f"run {run.name}: {names} never move above their noise: twist wider, or leave the run "
-            "out"
+            f"run {run.name}: nothing moves above its noise in {names}: twist wider, or leave the "
+            "run out"
         )
 
 

@@ -376,7 +376,10 @@ HELD = (
     ),
     Held(
         "freeswing/doctor/bench_units.py",
-        ("LONGEST", "SHORTEST", "FARTHEST", "HEAVIEST", "LIGHTEST", "WIDEST", "SLOWEST", "FEWEST"),
+        (
+            "LONGEST", "SHORTEST", "FARTHEST", "HEAVIEST", "LIGHTEST", "WIDEST", "SLOWEST",
+            "FEWEST", "LOOSEST", "BENEATH",
+        ),
         "tests/freeswing/doctor/test_bench_units.py",
     ),
     Held("ident/bench/mass_verdict.py", ("CONTRADICTED", "CHECKING", "GIVES_WAY"), BENCH),

@@ -72,7 +72,13 @@ def driven_page(named: Path, folder: str | None) -> tuple[Path, Material]:
     if material.control is None and material.drive is None:
         why = material.why_absent("control", "drive")
         todo = f"freeswing design {named.parent}"
-        todo += "" if named.name == "robot.toml" else f", or freeswing drive {named}"
+        if named.name == "robot.toml":
+            todo += (
+                f"; for swings or a bench {named.parent} lacks a session.toml, which freeswing new "
+                "writes"
+            )
+        else:
+            todo += f", or freeswing drive {named}"
         raise InputError(why or f"{results}: nothing to show of a driven robot yet: {todo}")
     page = results / "report.html"
     write_page(page, material, driven_panels(material))

@@ -13,7 +13,9 @@ from typing import Any
 import numpy as np
 
 from freeswing.cdpr.robot import Array
+from freeswing.cdpr.simulation.parallel_wires import hangs_parallel
 from freeswing.ident.bench.objects import moments
+from freeswing.ident.bench.runs import BenchRun
 from freeswing.ident.bench.solve import Solved
 from freeswing.ident.bench.swing import IZZ, BenchSwing
 from freeswing.ident.bench.told.classic_reasons import (
@@ -157,6 +159,31 @@ def held_sentences(solved: Solved) -> list[str]:
                 "(one deviation) is counted"
             )
     return found
+
+
+def unchecked_lengths(solved: Solved, runs: Sequence[BenchRun]) -> str:
+    """That nothing checks the wires' length, where neither sway nor a known mass does; or "".
+
+    Args:
+        solved: the fit.
+        runs: as fitted.
+
+    Source:
+        The classic formula, I = m g R r T^2 / (4 pi^2 L): yaw's period tells I L.
+    """
+    swing = solved.swings[0]
+    checked = solved.wires is not None or any(run.payloads for run in runs)
+    if checked or not hangs_parallel(swing.model.robot):
+        return ""
+    length = float(np.mean(swing.lengths_m))
+    gravity = float(np.linalg.norm(swing.model.robot.gravity_m_s2))
+    sways = 2.0 * np.pi * float(np.sqrt(length / gravity))
+    return (
+        f"no run shows sway or carries a known mass, and yaw alone cannot check the wires' length: "
+        f"Izz goes as one over it, so that wires twice as long as the stated {length:.3g} m would "
+        f"halve it unseen. Time ten sways ({10.0 * sways:.1f} s on such wires), measure x or y in "
+        "one run, or hang a known mass far from the middle"
+    )
 
 
 def own_izz(solved: Solved) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from freeswing.cdpr.files.documents import InputError
-from freeswing.cdpr.robot import Platform
+from freeswing.cdpr.robot import Platform, Robot
 from freeswing.doctor.bench_units import refuse_wrong_plan, refuse_wrong_units
 from freeswing.excite.bench_plan import BenchCase
 from freeswing.ident.bench.runs import Bench, BenchRun, KnownBody, Load, Signal
@@ -58,6 +58,8 @@ PENDULUM_S = 2.0 * np.pi * np.sqrt(1.2 / 9.81)
         (payload(0.4, 2.6), "run a: payload position_m is 2.6 m"),
         (load(241.0, 0.1), "loads cube: mass_kg = 241 kg"),
         (load(0.4, 2.6), "loads cube: com_m is 2.6 m"),
+        ({"lengths_std_m": 0.059}, ""),
+        ({"lengths_std_m": 0.061}, "run a: cable_lengths_std_m = 0.061 m on wires of 1.2 m"),
         (moved("x", 2.3), ""),
         (moved("x", 2.5), "run a: column x_m goes over 2.5 m"),
         (moved("dot_px", 1e3), ""),
@@ -85,6 +87,39 @@ def test_a_column_that_holds_next_to_nothing(known: int, refused: bool) -> None:
         return
     with pytest.raises(InputError, match=f"run a: the column of chi holds {known} number"):
         refuse_wrong_units(bench_of(**counted(known)), ROBOT)
+
+
+def risen(entries_z_m: float, z_m: float | None = None, up: float = 1.0) -> tuple[Bench, Robot]:
+    """A bench whose wires end at some height; where z is measured, and which way is up."""
+    ends = [
+        replace(c, entry_m=c.entry_m * [1.0, 1.0, 0.0] + [0.0, 0.0, entries_z_m])
+        for c in ROBOT.cables
+    ]
+    robot = replace(ROBOT, cables=tuple(ends), gravity_m_s2=np.array([0.0, 0.0, -9.81 * up]))
+    seen: dict[str, Any] = {} if z_m is None else {"signals": (Signal("z", np.full(100, z_m)),)}
+    return bench_of(**seen), robot
+
+
+@pytest.mark.parametrize(
+    ("bench", "refused"),
+    [
+        (risen(1.2), False),
+        (risen(1.2, up=-1.0), True),
+        (risen(-1.2, up=-1.0), False),  # z down
+        (risen(0.0, up=-1.0), False),  # the frame hangs at the ceiling, z down
+        (risen(-0.59), False),
+        (risen(-0.61), True),
+        (risen(-0.7, z_m=-1.9), False),
+        (risen(0.0, z_m=1.2, up=1.0), True),
+        (risen(0.0, z_m=1.2, up=-1.0), False),
+    ],
+)
+def test_gravity_that_points_upwards(bench: tuple[Bench, Robot], refused: bool) -> None:
+    if not refused:
+        refuse_wrong_units(*bench)
+        return
+    with pytest.raises(InputError, match=r"robot.toml: gravity_m_s2 = .* turn its sign"):
+        refuse_wrong_units(*bench)
 
 
 def test_many_are_counted() -> None:

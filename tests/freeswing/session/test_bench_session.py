@@ -166,3 +166,49 @@ def test_degrees_are_questioned_by_name(tmp_path: Path, scale: float, refused: b
                 read(tmp_path / "tare.csv")
         else:
             read(tmp_path / "tare.csv")
+
+
+STATED = "cable_lengths_m = [1.2, 1.2, 1.2]"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "status", "said"),
+    [
+        (STATED, f"{STATED}\nwindow_s = [20, 30]", 1, "from 0 to 3.98 s: correct window_s, or"),
+        (STATED, f"{STATED}\nwindow_s = [3, 1]", 2, "window_s: [3.0, 1.0]: its end must follow"),
+        (STATED, f"{STATED}\ncable_lengths_std_m = 1.0", 2, "cable_lengths_std_m = 1 m on wires"),
+    ],
+)
+def test_a_session_that_cannot_be_meant(
+    tmp_path: Path, capsys, old: str, new: str, status: int, said: str
+) -> None:
+    """Wrong input is 2, data that cannot give a result 1, and both say what to do."""
+    make(tmp_path, SESSION.replace(old, new, 1))
+    assert main(["identify", str(tmp_path)]) == status
+    assert said in capsys.readouterr().err
+
+
+def test_gravity_that_points_upwards_is_refused(tmp_path: Path, capsys) -> None:
+    make(tmp_path)
+    robot = tmp_path / "robot.toml"
+    upwards = "gravity_m_s2 = [0.0, 0.0, 9.81]\n[platform]"
+    robot.write_text(robot.read_text().replace("[platform]", upwards, 1))
+    assert main(["identify", str(tmp_path)]) == 2
+    assert "turn its sign" in capsys.readouterr().err
+
+
+def test_a_run_in_which_nothing_moves(tmp_path: Path, capsys) -> None:
+    make(tmp_path)
+    noise = np.random.default_rng(1).normal(0.0, 5e-4, 200)
+    rows = "".join(f"{k / 50:.3f},{c:.6f}\n" for k, c in enumerate(noise))
+    (tmp_path / "tare.csv").write_text("t_s,chi_rad\n" + rows)
+    assert main(["identify", str(tmp_path)]) == 1
+    assert "run tare: nothing moves above its noise in chi: twist" in capsys.readouterr().err
+
+
+def test_a_report_without_a_session_says_how_one_starts(tmp_path: Path, capsys) -> None:
+    make(tmp_path)
+    (tmp_path / "session.toml").unlink()
+    assert main(["report", str(tmp_path)]) == 2
+    told = capsys.readouterr().err
+    assert "lacks a session.toml, which freeswing new writes" in told

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from freeswing.cdpr.files.documents import DataError
+from freeswing.cdpr.model.equations import build_model
 from freeswing.ident.bench import mass_verdict, noise, solve
 from freeswing.ident.bench.channels import Channel, check_moves
 from freeswing.ident.bench.modal import SQUARE
@@ -18,9 +19,16 @@ from freeswing.ident.bench.noise import _colours, rescaled
 from freeswing.ident.bench.runs import Bench, BenchRun, Signal, check_swings
 from freeswing.ident.bench.scatter import scatter_std
 from freeswing.ident.bench.swing import COMMON, Column
-from freeswing.ident.bench.told.classic import BESIDE, ClassicRun, leaning_sentence, sine_period
+from freeswing.ident.bench.told.classic import (
+    BESIDE,
+    ClassicRun,
+    leaning_sentence,
+    sine_period,
+    unchecked_lengths,
+)
 from freeswing.ident.bench.told.report_objects import _in_true_scale, told_object
 from freeswing.ident.likelihood.unknowns import Gaussian, Unknown, Unknowns
+from tests.ident.bench.test_swing_slopes import trifilar
 
 TRIFILAR = SimpleNamespace(robot=SimpleNamespace(n_cables=3))
 
@@ -217,7 +225,11 @@ def test_a_run_that_stands_still(over, usable) -> None:
     random = np.random.default_rng(0).standard_normal(4000)
     slow = np.sin(np.arange(4000) / 300.0)
     chi = slow / slow.std() * np.sqrt(over**2 - 1.0) + random / random.std()
-    with nullcontext() if usable else pytest.raises(DataError, match="run a: chi never move"):
+    with (
+        nullcontext()
+        if usable
+        else pytest.raises(DataError, match="run a: nothing moves above its noise in chi")
+    ):
         check_swings(still_run(chi))
     check_swings(still_run(chi, Signal("dot_px", slow)))
 
@@ -226,3 +238,16 @@ def test_a_column_that_no_sensor_gave() -> None:
     chi, constant = np.sin(np.arange(100) / 9.0), Signal("theta", np.full(100, 0.1))
     with pytest.raises(DataError, match="run a: column theta is the same number throughout"):
         check_swings(still_run(chi, constant))
+
+
+@pytest.mark.parametrize(
+    ("wires", "payloads", "says"),
+    [(None, (), True), ("by sway", (), False), (None, ("known",), False)],
+)
+def test_lengths_that_nothing_checks(wires, payloads, says) -> None:
+    """Izz goes as one over the length: by yaw alone a factor two would be unseen."""
+    swing = SimpleNamespace(model=build_model(trifilar()), lengths_m=np.full(3, 1.2))
+    solved = SimpleNamespace(swings=(swing,), wires=wires)
+    told = unchecked_lengths(solved, [SimpleNamespace(payloads=payloads)])
+    assert bool(told) == says, told
+    assert ("1.2 m would halve it" in told and "ten sways (22.0 s" in told) == says, told
