@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from freeswing.calib.board.board_check import settled_board
-from freeswing.calib.board.boards import Board, board_from
+from freeswing.calib.board.board_unlike_seen import settled_board
+from freeswing.calib.board.declared_board import Board, board_from
 from freeswing.calib.board.recordings import find_recordings
 from freeswing.calib.board.sightings import Sightings, gather, see_boards
 from freeswing.calib.camera.camera import Camera
@@ -25,11 +25,11 @@ from freeswing.calib.remarks import (
 )
 from freeswing.calib.rig.coarse_clocks import board_moves, coarse_clocks
 from freeswing.calib.rig.reprojection_kernels import WARP
-from freeswing.calib.rig.rig_start import BaseTie, base_tie, board_groups
 from freeswing.calib.rig.solve_rig import Rig, solve_rig, start_cameras, tie_to_base
-from freeswing.calib.rig.swing_tie import Joined, SwingFilms, joined
+from freeswing.calib.rig.tie_by_shared_boards import BaseTie, base_tie, board_groups
+from freeswing.calib.rig.tie_by_swings import Joined, SwingFilms, joined
 from freeswing.calib.rig.views import Views
-from freeswing.calib.scene.marks import Click, read_clicks
+from freeswing.calib.scene.clicked_points import Click, read_clicks
 from freeswing.calib.scene.survey import Survey
 from freeswing.calib.scene.tape_measured import SurveyedPoint
 from freeswing.calib.tags.base_tags import CORNER_NAMES, SURVEY_STD_M, SurveyedTag
@@ -40,11 +40,11 @@ from freeswing.calib.verdict.calibration_result import (
     camera_entries,
     covariance_entry,
 )
+from freeswing.calib.verdict.halves_and_lengths import check_truth, widened
 from freeswing.calib.verdict.plumb_line import StringView, find_vertical, vertical_entry
 from freeswing.calib.verdict.plumb_line_file import read_plumb_line
 from freeswing.calib.verdict.survey_check import SurveyCheck, check_survey
-from freeswing.calib.verdict.trust import Verdict, judge
-from freeswing.calib.verdict.truth_checks import check_truth, widened
+from freeswing.calib.verdict.verdict import Verdict, judge
 from freeswing.cdpr.files.documents import DataError, InputError
 from freeswing.cdpr.robot import STANDARD_GRAVITY_M_S2
 from freeswing.cdpr.system.progress import Progress

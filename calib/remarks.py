@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from freeswing.calib.board.board_check import marker_warning
-from freeswing.calib.board.boards import Board
+from freeswing.calib.board.board_unlike_seen import marker_warning
+from freeswing.calib.board.declared_board import Board
 from freeswing.calib.rig.reprojection import board_size
-from freeswing.calib.rig.rig_start import board_groups
 from freeswing.calib.rig.solve_rig import Rig
+from freeswing.calib.rig.tie_by_shared_boards import board_groups
 
 
 def moved_warnings(moved: tuple[tuple[str, float], ...]) -> list[str]:

@@ -28,7 +28,7 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
 from freeswing.calib.rig.triangulation import triangulate  # noqa: E402
-from freeswing.calib.verdict.truth_checks import rigidly_fitted  # noqa: E402
+from freeswing.calib.verdict.halves_and_lengths import rigidly_fitted  # noqa: E402
 from tests.calib import films, rigs  # noqa: E402
 
 KINDS = {"at rest, 16 poses": None, "waved, 60 Hz": (60.0, 100), "waved, 25 Hz": (25.0, 60)}

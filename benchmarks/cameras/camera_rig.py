@@ -31,16 +31,16 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
-from freeswing.calib.board.boards import Board  # noqa: E402
-from freeswing.calib.board.detection import BoardDetector  # noqa: E402
+from freeswing.calib.board.board_corners import BoardDetector  # noqa: E402
+from freeswing.calib.board.declared_board import Board  # noqa: E402
 from freeswing.calib.camera.camera import Camera  # noqa: E402
-from freeswing.calib.exchange.lens import lens  # noqa: E402
+from freeswing.calib.exchange.matrix_and_distortion import lens  # noqa: E402
 from freeswing.calib.rig.solve_rig import solve_rig, start_cameras  # noqa: E402
 from freeswing.calib.rig.triangulation import triangulate  # noqa: E402
 from freeswing.calib.rig.views import make_views  # noqa: E402
 from freeswing.calib.tags.tag_bend import straightened  # noqa: E402
 from freeswing.calib.tags.tag_patterns import tag_dictionary  # noqa: E402
-from freeswing.calib.verdict.truth_checks import rigidly_fitted  # noqa: E402
+from freeswing.calib.verdict.halves_and_lengths import rigidly_fitted  # noqa: E402
 from freeswing.cdpr.rotation import exp_rotation, transform  # noqa: E402
 from freeswing.vision.render.patterns import charuco_patch  # noqa: E402
 from freeswing.vision.render.render_scene import Look, Renderer, Scene, still  # noqa: E402

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
-from freeswing.calib.board.boards import Board
-from freeswing.calib.board.detection import BoardCorners, BoardDetector, Image
-from freeswing.calib.board.platform_tags import PlatformDetector, PlatformTags
+from freeswing.calib.board.board_corners import BoardCorners, BoardDetector, Image
+from freeswing.calib.board.declared_board import Board
+from freeswing.calib.board.platform_as_board import PlatformDetector, PlatformTags
 from freeswing.calib.board.recordings import Recording
 from freeswing.cdpr.system.arrays import Arrays, save_arrays, whole_arrays
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from freeswing.calib.footage.presentation import presentation_of, turn_of, upright
+from freeswing.calib.footage.container_times import presentation_of, turn_of, upright
 from freeswing.cdpr.files.documents import InputError, read_text
 from freeswing.cdpr.files.number_table import comma_separated
 

@@ -9,15 +9,15 @@ from pathlib import Path
 
 import numpy as np
 
-from freeswing.calib.board.board_check import corners_in_a_mirror
-from freeswing.calib.board.board_motion import Timeline, linked, timeline
-from freeswing.calib.board.boards import Board
-from freeswing.calib.board.detection import BoardCorners, BoardDetector
+from freeswing.calib.board.board_corners import BoardCorners, BoardDetector
+from freeswing.calib.board.board_unlike_seen import corners_in_a_mirror
+from freeswing.calib.board.declared_board import Board
 from freeswing.calib.board.kept_boards import KeptBoards
-from freeswing.calib.board.platform_tags import PlatformDetector, PlatformTags
+from freeswing.calib.board.motion_cuts import smoothness
+from freeswing.calib.board.motion_pieces import Timeline, linked, timeline
+from freeswing.calib.board.platform_as_board import PlatformDetector, PlatformTags
 from freeswing.calib.board.recordings import Recording, read_frames
 from freeswing.calib.board.searched_frames import in_bursts, middle_frames
-from freeswing.calib.board.smooth_motion import smoothness
 from freeswing.calib.camera.lens_models import Array
 from freeswing.calib.footage.frame_times import frame_times
 from freeswing.calib.rig.views import Views, make_views

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from freeswing.calib.board.board_motion import boards_at
+from freeswing.calib.board.motion_pieces import boards_at
 from freeswing.calib.camera.camera import Camera
 from freeswing.calib.camera.lens_models import PARAMETER_NAMES, Array
 from freeswing.calib.rig.bundle_adjustment import ROUGHLY_CONVERGED, adjust
@@ -20,7 +20,7 @@ from freeswing.calib.rig.normal_equations import Problem
 from freeswing.calib.rig.reprojection import Scene
 from freeswing.calib.rig.solve_rig import Rig, free_unknowns
 from freeswing.calib.rig.views import Views
-from freeswing.calib.verdict.truth_checks import at_moment
+from freeswing.calib.verdict.halves_and_lengths import at_moment
 
 LADDER = ("PINHOLE", "OPENCV", "FULL_OPENCV")
 LEAST_VIEWS = 12  # six a half: a lens of eight numbers from 48 corners each and more

@@ -15,8 +15,7 @@ import numpy as np
 
 from freeswing.calib.camera.camera import Camera
 from freeswing.calib.camera.lens_models import FISHEYE
-from freeswing.calib.exchange.lengths import in_metres
-from freeswing.calib.exchange.lens import (
+from freeswing.calib.exchange.matrix_and_distortion import (
     ODD_ENTRY,
     distortion,
     lens,
@@ -25,6 +24,7 @@ from freeswing.calib.exchange.lens import (
     shortest,
     usable,
 )
+from freeswing.calib.exchange.metres_or_millimetres import in_metres
 from freeswing.cdpr.files.documents import InputError, dump_toml, read_text
 from freeswing.cdpr.rotation import exp_rotation, log_rotation, transform
 

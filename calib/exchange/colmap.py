@@ -14,7 +14,7 @@ import numpy as np
 
 from freeswing.calib.camera.camera import Camera
 from freeswing.calib.camera.lens_models import PARAMETER_NAMES
-from freeswing.calib.exchange.lens import ODD_ENTRY, usable
+from freeswing.calib.exchange.matrix_and_distortion import ODD_ENTRY, usable
 from freeswing.calib.exchange.names import distinct_names
 from freeswing.cdpr.files.documents import InputError, read_text, replace_file
 from freeswing.cdpr.rotation import matrix_from_quaternion, quaternion_from_matrix, transform

@@ -16,7 +16,13 @@ import numpy as np
 
 from freeswing.calib.camera.camera import Camera
 from freeswing.calib.camera.lens_models import FISHEYE, Array
-from freeswing.calib.exchange.lens import ODD_ENTRY, distortion, lens, shortest, usable
+from freeswing.calib.exchange.matrix_and_distortion import (
+    ODD_ENTRY,
+    distortion,
+    lens,
+    shortest,
+    usable,
+)
 from freeswing.calib.exchange.names import by_number, distinct_names
 from freeswing.calib.exchange.plain_yaml import load_yaml
 from freeswing.cdpr.files.documents import InputError, replace_file

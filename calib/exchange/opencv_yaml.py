@@ -14,8 +14,7 @@ import numpy as np
 
 from freeswing.calib.camera.camera import Camera
 from freeswing.calib.camera.lens_models import FISHEYE
-from freeswing.calib.exchange.lengths import in_metres
-from freeswing.calib.exchange.lens import (
+from freeswing.calib.exchange.matrix_and_distortion import (
     ODD_ENTRY,
     distortion,
     lens,
@@ -24,6 +23,7 @@ from freeswing.calib.exchange.lens import (
     shortest,
     usable,
 )
+from freeswing.calib.exchange.metres_or_millimetres import in_metres
 from freeswing.calib.exchange.plain_xml import load_opencv_xml
 from freeswing.calib.exchange.plain_yaml import load_yaml
 from freeswing.cdpr.files.documents import InputError, replace_file

@@ -15,7 +15,7 @@ import numpy as np
 
 from freeswing.calib.camera.camera import Camera
 from freeswing.calib.camera.lens_models import FISHEYE
-from freeswing.calib.exchange.lens import (
+from freeswing.calib.exchange.matrix_and_distortion import (
     ODD_ENTRY,
     distortion,
     lens,

@@ -11,7 +11,14 @@ import numpy as np
 
 from freeswing.calib.camera.camera import Camera
 from freeswing.calib.camera.lens_models import FISHEYE
-from freeswing.calib.exchange.lens import ODD_ENTRY, distortion, lens, matrix, of_matrix, shortest
+from freeswing.calib.exchange.matrix_and_distortion import (
+    ODD_ENTRY,
+    distortion,
+    lens,
+    matrix,
+    of_matrix,
+    shortest,
+)
 from freeswing.calib.exchange.plain_yaml import load_yaml
 from freeswing.cdpr.files.documents import InputError, replace_file
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from freeswing.calib.board.recordings import Recording, stamp_file, stamp_rows
 from freeswing.calib.camera.lens_models import Array
-from freeswing.calib.footage.presentation import Presentation, presentation_of
+from freeswing.calib.footage.container_times import Presentation, presentation_of
 from freeswing.cdpr.files.documents import DataError, InputError
 
 SAME_RATE = 1e-4

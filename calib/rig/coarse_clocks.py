@@ -2,7 +2,7 @@
 
 The angular speed of a rigid board does not depend on who looks at it, so each camera's own track
 of it is slid over the others' until they agree. The bundle adjustment then refines the offsets
-with the board's motion (`calib.board.board_motion`). A hand waves much the same way again and
+with the board's motion (`calib.board.motion_pieces`). A hand waves much the same way again and
 again: a lag is believed where chance cannot make tracks so alike, and no other lag does as well.
 """
 

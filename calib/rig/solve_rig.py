@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from freeswing.calib.board.board_motion import Timeline, in_pieces
+from freeswing.calib.board.motion_pieces import Timeline, in_pieces
 from freeswing.calib.camera.camera import Camera
 from freeswing.calib.camera.intrinsics import CameraStart, DroppedView, start_camera
 from freeswing.calib.camera.lens_models import Array
-from freeswing.calib.rig.board_shape import shape_std_m
+from freeswing.calib.rig.board_sag_and_growth import shape_std_m
 from freeswing.calib.rig.bundle_adjustment import (
     ROUGHLY_CONVERGED,
     Adjustment,
@@ -28,8 +28,8 @@ from freeswing.calib.rig.outliers import (
 )
 from freeswing.calib.rig.reprojection import Scene, board_size, camera_slices
 from freeswing.calib.rig.reprojection_kernels import CLOCK, POSE, WARP
-from freeswing.calib.rig.rig_start import BaseTie, board_groups, place_in_base, start_rig
 from freeswing.calib.rig.survey_noise import survey_std
+from freeswing.calib.rig.tie_by_shared_boards import BaseTie, board_groups, place_in_base, start_rig
 from freeswing.calib.rig.views import FixedPoints, Views, joined_views
 
 _MOST_SWEEPS = 3

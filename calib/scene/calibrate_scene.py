@@ -11,18 +11,18 @@ import numpy as np
 from freeswing.calib.calibrate import CalibrationResult
 from freeswing.calib.rig.solve_rig import Rig
 from freeswing.calib.rig.views import FixedPoints
+from freeswing.calib.scene.clicked_points import (
+    Click,
+    clicked,
+    read_clicks,
+    surveyed_sightings,
+)
 from freeswing.calib.scene.lab_map import LabMap, map_of
 from freeswing.calib.scene.map_frame import (
     placed_points,
     roughly_in_base,
     tied_to_survey,
     with_distances,
-)
-from freeswing.calib.scene.marks import (
-    Click,
-    clicked,
-    read_clicks,
-    surveyed_sightings,
 )
 from freeswing.calib.scene.scene_rig import rig_of_map, rig_part
 from freeswing.calib.scene.scene_verdict import (

@@ -13,7 +13,8 @@ from freeswing.calib.rig.reprojection import camera_slices
 from freeswing.calib.rig.solve_rig import Rig
 from freeswing.calib.rig.triangulation import triangulate
 from freeswing.calib.scene.scene_rig import rig_part
-from freeswing.calib.verdict.grades import (
+from freeswing.calib.verdict.halves_and_lengths import rigidly_fitted, volume_std_m
+from freeswing.calib.verdict.limits_of_use import (
     GOOD_FILLED,
     GOOD_FOCAL_STD,
     GOOD_VOLUME_M,
@@ -26,7 +27,6 @@ from freeswing.calib.verdict.grades import (
     low,
     refused,
 )
-from freeswing.calib.verdict.truth_checks import rigidly_fitted, volume_std_m
 from freeswing.cdpr.rotation import log_rotation
 
 # Fourteen unknowns of a camera: 40 points of two numbers determine them with some to spare.

@@ -98,7 +98,7 @@ def _walk(path: Path) -> Recording:
 
 def _shares(recording: Recording) -> list[tuple[int, str, Image]]:
     """All frames, each with the number of the share of the walk that it stands for."""
-    from freeswing.calib.footage.presentation import presentation_of
+    from freeswing.calib.footage.container_times import presentation_of
 
     shown = None if recording.images else presentation_of(recording.path)
     count = len(recording.images) if shown is None else len(shown.ticks)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from freeswing.calib.board.sightings import Sightings
 from freeswing.calib.camera.camera import Camera
 from freeswing.calib.camera.lens_models import Array
-from freeswing.calib.scene.marks import Click, clicked, joined
+from freeswing.calib.scene.clicked_points import Click, clicked, joined
 from freeswing.calib.scene.tape_measured import SurveyedPoint
 from freeswing.calib.tags.base_tags import (
     SURVEY_STD_M,

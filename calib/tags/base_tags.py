@@ -9,7 +9,7 @@ from typing import Protocol
 import cv2
 import numpy as np
 
-from freeswing.calib.board.detection import LEAST_STD_PX, Image
+from freeswing.calib.board.board_corners import LEAST_STD_PX, Image
 from freeswing.calib.camera.camera import Camera
 from freeswing.calib.camera.lens_models import Array
 from freeswing.calib.rig.views import FixedPoints

@@ -1,6 +1,6 @@
 """What fitting a tag in plain pixels gets wrong because the tag is bent in the image.
 
-Before the lens is known a tag's pattern is fitted with a homography (`calib.board.detection`),
+Before the lens is known a tag's pattern is fitted with a homography (`calib.board.board_corners`),
 which no lens keeps, nor a rolling shutter before which the tag turns: corners come out up to some
 thousandths of a pixel off, those of all tags to the same side, so that no number of views averages
 it away. Once lens, pose and motion are known the error follows from geometry. The fit moves its
@@ -21,10 +21,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from freeswing.calib.board.board_motion import boards_at
-from freeswing.calib.board.boards import CIRCLES, Board
-from freeswing.calib.board.circles import circle_bias
-from freeswing.calib.board.platform_tags import PlatformTags
+from freeswing.calib.board.circle_grid_corners import circle_bias
+from freeswing.calib.board.declared_board import CIRCLES, Board
+from freeswing.calib.board.motion_pieces import boards_at
+from freeswing.calib.board.platform_as_board import PlatformTags
 from freeswing.calib.camera.camera import Camera
 from freeswing.calib.camera.lens_kernels import WITH_SLOPES, WITHOUT_SLOPES, lens_point
 from freeswing.calib.camera.lens_models import FISHEYE, Array, full_parameters

@@ -17,7 +17,7 @@ from freeswing.calib.camera.camera import Camera
 from freeswing.calib.camera.lens_models import PARAMETER_NAMES, Array, focal_and_centre
 from freeswing.calib.rig.reprojection import camera_slices, warped
 from freeswing.calib.rig.solve_rig import Rig
-from freeswing.calib.verdict.truth_checks import at_moment
+from freeswing.calib.verdict.halves_and_lengths import at_moment
 from freeswing.cdpr.rotation import invert, log_rotation
 
 HALF_PIXEL = 0.5

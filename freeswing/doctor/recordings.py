@@ -48,7 +48,7 @@ def calibration_findings(session: Session) -> Iterator[Finding]:
 
 
 def _board(table: Mapping[str, object]) -> Iterator[Finding]:
-    from freeswing.calib.board.boards import board_from
+    from freeswing.calib.board.declared_board import board_from
 
     try:
         board_from(table)
@@ -99,7 +99,7 @@ def footage_findings(subject: str, folder: Path, frame_rate_hz: float | None) ->
 def _recording_findings(
     subject: str, recording: Recording, frame_rate_hz: float | None
 ) -> Iterator[Finding]:
-    from freeswing.calib.footage.condition import condition_of, torn_text
+    from freeswing.calib.footage.first_frames import condition_of, torn_text
     from freeswing.calib.footage.frame_times import frame_times
 
     times = frame_times(recording, frame_rate_hz)

@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 
 from freeswing.calib.board.coverage import coverage_of
+from freeswing.calib.board.motion_cuts import smoothness
 from freeswing.calib.board.searched_frames import in_bursts
-from freeswing.calib.board.smooth_motion import smoothness
 from freeswing.calib.camera.camera import Camera
 from freeswing.calib.exchange.impossible_cameras import refuse_impossible
-from freeswing.calib.exchange.lengths import in_metres
+from freeswing.calib.exchange.metres_or_millimetres import in_metres
 from freeswing.calib.exchange.qualisys import _binning
-from freeswing.calib.verdict import survey_check, truth_checks
+from freeswing.calib.verdict import halves_and_lengths, survey_check
 from freeswing.calib.verdict.plumb_line import _refuse_one_plane
 from freeswing.calib.verdict.plumb_line_file import _numbers
 from freeswing.cdpr.files.documents import DataError, InputError
@@ -132,10 +132,10 @@ def checked(points: np.ndarray) -> survey_check.SurveyCheck:
 def test_half_of_a_calibration_has_four_views_of_each_camera(monkeypatch, views, enough) -> None:
     half = stub(camera=np.r_[np.zeros(9, int), np.ones(views, int)])
     chosen = stub(piece=np.zeros(1, int), select=lambda _: stub(compacted=lambda: (half, None)))
-    monkeypatch.setattr(truth_checks, "adjust", lambda *_, **__: "adjusted")
-    monkeypatch.setattr(truth_checks, "replace", lambda *_, **__: None)
+    monkeypatch.setattr(halves_and_lengths, "adjust", lambda *_, **__: "adjusted")
+    monkeypatch.setattr(halves_and_lengths, "replace", lambda *_, **__: None)
     scene = stub(pieces=lambda _: None)
     rig = stub(
         problem=stub(views=chosen), cameras=(1, 2), adjustment=stub(scene=scene, sigma_px=None)
     )
-    assert (truth_checks._half(rig, 0) == "adjusted") == enough
+    assert (halves_and_lengths._half(rig, 0) == "adjusted") == enough

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from freeswing.calib.board.recordings import Image, Recording, read_frames
 from freeswing.calib.camera.camera import Camera
 from freeswing.calib.footage.ahead import ahead
-from freeswing.calib.footage.copies import WARM_UP, with_copies
+from freeswing.calib.footage.copied_frames import WARM_UP, with_copies
 from freeswing.calib.footage.frame_times import frame_times, needed
 from freeswing.cdpr.files.documents import InputError
 from freeswing.vision.look.follow import REPEATED, UNSTAMPED, Follower, FrameView

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from freeswing.calib.board.recordings import Recording, read_frames
 from freeswing.calib.camera.camera import Camera
-from freeswing.calib.footage.copies import with_copies
+from freeswing.calib.footage.copied_frames import with_copies
 from freeswing.calib.footage.frame_times import frame_times, needed
 from freeswing.cdpr.files.documents import InputError
 from freeswing.cdpr.rotation import exp_rotation

@@ -117,7 +117,7 @@ def _sheets(session: Session) -> Iterator[tuple[str, Sheet]]:
 
 
 def _board_label(table: Mapping[str, object]) -> str:
-    from freeswing.calib.board.boards import CIRCLES, board_from
+    from freeswing.calib.board.declared_board import CIRCLES, board_from
 
     board = board_from(table)
     counts = f"{board.columns} x {board.rows}"
@@ -134,7 +134,7 @@ def _board_label(table: Mapping[str, object]) -> str:
 
 
 def _board_patch(table: Mapping[str, object]) -> Patch:
-    from freeswing.calib.board.boards import CIRCLES, board_from
+    from freeswing.calib.board.declared_board import CIRCLES, board_from
     from freeswing.vision.render.patterns import (
         aprilgrid_patch,
         charuco_patch,

@@ -11,7 +11,7 @@ from freeswing.console import Console
 
 if TYPE_CHECKING:
     from freeswing.calib.calibrate import CalibrationResult
-    from freeswing.calib.rig.swing_tie import SwingFilms
+    from freeswing.calib.rig.tie_by_swings import SwingFilms
     from freeswing.session.made import Made
     from freeswing.session.session_file import Session
     from freeswing.workers.crew import Crew
@@ -119,9 +119,9 @@ def _made(
 
 def _swings(session: Session) -> SwingFilms | None:
     """The runs' recordings, where the session has some and tags on the platform."""
-    from freeswing.calib.board.platform_tags import platform_tags
+    from freeswing.calib.board.platform_as_board import platform_tags
     from freeswing.calib.calibrate import KEPT_BOARDS
-    from freeswing.calib.rig.swing_tie import SwingFilms
+    from freeswing.calib.rig.tie_by_swings import SwingFilms
     from freeswing.session.load_swings import load_target
 
     runs = tuple(

@@ -10,9 +10,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from freeswing.calib.board import board_check, chessboards, circles, detection
-from freeswing.calib.board.boards import Board
-from freeswing.calib.board.platform_tags import platform_tags
+from freeswing.calib.board import (
+    board_corners,
+    board_unlike_seen,
+    chessboard_corners,
+    circle_grid_corners,
+)
+from freeswing.calib.board.declared_board import Board
+from freeswing.calib.board.platform_as_board import platform_tags
 from freeswing.calib.camera.camera import Camera
 from freeswing.calib.camera.cameras_file import read_cameras, write_cameras
 from freeswing.calib.camera.impossible_lenses import question_lens
@@ -26,15 +31,17 @@ CHARUCO = Board("charuco", 5, 4, 0.04, marker_m=0.03, dictionary="DICT_4X4_50")
 )
 def test_corners_on_no_plane_are_of_another_layout(monkeypatch, views, bent, other) -> None:
     """Three views of the stated board so far off a plane, of any other one at none."""
-    monkeypatch.setattr(board_check, "_bent", lambda board, _: bent if board == CHARUCO else 0.0)
-    found, said = board_check.settled_board(CHARUCO, np.zeros((views, 12, 2)))
+    monkeypatch.setattr(
+        board_unlike_seen, "_bent", lambda board, _: bent if board == CHARUCO else 0.0
+    )
+    found, said = board_unlike_seen.settled_board(CHARUCO, np.zeros((views, 12, 2)))
     assert (found != CHARUCO) == other
     assert (said is not None) == other
 
 
 @pytest.mark.parametrize(("percent", "warned"), [(0.93, False), (1.07, True)])
 def test_markers_of_another_size_are_named(percent, warned) -> None:
-    assert (board_check.marker_warning(CHARUCO, 1e-2 * percent * 0.03) is not None) == warned
+    assert (board_unlike_seen.marker_warning(CHARUCO, 1e-2 * percent * 0.03) is not None) == warned
 
 
 @pytest.mark.parametrize(("square_m", "refused"), [(0.93, False), (1.07, True)])
@@ -45,8 +52,8 @@ def test_a_square_of_a_metre_is_a_unit_mistaken(square_m, refused) -> None:
 
 def test_other_boards_are_looked_for_in_eight_images(monkeypatch) -> None:
     asked = []
-    monkeypatch.setattr(chessboards, "_counts", lambda image: asked.append(1))
-    finder = chessboards.ChessboardFinder(5, 4)
+    monkeypatch.setattr(chessboard_corners, "_counts", lambda image: asked.append(1))
+    finder = chessboard_corners.ChessboardFinder(5, 4)
     for _ in range(12):
         finder.find(np.zeros((60, 80), np.uint8))
     assert len(asked) == 8
@@ -55,8 +62,8 @@ def test_other_boards_are_looked_for_in_eight_images(monkeypatch) -> None:
 @pytest.mark.parametrize(("rows", "counts"), [(2, None), (3, (5, 3))])
 def test_the_smallest_board_has_three_rows(monkeypatch, rows, counts) -> None:
     found = (True, None, np.zeros((rows, 5)))
-    monkeypatch.setattr(chessboards.cv2, "findChessboardCornersSBWithMeta", lambda *_: found)
-    assert chessboards._counts(np.zeros((60, 80), np.uint8)) == counts
+    monkeypatch.setattr(chessboard_corners.cv2, "findChessboardCornersSBWithMeta", lambda *_: found)
+    assert chessboard_corners._counts(np.zeros((60, 80), np.uint8)) == counts
 
 
 @pytest.mark.parametrize(
@@ -68,24 +75,24 @@ def test_a_circle_has_twenty_pixels_and_a_contrast(pixels, contrast, seen) -> No
     window, mine = np.full((10, 10), 200.0), np.zeros((10, 10), dtype=bool)
     mine.ravel()[:pixels] = True
     window[:, ::2] -= contrast
-    found = circles._middle(window, np.array([4.5, 4.5]), mine)
+    found = circle_grid_corners._middle(window, np.array([4.5, 4.5]), mine)
     assert (found is not None) == seen
 
 
 @pytest.mark.parametrize(("corners", "found"), [(5, False), (6, True)])
 def test_a_board_shows_six_corners(monkeypatch, corners, found) -> None:
-    detector = detection.BoardDetector(CHARUCO)
+    detector = board_corners.BoardDetector(CHARUCO)
     seen = detector.nothing()
     seen.pixels[:corners] = 1.0
-    monkeypatch.setattr(detection.BoardDetector, "_tag_corners", lambda *_: seen)
+    monkeypatch.setattr(board_corners.BoardDetector, "_tag_corners", lambda *_: seen)
     assert (detector._detect_tags(np.zeros((60, 80), np.uint8)) is not None) == found
 
 
 @pytest.mark.parametrize(("explained", "kept"), [(0.77, False), (0.83, True)])
 def test_a_tag_looks_like_its_pattern(monkeypatch, explained, kept) -> None:
-    monkeypatch.setattr(detection, "fit_tag", lambda *_: SimpleNamespace(explained=explained))
+    monkeypatch.setattr(board_corners, "fit_tag", lambda *_: SimpleNamespace(explained=explained))
     quad = np.array([[20.0, 20.0], [40.0, 20.0], [40.0, 40.0], [20.0, 40.0]])
-    fit = detection.fitted_corners(np.zeros((60, 80), np.uint8), quad, np.zeros((6, 6)))
+    fit = board_corners.fitted_corners(np.zeros((60, 80), np.uint8), quad, np.zeros((6, 6)))
     assert (fit is not None) == kept
 
 
@@ -93,8 +100,8 @@ def test_no_corner_is_better_than_three_thousandths_of_a_pixel(monkeypatch) -> N
     exact = SimpleNamespace(rays=np.zeros((4, 2)), rays_covariance=np.zeros((8, 8)))
     quad = np.zeros((1, 4, 2), np.float32)
     finder = SimpleNamespace(detectMarkers=lambda _: ([quad], np.array([[0]]), None))
-    monkeypatch.setattr(detection, "fitted_corners", lambda *_: exact)
-    detector = detection.BoardDetector(CHARUCO)
+    monkeypatch.setattr(board_corners, "fitted_corners", lambda *_: exact)
+    detector = board_corners.BoardDetector(CHARUCO)
     found = detector._tag_corners(np.zeros((60, 80), np.uint8), 1, finder)
     assert np.sqrt(found.covariance_px2[0, 0, 0]) == pytest.approx(0.003, rel=0.15)
 

@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 from freeswing.calib.board import kept_boards
-from freeswing.calib.board.boards import board_from
-from freeswing.calib.board.detection import BoardCorners, BoardDetector
+from freeswing.calib.board.board_corners import BoardCorners, BoardDetector
+from freeswing.calib.board.declared_board import board_from
 from freeswing.calib.board.kept_boards import FRAMES_A_PIECE, MOST_PIECE_BYTES
 from freeswing.calib.board.recordings import find_recordings
 from freeswing.calib.board.sightings import Sightings, see_boards
@@ -27,7 +27,7 @@ from tests.places import SAMPLES
 FRAMES = 2 * FRAMES_A_PIECE + 7
 SEE = """
 import sys
-from freeswing.calib.board.boards import board_from
+from freeswing.calib.board.declared_board import board_from
 from freeswing.calib.board.recordings import find_recordings
 from freeswing.calib.board.sightings import see_boards
 from pathlib import Path

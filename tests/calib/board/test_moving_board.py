@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from freeswing.calib.board.boards import Board
+from freeswing.calib.board.declared_board import Board
 from freeswing.calib.board.sightings import Sightings, gather
 from freeswing.calib.calibrate import rig_from_sightings
 from tests.calib import rigs

@@ -8,11 +8,11 @@ import cv2
 import numpy as np
 import pytest
 
-from freeswing.calib.board import chessboards
-from freeswing.calib.board.boards import Board, board_from
-from freeswing.calib.board.chessboards import ChessboardFinder
-from freeswing.calib.board.circles import circle_bias
-from freeswing.calib.board.detection import BoardDetector
+from freeswing.calib.board import chessboard_corners
+from freeswing.calib.board.board_corners import BoardDetector
+from freeswing.calib.board.chessboard_corners import ChessboardFinder
+from freeswing.calib.board.circle_grid_corners import circle_bias
+from freeswing.calib.board.declared_board import Board, board_from
 from freeswing.calib.camera.cameras_file import read_cameras
 from freeswing.calib.verdict.calibration_result import read_camera_covariance
 from freeswing.cdpr.files.documents import InputError, dump_toml
@@ -133,13 +133,13 @@ def test_images_without_a_board_are_not_looked_at_hard_for_ever(monkeypatch) -> 
     finder = ChessboardFinder(9, 6)
     blank = np.full((60, 80), 128, np.uint8)
     assert [finder.find(blank) for _ in range(7)] == [None] * 7
-    assert sum(hard) == chessboards.MOST_HARD == 3
+    assert sum(hard) == chessboard_corners.MOST_HARD == 3
     assert finder.other_counts is None
 
 
 @pytest.mark.parametrize(("times", "said"), [(2, False), (3, True)])
 def test_other_counts_are_said_once_they_are_sure(monkeypatch, times, said) -> None:
-    monkeypatch.setattr(chessboards, "_counts", lambda image: (8, 5))
+    monkeypatch.setattr(chessboard_corners, "_counts", lambda image: (8, 5))
     finder = ChessboardFinder(9, 6)
     for _ in range(times):
         finder.find(np.full((60, 80), 128, np.uint8))

@@ -7,9 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from freeswing.calib.board.board_check import corners_in_a_mirror, marker_warning, settled_board
-from freeswing.calib.board.boards import Board, board_from
-from freeswing.calib.board.detection import BoardDetector
+from freeswing.calib.board.board_corners import BoardDetector
+from freeswing.calib.board.board_unlike_seen import (
+    corners_in_a_mirror,
+    marker_warning,
+    settled_board,
+)
+from freeswing.calib.board.declared_board import Board, board_from
 from freeswing.cdpr.files.documents import DataError, InputError
 from freeswing.vision.render.patterns import charuco_patch
 from freeswing.vision.render.render_scene import Look, Renderer, Scene

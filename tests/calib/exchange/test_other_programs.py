@@ -9,7 +9,7 @@ import pytest
 
 from freeswing.calib.camera.camera import Camera
 from freeswing.calib.camera.cameras_file import read_cameras
-from freeswing.calib.exchange.lens import turned
+from freeswing.calib.exchange.matrix_and_distortion import turned
 from freeswing.cdpr.rotation import exp_rotation, transform
 from freeswing.main import main
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from freeswing.calib.footage.copies import comb_ratio, largest_change
+from freeswing.calib.footage.copied_frames import comb_ratio, largest_change
 
 
 @pytest.mark.parametrize("shape", [(64, 96), (75, 101)])

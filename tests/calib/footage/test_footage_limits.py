@@ -11,10 +11,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from freeswing.calib.footage import condition, copies
-from freeswing.calib.footage.copies import comb_ratio, largest_shift_px, with_copies
+from freeswing.calib.footage import copied_frames, first_frames
+from freeswing.calib.footage.container_times import evened
+from freeswing.calib.footage.copied_frames import comb_ratio, largest_shift_px, with_copies
 from freeswing.calib.footage.frame_times import _from_container
-from freeswing.calib.footage.presentation import evened
 from freeswing.cdpr.files.documents import DataError
 
 
@@ -33,14 +33,14 @@ def test_a_copy_changes_by_less_than_a_seventh_of_its_neighbours(change, is_copy
 @pytest.mark.parametrize(("usual", "is_copy"), [(2.8, False), (3.2, True)])
 def test_where_nothing_moves_nothing_is_a_copy(monkeypatch, usual, is_copy) -> None:
     changes = iter([usual, 0.01, usual])
-    monkeypatch.setattr(copies, "largest_change", lambda *_: next(changes))
+    monkeypatch.setattr(copied_frames, "largest_change", lambda *_: next(changes))
     told = list(with_copies((k, "", grey(0)) for k in range(4)))
     assert told[2][1] == is_copy
 
 
 @pytest.mark.parametrize(("shift_px", "is_copy"), [(0.07, True), (0.09, False)])
 def test_edges_of_a_copy_stand_still(monkeypatch, shift_px, is_copy) -> None:
-    monkeypatch.setattr(copies, "largest_shift_px", lambda *_: shift_px)
+    monkeypatch.setattr(copied_frames, "largest_shift_px", lambda *_: shift_px)
     told = list(with_copies((k, "", grey(value)) for k, value in enumerate((0, 100, 101, 201))))
     assert told[2][1] == is_copy
 
@@ -66,12 +66,12 @@ def test_too_little_motion_tells_no_comb(columns, told) -> None:
     assert np.isfinite(comb_ratio(grey(0, 64), image)) == told
 
 
-def looked_at(monkeypatch, ratio: float) -> condition.Condition:
+def looked_at(monkeypatch, ratio: float) -> first_frames.Condition:
     frames = (((k, "", grey(0)), False) for k in range(1000))
-    monkeypatch.setattr(condition, "read_frames", lambda _: None)
-    monkeypatch.setattr(condition, "with_copies", lambda _: frames)
-    monkeypatch.setattr(condition, "comb_ratio", lambda *_: ratio)
-    return condition.condition_of(SimpleNamespace())
+    monkeypatch.setattr(first_frames, "read_frames", lambda _: None)
+    monkeypatch.setattr(first_frames, "with_copies", lambda _: frames)
+    monkeypatch.setattr(first_frames, "comb_ratio", lambda *_: ratio)
+    return first_frames.condition_of(SimpleNamespace())
 
 
 @pytest.mark.parametrize(("ratio", "torn"), [(1.0, False), (1.2, True)])

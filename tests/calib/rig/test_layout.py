@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from freeswing.calib.board.platform_tags import platform_tags
+from freeswing.calib.board.platform_as_board import platform_tags
 from freeswing.calib.rig.reprojection import shape_modes, warped
-from freeswing.calib.rig.rig_start import pose_from_points
 from freeswing.calib.rig.solve_rig import Rig, solve_rig, start_cameras
+from freeswing.calib.rig.tie_by_shared_boards import pose_from_points
 from freeswing.calib.rig.views import Views, joined_views, make_views
-from freeswing.calib.verdict.truth_checks import rigidly_fitted
+from freeswing.calib.verdict.halves_and_lengths import rigidly_fitted
 from freeswing.cdpr.measured.target import Target, read_target, write_target
 from freeswing.cdpr.rotation import exp_rotation
 from tests.calib import rigs

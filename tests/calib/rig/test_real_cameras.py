@@ -8,14 +8,14 @@ import cv2
 import numpy as np
 import pytest
 
-from freeswing.calib.board.boards import Board
-from freeswing.calib.board.detection import BoardDetector
+from freeswing.calib.board.board_corners import BoardDetector
+from freeswing.calib.board.declared_board import Board
 from freeswing.calib.camera.camera import Camera
 from freeswing.calib.camera.intrinsics import start_camera
 from freeswing.calib.exchange import read
 from freeswing.calib.rig.normal_equations import Problem
-from freeswing.calib.rig.rig_start import pose_from_points, start_rig
 from freeswing.calib.rig.solve_rig import free_unknowns, refine
+from freeswing.calib.rig.tie_by_shared_boards import pose_from_points, start_rig
 from freeswing.calib.rig.triangulation import triangulate
 from freeswing.calib.rig.views import make_views
 from freeswing.calib.tags.corners import fit_tag, pixel_rays, rimmed_cells

@@ -9,10 +9,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from freeswing.calib.board.boards import Board
+from freeswing.calib.board.declared_board import Board
 from freeswing.calib.camera.camera import Camera
 from freeswing.calib.rig import (
-    board_shape,
+    board_sag_and_growth,
     coarse_clocks,
     line_times,
     outliers,
@@ -73,11 +73,11 @@ def test_line_times_that_stand_out(line_time_s, std_s, stands_out) -> None:
 def test_boards_are_flat_to_some_thousandths_before_anything_was_seen() -> None:
     """Card on wood over half a metre bends by a millimetre, markers grow by some per cent."""
     board = Board("charuco", 7, 5, 0.08, 0.06, "DICT_5X5_100")
-    along, across, growth = board_shape.shape_std_m(board.points_m)
+    along, across, growth = board_sag_and_growth.shape_std_m(board.points_m)
     assert 0.9e-3 < along < 1.2e-3
     assert 0.6e-3 < across < 0.85e-3
     assert 1.0e-3 < growth < 1.4e-3
-    assert np.isinf(board_shape.shape_std_m(Board("chessboard", 6, 4, 0.08).points_m)[2])
+    assert np.isinf(board_sag_and_growth.shape_std_m(Board("chessboard", 6, 4, 0.08).points_m)[2])
 
 
 def survey_std(given_m: float, correction_m: float, known: bool) -> float:

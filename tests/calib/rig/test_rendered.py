@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from freeswing.calib.board.boards import Board, board_from, read_board
-from freeswing.calib.board.detection import BoardDetector
+from freeswing.calib.board.board_corners import BoardDetector
+from freeswing.calib.board.declared_board import Board, board_from, read_board
 from freeswing.calib.calibrate import calibrate_session
 from freeswing.calib.camera.cameras_file import read_cameras, write_cameras
 from freeswing.calib.rig.triangulation import triangulate

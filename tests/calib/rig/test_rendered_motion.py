@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from freeswing.calib.board.boards import board_from
-from freeswing.calib.board.detection import BoardDetector
+from freeswing.calib.board.board_corners import BoardDetector
+from freeswing.calib.board.declared_board import board_from
 from freeswing.calib.tags.tag_bend import fit_bias, pattern_edges
 from freeswing.vision.render.render_scene import Look, Renderer, Scene, still
 from tests.calib import films, rigs

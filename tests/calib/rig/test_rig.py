@@ -23,9 +23,9 @@ from freeswing.calib.rig.reprojection_kernels import WARP, local_rows
 from freeswing.calib.rig.solve_rig import free_unknowns, solve_rig, start_cameras, tie_to_base
 from freeswing.calib.rig.triangulation import triangulate
 from freeswing.calib.rig.views import FixedPoints
+from freeswing.calib.verdict.halves_and_lengths import check_truth
 from freeswing.calib.verdict.survey_check import check_survey
-from freeswing.calib.verdict.trust import judge
-from freeswing.calib.verdict.truth_checks import check_truth
+from freeswing.calib.verdict.verdict import judge
 from freeswing.cdpr.files.documents import DataError
 from tests.calib import rigs
 

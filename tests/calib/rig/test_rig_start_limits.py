@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from freeswing.calib.rig import bundle_adjustment, rig_start, solve_rig, swing_tie
+from freeswing.calib.rig import bundle_adjustment, solve_rig, tie_by_shared_boards, tie_by_swings
 
 
 class Reached(Exception):
@@ -29,7 +29,7 @@ def stub(**attributes: Any) -> Any:
 @pytest.mark.parametrize(("second", "groups"), [(1, [0, 0]), (2, [0, 1])])
 def test_one_moment_seen_by_both_ties_cameras(second, groups) -> None:
     views = stub(camera=np.array([0, 0, 1]), moment=np.array([0, 1, second]))
-    assert rig_start.board_groups(2, views).tolist() == groups
+    assert tie_by_shared_boards.board_groups(2, views).tolist() == groups
 
 
 @pytest.mark.parametrize(("off_px", "counted"), [(19.5, 19.5), (60.0, 20.0)])
@@ -38,7 +38,7 @@ def test_a_view_says_no_more_than_twenty_pixels_against_a_pose(off_px, counted) 
     camera = stub(project=lambda points: points[..., :2])
     pixels = np.zeros((1, 4, 2))
     pixels[..., 0] = off_px
-    found = rig_start._capped(camera, np.zeros((4, 3)), np.eye(4)[None], pixels)
+    found = tie_by_shared_boards._capped(camera, np.zeros((4, 3)), np.eye(4)[None], pixels)
     assert found == pytest.approx(counted)
 
 
@@ -85,15 +85,15 @@ def test_a_view_keeps_four_corners(monkeypatch, corners, dropped) -> None:
 
 @pytest.mark.parametrize(("miss_px", "fits"), [(2.9, True), (3.1, False)])
 def test_a_platform_that_misses_by_three_pixels_is_another_one(monkeypatch, miss_px, fits) -> None:
-    monkeypatch.setattr(swing_tie, "pose_from_points", lambda *_: np.eye(4))
+    monkeypatch.setattr(tie_by_swings, "pose_from_points", lambda *_: np.eye(4))
     camera = stub(project=lambda points: points[..., :2])
     pixels = np.full((1, 4, 2), miss_px)
-    _, good = swing_tie._poses(camera, stub(points_m=np.zeros((4, 3))), pixels)
+    _, good = tie_by_swings._poses(camera, stub(points_m=np.zeros((4, 3))), pixels)
     assert good.tolist() == [fits]
 
 
 def test_two_runs_tie_cameras(monkeypatch) -> None:
-    monkeypatch.setattr(swing_tie, "find_recordings", lambda _: ())
-    monkeypatch.setattr(swing_tie, "see_platform", lambda *_: ())
-    films = swing_tie.SwingFilms(stub(), (("a", "a"), ("b", "b"), ("c", "c")))
+    monkeypatch.setattr(tie_by_swings, "find_recordings", lambda _: ())
+    monkeypatch.setattr(tie_by_swings, "see_platform", lambda *_: ())
+    films = tie_by_swings.SwingFilms(stub(), (("a", "a"), ("b", "b"), ("c", "c")))
     assert [swing.name for swing in films.seen((), None)] == ["a", "b"]

@@ -13,11 +13,11 @@ import pytest
 
 from freeswing.calib.camera.camera import Camera
 from freeswing.calib.camera.cameras_file import read_cameras
-from freeswing.calib.rig.rig_start import base_tie, board_groups
 from freeswing.calib.rig.solve_rig import solve_rig, start_cameras
+from freeswing.calib.rig.tie_by_shared_boards import base_tie, board_groups
 from freeswing.calib.rig.triangulation import triangulate
 from freeswing.calib.rig.views import FixedPoints, Views, make_views
-from freeswing.calib.verdict.truth_checks import rigidly_fitted, volume_std_m
+from freeswing.calib.verdict.halves_and_lengths import rigidly_fitted, volume_std_m
 from freeswing.cdpr.files.documents import DataError, dump_toml
 from freeswing.cdpr.measured.target import Tag, Target, write_target
 from freeswing.cdpr.rotation import exp_rotation, invert, log_rotation, transform

@@ -11,6 +11,7 @@ import pytest
 from freeswing.calib.camera.camera import Camera
 from freeswing.calib.rig.normal_equations import Problem
 from freeswing.calib.scene.calibrate_scene import calibrate_scene, refuse_untied
+from freeswing.calib.scene.clicked_points import Click, clicked, read_clicks
 from freeswing.calib.scene.lab_map import LabMap
 from freeswing.calib.scene.map_frame import (
     DISTANCE_SIGMAS,
@@ -20,7 +21,6 @@ from freeswing.calib.scene.map_frame import (
     tied_to_survey,
     with_distances,
 )
-from freeswing.calib.scene.marks import Click, clicked, read_clicks
 from freeswing.calib.scene.scene_rig import chosen_points, rig_of_map, rig_part
 from freeswing.calib.scene.scene_verdict import (
     SceneChecks,

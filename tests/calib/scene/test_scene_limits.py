@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from freeswing.calib.scene import stills
+from freeswing.calib.scene.clicked_points import read_clicks
 from freeswing.calib.scene.map_frame import scale_of, similarity
-from freeswing.calib.scene.marks import read_clicks
 from freeswing.calib.scene.scene_rig import _kept, chosen_points, feature_variance, small_blobs
 from freeswing.calib.scene.tape_measured import Distance
 from freeswing.cdpr.files.documents import DataError, InputError

@@ -14,7 +14,7 @@ import pytest
 from freeswing.calib.camera.camera import Camera
 from freeswing.calib.camera.cameras_file import read_cameras
 from freeswing.calib.rig.triangulation import triangulate
-from freeswing.calib.verdict.truth_checks import rigidly_fitted
+from freeswing.calib.verdict.halves_and_lengths import rigidly_fitted
 from freeswing.cdpr.rotation import invert
 from freeswing.main import main
 from freeswing.vision.look.video import write_video

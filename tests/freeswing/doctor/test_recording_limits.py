@@ -9,7 +9,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from freeswing.calib.footage.condition import Condition
+from freeswing.calib.footage.first_frames import Condition
 from freeswing.doctor import recordings
 
 
@@ -21,7 +21,7 @@ def test_three_in_a_hundred_frames_may_repeat_the_one_before(monkeypatch, copies
         "freeswing.calib.footage.frame_times.frame_times", lambda recording, rate: times
     )
     monkeypatch.setattr(
-        "freeswing.calib.footage.condition.condition_of",
+        "freeswing.calib.footage.first_frames.condition_of",
         lambda recording, least: Condition(1000, copies, is_torn=False),
     )
     recording = SimpleNamespace(path=Path("a.mp4"), name="a")

@@ -12,12 +12,12 @@ import cv2
 import numpy as np
 import trimesh
 
-from freeswing.calib.board.boards import board_from
-from freeswing.calib.board.detection import BoardDetector
+from freeswing.calib.board.board_corners import BoardDetector
+from freeswing.calib.board.declared_board import board_from
 from freeswing.calib.board.kept_boards import KeptBoards
 from freeswing.calib.board.recordings import Recording, find_recordings, read_frames
 from freeswing.calib.exchange import colmap_binary
-from freeswing.calib.footage.condition import condition_of
+from freeswing.calib.footage.first_frames import condition_of
 from freeswing.calib.footage.frame_times import frame_times
 from freeswing.calib.verdict.plumb_line_file import read_plumb_line
 from freeswing.cdpr.files.drive_csv import read_drive_run, read_static, run_columns, static_columns

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from freeswing.calib import exchange
-from freeswing.calib.board.boards import read_board
+from freeswing.calib.board.declared_board import read_board
 from freeswing.calib.board.recordings import Recording
 from freeswing.calib.camera.camera import Camera
 from freeswing.calib.camera.cameras_file import read_cameras, write_cameras

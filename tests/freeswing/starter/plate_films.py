@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from freeswing.calib.board.boards import board_from
+from freeswing.calib.board.declared_board import board_from
 from freeswing.calib.camera.camera import Camera
 from freeswing.cdpr.measured.target import read_target
 from freeswing.cdpr.measured.trajectory import Trajectory

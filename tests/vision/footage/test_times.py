@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from freeswing.calib.camera.cameras_file import read_cameras
-from freeswing.calib.footage.presentation import evened
+from freeswing.calib.footage.container_times import evened
 from freeswing.main import main
 from tests.vision.footage.sessions import (
     RATE_HZ,

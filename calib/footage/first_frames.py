@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from freeswing.calib.board.recordings import Recording, read_frames
-from freeswing.calib.footage.copies import COMB_RATIO, comb_ratio, with_copies
+from freeswing.calib.footage.copied_frames import COMB_RATIO, comb_ratio, with_copies
 
 _ENOUGH_MOVING = 12  # pairs of frames with motion, of which the median is taken
 _MOST_FRAMES = 150

@@ -14,15 +14,15 @@ from pathlib import Path
 
 import numpy as np
 
-from freeswing.calib.board.board_motion import NONE, REST, Timeline
-from freeswing.calib.board.platform_tags import PlatformTags
+from freeswing.calib.board.motion_pieces import NONE, REST, Timeline
+from freeswing.calib.board.platform_as_board import PlatformTags
 from freeswing.calib.board.recordings import find_recordings
 from freeswing.calib.board.sightings import Sightings, gather, see_platform
 from freeswing.calib.camera.camera import Camera
 from freeswing.calib.camera.intrinsics import CameraStart
 from freeswing.calib.camera.lens_models import Array
 from freeswing.calib.rig.coarse_clocks import coarse_clocks
-from freeswing.calib.rig.rig_start import board_groups, pose_from_points
+from freeswing.calib.rig.tie_by_shared_boards import board_groups, pose_from_points
 from freeswing.calib.rig.views import Views, joined_views
 from freeswing.cdpr.system.progress import Progress
 

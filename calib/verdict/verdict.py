@@ -12,7 +12,8 @@ from freeswing.calib.camera.lens_models import PARAMETER_NAMES
 from freeswing.calib.rig.bundle_adjustment import named
 from freeswing.calib.rig.reprojection import board_size, camera_slices
 from freeswing.calib.rig.solve_rig import Rig
-from freeswing.calib.verdict.grades import (
+from freeswing.calib.verdict.halves_and_lengths import TruthChecks
+from freeswing.calib.verdict.limits_of_use import (
     CameraNumbers,
     Finding,
     RigNumbers,
@@ -20,7 +21,6 @@ from freeswing.calib.verdict.grades import (
     rig_findings,
 )
 from freeswing.calib.verdict.survey_check import SurveyCheck
-from freeswing.calib.verdict.truth_checks import TruthChecks
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,7 @@
 """The platform's tags in recordings of swings: at any instant all cameras see one rigid body.
 
 Found and fitted as a board's tags are; the body they make is not flat, and its corners are those of
-target.toml. Cameras that never see a board together are tied by it (`calib.rig.swing_tie`).
+target.toml. Cameras that never see a board together are tied by it (`calib.rig.tie_by_swings`).
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from freeswing.calib.board.detection import (
+from freeswing.calib.board.board_corners import (
     LEAST_STD_PX,
     BoardCorners,
     Image,

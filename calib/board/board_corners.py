@@ -2,8 +2,8 @@
 
 Tags of a ChArUco board or an AprilGrid are found by OpenCV and then fitted, pattern against pixels
 (`calib.tags.corners`): 0.01 px where the crossings between squares give 0.09 px, pulled by the
-markers beside them. Circles: `calib.board.circles`. Pixel (0, 0) is the centre of the top-left
-pixel throughout.
+markers beside them. Circles: `calib.board.circle_grid_corners`. Pixel (0, 0) is the centre of the
+top-left pixel throughout.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from freeswing.calib.board.boards import CIRCLES, Board
-from freeswing.calib.board.chessboards import ChessboardFinder
-from freeswing.calib.board.circles import find_circles
+from freeswing.calib.board.chessboard_corners import ChessboardFinder
+from freeswing.calib.board.circle_grid_corners import find_circles
+from freeswing.calib.board.declared_board import CIRCLES, Board
 from freeswing.calib.camera.lens_models import Array
 from freeswing.calib.tags.corners import TagFit, fit_tag, rimmed_cells
 from freeswing.calib.tags.tag_patterns import cut_dictionary

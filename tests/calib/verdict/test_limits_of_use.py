@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import pytest
 
-from freeswing.calib.verdict.grades import (
+from freeswing.calib.verdict.halves_and_lengths import spread_of
+from freeswing.calib.verdict.limits_of_use import (
     CameraNumbers,
     RigNumbers,
     camera_findings,
     rig_findings,
 )
-from freeswing.calib.verdict.truth_checks import spread_of
 
 GOOD = CameraNumbers("a", "OPENCV", 20, 0, 40.0, 0.6, (), 5e-4, 0.1, 0.11, 0.1, 2)
 GOOD_RIG = RigNumbers(2, 40, 40, "", 2e-4, 300, 2e-4, 3e-4)

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from freeswing.calib.board.boards import Board
-from freeswing.calib.board.detection import BoardDetector
+from freeswing.calib.board.board_corners import BoardDetector
+from freeswing.calib.board.declared_board import Board
 from freeswing.calib.board.planar_pose import flatness_errors
 from freeswing.calib.camera.lens_models import Array
 from freeswing.cdpr.files.documents import DataError
