@@ -19,7 +19,6 @@ from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.files.robot_file import read_robot
 from freeswing.cdpr.robot import Cable, Robot
 from freeswing.cdpr.system.progress import Progress
-from freeswing.homing.acquisition import default_tensions
 from freeswing.homing.arrow_least_squares import covariance
 from freeswing.homing.fit_start_pose import StartProblem
 from freeswing.homing.guess_from_tensions import (
@@ -30,6 +29,7 @@ from freeswing.homing.guess_from_tensions import (
 )
 from freeswing.homing.homing_files import Homing, ReadingNoise, Readings
 from freeswing.homing.rest_readings import RestModel
+from freeswing.homing.simulated_acquisition import default_tensions
 
 Array = NDArray[np.float64]
 

@@ -15,7 +15,7 @@ from freeswing.ident.fidim.fidim import FidimEstimate
 from freeswing.ident.fidim.payload_mass import MassEstimate
 from freeswing.ident.fidim.shares import Share
 from freeswing.ident.fidim.weighted_least_squares import WeightedSolution
-from freeswing.ident.judge.consistency import Consistency, consistency
+from freeswing.ident.judge.physical_consistency import Consistency, consistency
 from freeswing.ident.runs import DroppedRun
 
 

@@ -27,7 +27,7 @@ from freeswing.ident.likelihood.calibration_modes import freed
 from freeswing.ident.likelihood.session_estimates import Asked
 from freeswing.ident.runs import SwingRun
 from freeswing.ident.signals.derivatives import SignalSettings
-from freeswing.ident.signals.prepare import (
+from freeswing.ident.signals.usable_runs import (
     LARGEST_AMPLIFICATION,
     PreparedRun,
     PreparedRuns,

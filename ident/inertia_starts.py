@@ -11,8 +11,8 @@ from freeswing.cdpr.model.free_motion import choose_free_coordinates
 from freeswing.cdpr.model.regressor import regressor
 from freeswing.cdpr.robot import Array
 from freeswing.ident.fidim.fidim import fidim
-from freeswing.ident.judge.consistency import is_possible
-from freeswing.ident.signals.prepare import PreparedRuns, guessed_inertia, usable
+from freeswing.ident.judge.physical_consistency import is_possible
+from freeswing.ident.signals.usable_runs import PreparedRuns, guessed_inertia, usable
 
 _POSES_A_RUN = 10
 

@@ -11,7 +11,7 @@ from freeswing.cdpr.model.free_motion import amplification
 from freeswing.cdpr.model.statics import equilibrium_at_lengths, modes
 from freeswing.cdpr.robot import Array, Robot
 from freeswing.ident.identify import Identification
-from freeswing.ident.signals.prepare import PreparedRun
+from freeswing.ident.signals.usable_runs import PreparedRun
 
 
 def swing_places(robot: Robot, found: Identification) -> list[dict[str, Any]]:

@@ -19,8 +19,8 @@ from freeswing.cdpr.files.robot_file import read_robot
 from freeswing.servo.design.plant import plant_at
 from freeswing.servo.files.weights_file import read_weights
 from freeswing.servo.synthesis.four_block import weighted
+from freeswing.servo.synthesis.gamma_search import synthesise
 from freeswing.servo.synthesis.riccati import StandardProblem
-from freeswing.servo.synthesis.search import synthesise
 from freeswing.servo.synthesis.state_space import StateSpace
 
 SAMPLE = "samples/inca-6d"

@@ -31,10 +31,10 @@ from freeswing.ident.likelihood.blocks import first_unknowns
 from freeswing.ident.likelihood.fit import fit
 from freeswing.ident.likelihood.fit_swings import FreeSwing, Swings
 from freeswing.ident.likelihood.guess_run_start import first_state
-from freeswing.ident.likelihood.raw_samples import prepare
+from freeswing.ident.likelihood.samples_and_noise import prepare
 from freeswing.ident.runs import SwingRun
 from freeswing.ident.signals.derivatives import SignalSettings
-from freeswing.ident.signals.prepare import prepare_runs
+from freeswing.ident.signals.usable_runs import prepare_runs
 from tests.ident.swings import PAPER_LENGTHS_M, TRUE_INERTIA, paper_model, recorded, tilted_swing
 
 NOISE_M = 1e-4

@@ -16,9 +16,9 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-from freeswing.homing.acquisition import PERFECT, AcquisitionErrors, simulate_acquisition
 from freeswing.homing.home import find_start
 from freeswing.homing.homing_files import GeometryNoise, Homing, ReadingNoise, Readings
+from freeswing.homing.simulated_acquisition import PERFECT, AcquisitionErrors, simulate_acquisition
 from tests.paper_robots import LARGEST_N, PERTURBED_N, START_N, bologna_3
 
 PAPER_ERRORS_MM = (5.7, 9.9, 11.5, 13.4, 23.4)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.cdpr.files.documents import InputError, read_bytes, replace_file
-from freeswing.cdpr.files.mocap.gaps import without_gaps
+from freeswing.cdpr.files.mocap.fill_values import without_gaps
 from freeswing.cdpr.files.number_table import LARGEST_NUMBER
 from freeswing.cdpr.measured.marker_recording import MarkerRecording
 

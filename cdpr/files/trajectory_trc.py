@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.cdpr.files.documents import InputError, Problems, replace_file
-from freeswing.cdpr.files.mocap.gaps import without_gaps
+from freeswing.cdpr.files.mocap.fill_values import without_gaps
 from freeswing.cdpr.files.number_table import (
     NumberTable,
     check_times,

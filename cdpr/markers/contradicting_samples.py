@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from freeswing.cdpr.markers.jumps import JUMP_DEVIATIONS, Jump
+from freeswing.cdpr.markers.marker_jumps import JUMP_DEVIATIONS, Jump
 from freeswing.cdpr.markers.spoiling_markers import Rigidity
 
 # Below this it is the common drift of half-hidden markers, which the covariances hold.

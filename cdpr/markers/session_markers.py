@@ -13,11 +13,11 @@ from freeswing.cdpr.markers.common_frame import common_frame
 from freeswing.cdpr.markers.contradicting_samples import stand_outs
 from freeswing.cdpr.markers.distances import pairs_of, typical_distances
 from freeswing.cdpr.markers.exchanged_labels import renamed
-from freeswing.cdpr.markers.jumps import Jump, Mended, mended
-from freeswing.cdpr.markers.layout import Alignment, SessionLayout, align, session_layout
+from freeswing.cdpr.markers.layouts_aligned import Alignment, SessionLayout, align, session_layout
+from freeswing.cdpr.markers.marker_jumps import Jump, Mended, mended
+from freeswing.cdpr.markers.marker_units import unit_between
 from freeswing.cdpr.markers.slow_residuals import slow_share
 from freeswing.cdpr.markers.spoiling_markers import Rigidity, marker_weights, rigidity
-from freeswing.cdpr.markers.units import unit_between
 from freeswing.cdpr.measured.marker_recording import MarkerRecording
 from freeswing.cdpr.measured.pose_errors import PoseErrors
 from freeswing.cdpr.measured.rigid_fit import fit_rigid, pose_covariances
@@ -114,7 +114,7 @@ def examine(
 
 
 def common_layout(target: Target, runs: Sequence[Examined]) -> SessionLayout:
-    """The one layout of the session; see `cdpr.markers.layout.session_layout`.
+    """The one layout of the session; see `cdpr.markers.layouts_aligned.session_layout`.
 
     Raises:
         DataError: where which marker is off cannot be told, and the answer matters.

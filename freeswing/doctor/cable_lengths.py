@@ -6,14 +6,14 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from freeswing.cdpr.measured.frame_change import UP_TURNS, moved_trajectory
+from freeswing.cdpr.measured.recording_to_base_frame import UP_TURNS, moved_trajectory
 from freeswing.cdpr.measured.trajectory import Trajectory
 from freeswing.cdpr.model.batch import evaluate
 from freeswing.cdpr.model.equations import build_model
 from freeswing.cdpr.robot import Robot
 from freeswing.cdpr.rotation import transform
 from freeswing.doctor.finding import Finding
-from freeswing.doctor.quaternions import mistaken_quaternions
+from freeswing.doctor.mistaken_quaternions import mistaken_quaternions
 from freeswing.ident.runs import SwingRun
 from freeswing.session.exchanged_lengths import (
     LENGTH_DIFFERENCE_M,

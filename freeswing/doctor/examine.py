@@ -11,15 +11,15 @@ from freeswing.cdpr.robot import Robot
 from freeswing.cdpr.system.progress import Progress
 from freeswing.doctor.bench_runs import bench_findings
 from freeswing.doctor.finding import Finding
-from freeswing.doctor.geometry import robot_findings
-from freeswing.doctor.markers import marker_findings
-from freeswing.doctor.motion import run_findings
-from freeswing.doctor.recordings import (
+from freeswing.doctor.footage import (
     calibration_findings,
     footage_findings,
     video_findings,
 )
+from freeswing.doctor.geometry import robot_findings
+from freeswing.doctor.markers import marker_findings
 from freeswing.doctor.run_roles import split_findings
+from freeswing.doctor.run_samples import run_findings
 from freeswing.ident.runs import SwingRun
 from freeswing.session.load_bench import is_bench
 from freeswing.session.load_swings import load_robot, load_swing, load_target, trajectory_path

@@ -16,7 +16,7 @@ from freeswing.cdpr.model.equations import Model, build_model
 from freeswing.cdpr.robot import POSE_COORDINATES, Array, Robot, spread_of
 from freeswing.ident.bench.runs import Bench, BenchRun
 from freeswing.ident.likelihood.rest_pose import rest_near
-from freeswing.ident.signals.prepare import guessed_inertia
+from freeswing.ident.signals.usable_runs import guessed_inertia
 from freeswing.session.exchanged_lengths import BENCH_DIFFERENCE_M, LEFT_OVER, named_cables
 
 LEANS = ("phi", "theta")

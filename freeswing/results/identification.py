@@ -21,7 +21,7 @@ class DroppedRun(Entry):
 
 @entry
 class Consistency(Entry):
-    """Whether a body can have the inertia; see `ident.judge.consistency`."""
+    """Whether a body can have the inertia; see `ident.judge.physical_consistency`."""
 
     possible: bool = True
     held: bool = False

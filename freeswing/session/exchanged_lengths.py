@@ -21,7 +21,7 @@ from freeswing.cdpr.robot import POSE_COORDINATES, Array, Robot
 from freeswing.ident.likelihood.rest_pose import rest_near
 from freeswing.ident.runs import SwingRun
 from freeswing.ident.signals.derivatives import UnusableRunError, signals_of
-from freeswing.ident.signals.prepare import guessed_inertia
+from freeswing.ident.signals.usable_runs import guessed_inertia
 
 # Told lengths come from a tape or from counted turns, good to a few mm; 20 mm is another cable's.
 LENGTH_DIFFERENCE_M = 0.02

@@ -20,7 +20,7 @@ from freeswing.results.tracking import Tracking
 from freeswing.session.load_swings import load_trajectory, trajectory_path
 from freeswing.session.marker_runs import read_marker_runs
 from freeswing.session.session_file import Run, Session
-from freeswing.vision.planar.straight_wires import check_hangs_straight
+from freeswing.vision.planar.axes_at_rest import check_hangs_straight
 
 
 def is_bench(session: Session, robot: Robot) -> bool:

@@ -8,9 +8,9 @@ from pathlib import Path
 from freeswing.cdpr.files.documents import DataError, InputError
 from freeswing.cdpr.files.robot_file import read_robot
 from freeswing.cdpr.files.trajectory_files import read_trajectory
-from freeswing.cdpr.measured.frame_change import moved_trajectory
 from freeswing.cdpr.measured.held_doubled_wild import check_stamps, sound_samples
 from freeswing.cdpr.measured.pose_errors import PoseErrors, read_pose_errors
+from freeswing.cdpr.measured.recording_to_base_frame import moved_trajectory
 from freeswing.cdpr.measured.target import Target, read_target
 from freeswing.cdpr.measured.trajectory import Trajectory
 from freeswing.cdpr.model.equations import LARGEST_SWINGING

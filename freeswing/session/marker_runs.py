@@ -8,7 +8,7 @@ from functools import partial
 from freeswing.cdpr.files.problems import DataError, InputError
 from freeswing.cdpr.files.trajectory_files import holds_markers, read_recording
 from freeswing.cdpr.markers.from_recording import fixes_poses
-from freeswing.cdpr.markers.layout import SessionLayout
+from freeswing.cdpr.markers.layouts_aligned import SessionLayout
 from freeswing.cdpr.markers.session_markers import (
     Examined,
     RunMarkers,
@@ -16,8 +16,8 @@ from freeswing.cdpr.markers.session_markers import (
     examine,
     place,
 )
-from freeswing.cdpr.measured.frame_change import moved_recording
 from freeswing.cdpr.measured.pose_errors import PoseErrors
+from freeswing.cdpr.measured.recording_to_base_frame import moved_recording
 from freeswing.cdpr.measured.target import Target
 from freeswing.cdpr.measured.trajectory import Trajectory
 from freeswing.cdpr.system.threads import side_by_side

@@ -27,7 +27,7 @@ from freeswing.session.bench_keys import (
     read_placed,
     read_planar,
 )
-from freeswing.session.mocap_frame import read_mocap_frame
+from freeswing.session.mocap_keys import read_mocap_frame
 
 Array = NDArray[np.float64]
 

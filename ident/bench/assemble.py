@@ -41,7 +41,7 @@ from freeswing.ident.bench.priors.wire_priors import (
 from freeswing.ident.bench.runs import Bench, BenchRun, Load
 from freeswing.ident.bench.swing import COMMON, BenchSwing, Column, Riding
 from freeswing.ident.likelihood.unknowns import Gaussian, Unknown, Unknowns
-from freeswing.ident.signals.prepare import guessed_inertia
+from freeswing.ident.signals.usable_runs import guessed_inertia
 
 EFFECTS = ("rotational_drag", "translational_drag")  # air is never absent
 UNIT_NOISE_M, UNIT_NOISE_RAD = 1e-4, 5e-4

@@ -12,11 +12,11 @@ from freeswing.cdpr.model.equations import build_model
 from freeswing.cdpr.robot import POSE_COORDINATES, Array, Robot
 from freeswing.ident.bench.assemble import EFFECTS, assembled
 from freeswing.ident.bench.channels import check_moves
+from freeswing.ident.bench.fit_rounds import Solved, solved
 from freeswing.ident.bench.priors.wire_priors import with_lengths
 from freeswing.ident.bench.runs import Bench, BenchRun, Signal, check_swings
-from freeswing.ident.bench.solve import Solved, solved
 from freeswing.ident.bench.told.budget import budget
-from freeswing.ident.bench.told.classic import (
+from freeswing.ident.bench.told.classic_formula import (
     ClassicRun,
     classic_runs,
     held_sentences,

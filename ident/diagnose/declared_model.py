@@ -14,7 +14,7 @@ from freeswing.cdpr.robot import Array, Robot
 from freeswing.cdpr.system.progress import Progress
 from freeswing.ident.diagnose.outstanding_runs import tempered
 from freeswing.ident.diagnose.spectrum import residual_powers
-from freeswing.ident.judge.consistency import is_possible
+from freeswing.ident.judge.physical_consistency import is_possible
 from freeswing.ident.likelihood.blocks import INERTIA, first_unknowns
 from freeswing.ident.likelihood.fit import fit
 from freeswing.ident.likelihood.fit_swings import (
@@ -25,7 +25,7 @@ from freeswing.ident.likelihood.fit_swings import (
     Swings,
 )
 from freeswing.ident.likelihood.session_estimates import astray, begun
-from freeswing.ident.signals.prepare import PreparedRun
+from freeswing.ident.signals.usable_runs import PreparedRun
 
 # One run is left out at a time: two others have to agree.
 LEAST_RUNS = 3

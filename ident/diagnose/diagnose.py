@@ -49,10 +49,10 @@ from freeswing.ident.judge.prediction import Stage
 from freeswing.ident.likelihood.calibration_modes import amplitudes_of, with_calibration
 from freeswing.ident.likelihood.fit import fit
 from freeswing.ident.likelihood.fit_swings import FreeSwing, LikelihoodFit
-from freeswing.ident.likelihood.raw_samples import UNIT_NOISE_M, UNIT_NOISE_RAD
+from freeswing.ident.likelihood.samples_and_noise import UNIT_NOISE_M, UNIT_NOISE_RAD
 from freeswing.ident.runs import SwingRun
 from freeswing.ident.signals.derivatives import SignalSettings
-from freeswing.ident.signals.prepare import PreparedRun, prepare_runs
+from freeswing.ident.signals.usable_runs import PreparedRun, prepare_runs
 
 FORMAT = "freeswing-diagnosis/1"
 NOTHING_TO_CHECK = (

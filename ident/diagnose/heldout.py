@@ -19,7 +19,7 @@ from freeswing.ident.diagnose.answer.averages import median, rms
 from freeswing.ident.judge.prediction import Prediction, Stage, predict_in_turn
 from freeswing.ident.likelihood.calibration_modes import freed
 from freeswing.ident.signals.derivatives import SignalSettings
-from freeswing.ident.signals.prepare import PreparedRun, prepare_runs
+from freeswing.ident.signals.usable_runs import PreparedRun, prepare_runs
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,6 +20,7 @@ from freeswing.cdpr.effects import effect_named
 from freeswing.cdpr.robot import Array, Robot
 from freeswing.cdpr.system.lifeline import tie_to
 from freeswing.cdpr.system.progress import Progress
+from freeswing.ident.diagnose.backward_removal import is_no_worse, superfluous
 from freeswing.ident.diagnose.decision import (
     LARGEST_EXCESS_LEFT,
     LEAST_EXCESS_LATER,
@@ -42,7 +43,6 @@ from freeswing.ident.diagnose.refit import (
     rescored,
     without,
 )
-from freeswing.ident.diagnose.removal import is_no_worse, superfluous
 from freeswing.ident.diagnose.screen import Screen, screen
 from freeswing.ident.diagnose.spectrum import Residual, too_small
 from freeswing.ident.diagnose.variants import effect_of, inside, variants

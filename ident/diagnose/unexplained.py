@@ -10,7 +10,7 @@ from freeswing.cdpr.robot import Array
 from freeswing.ident.diagnose.spectrum import common_frequencies, mean_log_spectrum, too_small
 from freeswing.ident.likelihood.fit_swings import LikelihoodFit
 from freeswing.ident.likelihood.run_residuals import predicted, residuals
-from freeswing.ident.signals.prepare import PreparedRun
+from freeswing.ident.signals.usable_runs import PreparedRun
 
 # What white noise does not leave: more power than its own, and that at low frequencies. A hint has
 # three terms of generic forces at most, each of which explains three per cent of the missing one.

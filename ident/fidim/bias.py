@@ -23,7 +23,7 @@ from freeswing.ident.fidim.total_least_squares import least_by_noise
 from freeswing.ident.fidim.weighted_least_squares import NoisyRegressor
 from freeswing.ident.signals.derivatives import SignalSettings, signals_of
 from freeswing.ident.signals.motions import free_motion, full_motion
-from freeswing.ident.signals.prepare import PreparedRun, motion_of, signals_used
+from freeswing.ident.signals.usable_runs import PreparedRun, motion_of, signals_used
 
 # A share that moves by less than half a scatter changes the deviation by a tenth.
 SETTLED = 0.5

@@ -20,7 +20,7 @@ from freeswing.cdpr.robot import Array
 from freeswing.ident.fidim.shares import Share, Stack
 from freeswing.ident.likelihood.calibration_modes import mode_shifts
 from freeswing.ident.signals.motions import free_motion
-from freeswing.ident.signals.prepare import PreparedRun, motion_of, signals_used
+from freeswing.ident.signals.usable_runs import PreparedRun, motion_of, signals_used
 
 
 def calibration_share(

@@ -16,7 +16,7 @@ from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.model.regressor import SwingMotion, regressor
 from freeswing.ident.fidim.shares import Share, Stack
 from freeswing.ident.signals.motions import free_motion, mean_lengths
-from freeswing.ident.signals.prepare import PreparedRun, motion_of, signals_used
+from freeswing.ident.signals.usable_runs import PreparedRun, motion_of, signals_used
 
 
 def ends_share(model: Model, runs: Sequence[PreparedRun], full: bool, stack: Stack) -> Share:

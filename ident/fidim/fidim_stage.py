@@ -27,12 +27,12 @@ from freeswing.ident.fidim.weighted_least_squares import (
     weighing,
     weighted_fidim,
 )
-from freeswing.ident.judge.consistency import nearest_possible
 from freeswing.ident.judge.free_against_full import between_runs
+from freeswing.ident.judge.physical_consistency import nearest_possible
 from freeswing.ident.likelihood.between_runs import widened
 from freeswing.ident.runs import DroppedRun
 from freeswing.ident.signals.derivatives import SignalSettings
-from freeswing.ident.signals.prepare import (
+from freeswing.ident.signals.usable_runs import (
     PreparedRun,
     PreparedRuns,
     left_out,

@@ -14,9 +14,9 @@ import numpy as np
 from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.model.regressor import regressor
 from freeswing.ident.fidim.shares import Share, Stack
-from freeswing.ident.likelihood.raw_samples import length_std
+from freeswing.ident.likelihood.samples_and_noise import length_std
 from freeswing.ident.signals.motions import free_motion
-from freeswing.ident.signals.prepare import PreparedRun, motion_of, signals_used
+from freeswing.ident.signals.usable_runs import PreparedRun, motion_of, signals_used
 
 
 def length_share(model: Model, runs: Sequence[PreparedRun], stack: Stack) -> Share | None:

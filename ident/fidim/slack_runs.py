@@ -8,7 +8,7 @@ from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.robot import Array
 from freeswing.ident.fidim.fidim import FidimEstimate
 from freeswing.ident.signals.motions import lowest_tension
-from freeswing.ident.signals.prepare import (
+from freeswing.ident.signals.usable_runs import (
     PreparedRuns,
 )
 

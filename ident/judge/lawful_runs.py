@@ -22,7 +22,7 @@ from freeswing.ident.judge.prediction import predict
 from freeswing.ident.likelihood.fit_swings import LikelihoodFit
 from freeswing.ident.likelihood.session_estimates import Asked, from_starts, is_refuted
 from freeswing.ident.runs import DroppedRun
-from freeswing.ident.signals.prepare import PreparedRun
+from freeswing.ident.signals.usable_runs import PreparedRun
 
 # Times the worst run: one bad run may take others with it, which leave together.
 AS_BAD = 0.95

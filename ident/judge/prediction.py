@@ -23,7 +23,7 @@ from freeswing.ident.likelihood.run_residuals import Samples, predicted, residua
 from freeswing.ident.likelihood.session_estimates import sampled, started
 from freeswing.ident.likelihood.unknowns import Unknowns
 from freeswing.ident.signals.band import independent_numbers
-from freeswing.ident.signals.prepare import PreparedRun
+from freeswing.ident.signals.usable_runs import PreparedRun
 
 # Ten samples a period at the 5 Hz where swings of a platform end (`band.LOWEST_PASS_HZ`).
 PREDICTED_HZ = 50.0

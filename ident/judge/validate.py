@@ -10,7 +10,7 @@ from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.model.regressor import regressor
 from freeswing.cdpr.robot import POSE_COORDINATES, Array
 from freeswing.ident.judge.prediction import Prediction, predict
-from freeswing.ident.signals.prepare import PreparedRun
+from freeswing.ident.signals.usable_runs import PreparedRun
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,7 +17,7 @@ from freeswing.cdpr.descent import Stop
 from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.robot import Array
 from freeswing.cdpr.simulation.free_swing import Motion
-from freeswing.cdpr.simulation.nearby import obeys
+from freeswing.cdpr.simulation.simplified_newton import obeys
 from freeswing.cdpr.system.progress import Progress
 from freeswing.ident.likelihood.between_runs import jackknife_std
 from freeswing.ident.likelihood.blocks import (
@@ -56,7 +56,7 @@ class Swings:
 
     Attributes:
         model: the equations, with the effects to be estimated.
-        samples: one a run; see `ident.likelihood.raw_samples.prepare`.
+        samples: one a run; see `ident.likelihood.samples_and_noise.prepare`.
         scales: factors on the stated (or unit) noise of metres and radians, (2,).
         motions: of the runs, where known: not simulated again where the unknowns are theirs.
     """

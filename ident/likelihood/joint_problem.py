@@ -12,10 +12,10 @@ from freeswing.cdpr.model.free_motion import admissible_rates
 from freeswing.cdpr.model.known_values import prior_whitener
 from freeswing.cdpr.robot import Array
 from freeswing.cdpr.simulation.free_swing import LARGEST_TAIL, Motion, simulate, tails
-from freeswing.cdpr.simulation.nearby import Surroundings
 from freeswing.cdpr.simulation.sensitivity import linearise
+from freeswing.cdpr.simulation.simplified_newton import Surroundings
 from freeswing.cdpr.system.threads import side_by_side
-from freeswing.ident.judge.consistency import nearest_possible
+from freeswing.ident.judge.physical_consistency import nearest_possible
 from freeswing.ident.likelihood.fit import RANK_LIMIT
 from freeswing.ident.likelihood.payload_runs import Loads
 from freeswing.ident.likelihood.run_residuals import (

@@ -11,8 +11,8 @@ from freeswing.cdpr.robot import Array
 from freeswing.cdpr.system.progress import Progress
 from freeswing.ident.estimate import Estimate
 from freeswing.ident.fidim.fidim import WELL_IDENTIFIED_PERCENT, near_zero
-from freeswing.ident.judge.consistency import consistency, is_possible, nearest_possible
 from freeswing.ident.judge.free_swing_law import unexplained_motion
+from freeswing.ident.judge.physical_consistency import consistency, is_possible, nearest_possible
 from freeswing.ident.likelihood.between_runs import widened
 from freeswing.ident.likelihood.blocks import INERTIA, MODES, PAYLOADS, first_unknowns
 from freeswing.ident.likelihood.cable_ends import geometry_document, weighed_against_priors
@@ -25,10 +25,10 @@ from freeswing.ident.likelihood.fit import fit
 from freeswing.ident.likelihood.fit_swings import FreeSwing, LikelihoodFit, Swings
 from freeswing.ident.likelihood.guess_run_start import first_state
 from freeswing.ident.likelihood.payload_runs import Loads, mass_of
-from freeswing.ident.likelihood.raw_samples import prepare
 from freeswing.ident.likelihood.run_residuals import Samples
+from freeswing.ident.likelihood.samples_and_noise import prepare
 from freeswing.ident.runs import DroppedRun
-from freeswing.ident.signals.prepare import PreparedRun
+from freeswing.ident.signals.usable_runs import PreparedRun
 
 _ASTRAY = 0.5  # a lost swing is out of phase with its samples
 

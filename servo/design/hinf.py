@@ -9,10 +9,10 @@ from freeswing.servo.design.plant import PADE_ORDER, Plant, state_names
 from freeswing.servo.synthesis.assumptions import failures
 from freeswing.servo.synthesis.discretise import pade
 from freeswing.servo.synthesis.four_block import weighted
+from freeswing.servo.synthesis.gamma_search import synthesise
 from freeswing.servo.synthesis.norm import hinf_norm
 from freeswing.servo.synthesis.reduction import truncate
 from freeswing.servo.synthesis.riccati import StandardProblem
-from freeswing.servo.synthesis.search import synthesise
 from freeswing.servo.synthesis.state_space import StateSpace, close, series
 from freeswing.servo.synthesis.weights import Filter, Part, Weights
 

@@ -15,7 +15,7 @@ import numpy as np
 from freeswing.cdpr.driven.model import DrivenModel
 from freeswing.cdpr.system.progress import Progress
 from freeswing.servo.design.controller import Controller
-from freeswing.servo.design.draws import DRAWS, Cloud
+from freeswing.servo.design.drawn_robots import DRAWS, Cloud
 from freeswing.servo.design.offer import Order
 from freeswing.servo.design.plant import Plant, plant_at
 from freeswing.servo.design.schedule import Schedule, scheduled

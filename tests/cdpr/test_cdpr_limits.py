@@ -18,7 +18,7 @@ from freeswing.cdpr.files.robot_file import read_robot
 from freeswing.cdpr.mesh.nominal_inertia import _check_body, _check_size
 from freeswing.cdpr.mesh.separate_bodies import _touches
 from freeswing.cdpr.model.undefined_poses import domain_problems
-from freeswing.cdpr.simulation import nearby
+from freeswing.cdpr.simulation import simplified_newton
 from tests.cdpr.driven_robots import INCA
 
 
@@ -109,13 +109,15 @@ def test_angles_end_six_hundredths_of_a_degree_before_ninety(monkeypatch, cosine
 @pytest.mark.parametrize(("ratio", "near"), [(0.68, True), (0.72, False)])
 def test_a_motion_is_near_while_changes_shrink_to_seven_tenths(monkeypatch, ratio, near):
     changes = iter(ratio ** np.arange(20.0))
-    monkeypatch.setattr(nearby, "_from", lambda aimed, *_: aimed)
-    monkeypatch.setattr(nearby, "_at_nodes", lambda *_: (0.0, 0.0))
-    monkeypatch.setattr(nearby, "only", lambda *_: None)
-    monkeypatch.setattr(nearby, "evaluate", lambda *_: [np.zeros((1, 4, 6))])
+    monkeypatch.setattr(simplified_newton, "_from", lambda aimed, *_: aimed)
+    monkeypatch.setattr(simplified_newton, "_at_nodes", lambda *_: (0.0, 0.0))
+    monkeypatch.setattr(simplified_newton, "only", lambda *_: None)
+    monkeypatch.setattr(simplified_newton, "evaluate", lambda *_: [np.zeros((1, 4, 6))])
     answer = np.zeros((1, 24))
     answer[0, 0] = 1.0
-    monkeypatch.setattr(nearby.Surroundings, "_answer", lambda *_: next(changes) * answer)
+    monkeypatch.setattr(
+        simplified_newton.Surroundings, "_answer", lambda *_: next(changes) * answer
+    )
     aimed = SimpleNamespace(
         steps_s=np.ones(1),
         starts_s=np.zeros(1),
@@ -123,8 +125,10 @@ def test_a_motion_is_near_while_changes_shrink_to_seven_tenths(monkeypatch, rati
         values=np.zeros(0),
         model=SimpleNamespace(acceleration=None),
     )
-    around = object.__new__(nearby.Surroundings)
-    settled = around._settled(aimed, np.zeros(12), np.zeros((1, 4, 6)), 0.1 / nearby.SETTLED)
+    around = object.__new__(simplified_newton.Surroundings)
+    settled = around._settled(
+        aimed, np.zeros(12), np.zeros((1, 4, 6)), 0.1 / simplified_newton.SETTLED
+    )
     assert (settled is not None) == near
 
 

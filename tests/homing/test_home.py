@@ -8,18 +8,18 @@ import pytest
 
 from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.files.robot_file import write_robot
-from freeswing.homing.acquisition import (
+from freeswing.homing.best_fit import best_fit, model_for
+from freeswing.homing.fit_start_pose import StartProblem
+from freeswing.homing.guess_from_tensions import TensionEnergy, guess_poses
+from freeswing.homing.home import find_start, home
+from freeswing.homing.homing_files import GeometryNoise, Homing, ReadingNoise, Readings
+from freeswing.homing.simulated_acquisition import (
     PERFECT,
     AcquisitionErrors,
     default_tensions,
     simulate_acquisition,
     simulate_homing,
 )
-from freeswing.homing.best_fit import best_fit, model_for
-from freeswing.homing.fit_start_pose import StartProblem
-from freeswing.homing.guess_from_tensions import TensionEnergy, guess_poses
-from freeswing.homing.home import find_start, home
-from freeswing.homing.homing_files import GeometryNoise, Homing, ReadingNoise, Readings
 from tests.paper_robots import LARGEST_N, PERTURBED_N, START_N, bologna_3, bologna_4
 
 REAL = AcquisitionErrors()

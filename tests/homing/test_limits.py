@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from freeswing.cdpr.files.documents import DataError
-from freeswing.homing import acquisition, best_fit, doubted_geometry, home, swivel_advice
-from freeswing.homing.acquisition import PERFECT, simulate_acquisition
+from freeswing.homing import best_fit, doubted_geometry, home, simulated_acquisition, swivel_advice
 from freeswing.homing.best_fit import PLAIN, ROBUST
 from freeswing.homing.guess_from_tensions import _weight_N
 from freeswing.homing.homing_files import Homing, ReadingNoise, Readings
 from freeswing.homing.reading_mistakes import suspect_readings
+from freeswing.homing.simulated_acquisition import PERFECT, simulate_acquisition
 from tests.paper_robots import LARGEST_N, START_N, bologna_3
 
 
@@ -152,13 +152,13 @@ def test_start_tensions_of_an_unknown_mass_hold_it_one_and_a_half_times() -> Non
 
 def test_a_slack_cable_still_pulls_by_a_fiftieth_of_the_weight(monkeypatch) -> None:
     """Tensions that repeat to a thousand newtons would push as often as they pull."""
-    settled, asked = acquisition._settle, []
+    settled, asked = simulated_acquisition._settle, []
 
     def settle(energy, pulls, *pushes):
         asked.append(pulls)
         return settled(energy, asked[0], *pushes)
 
-    monkeypatch.setattr(acquisition, "_settle", settle)
+    monkeypatch.setattr(simulated_acquisition, "_settle", settle)
     robot, rng = bologna_3(), np.random.default_rng(0)
     rough = replace(PERFECT, repeatability_N=1000.0)
     simulate_acquisition(robot, START_N, LARGEST_N, 9, rough, rng)

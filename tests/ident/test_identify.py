@@ -16,7 +16,7 @@ from freeswing.ident.identify import Identification, IdentifySettings, identify
 from freeswing.ident.runs import Payload, SwingRun
 from freeswing.ident.signals.derivatives import SignalSettings, signals_of
 from freeswing.ident.signals.motions import free_motion, full_motion
-from freeswing.ident.signals.prepare import guessed_inertia, prepare_runs
+from freeswing.ident.signals.usable_runs import guessed_inertia, prepare_runs
 from tests.ident.swings import REGULAR, TRUE_INERTIA, paper_model, recorded, swing
 
 FIDIM = IdentifySettings(maximum_likelihood=False, predict=False)

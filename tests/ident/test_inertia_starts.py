@@ -11,11 +11,11 @@ from freeswing.cdpr.measured.trajectory import Trajectory
 from freeswing.cdpr.model.equations import build_model
 from freeswing.cdpr.robot import POSE_COORDINATES
 from freeswing.ident.inertia_starts import likelihood_starts
-from freeswing.ident.judge.consistency import is_possible
+from freeswing.ident.judge.physical_consistency import is_possible
 from freeswing.ident.likelihood.guess_run_start import first_state
-from freeswing.ident.likelihood.raw_samples import prepare
+from freeswing.ident.likelihood.samples_and_noise import prepare
 from freeswing.ident.signals.derivatives import SignalSettings
-from freeswing.ident.signals.prepare import prepare_runs
+from freeswing.ident.signals.usable_runs import prepare_runs
 from tests.ident.swings import REGULAR, TRUE_INERTIA, paper_model, recorded, swing
 
 

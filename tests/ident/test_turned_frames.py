@@ -19,7 +19,7 @@ from freeswing.ident.identify import IdentifySettings, identify
 from freeswing.ident.likelihood.session_estimates import ml_estimate
 from freeswing.ident.runs import SwingRun
 from freeswing.ident.signals.derivatives import SignalSettings
-from freeswing.ident.signals.prepare import prepare_runs
+from freeswing.ident.signals.usable_runs import prepare_runs
 from tests.ident.swings import TRUE_INERTIA, paper_model, recorded, tilted_swing
 
 turns = st.tuples(*[st.floats(-3.1, 3.1, allow_nan=False)] * 3)

@@ -17,7 +17,7 @@ from freeswing.servo.files.wrench_file import _check_rows
 from freeswing.servo.loop.closed_loop import _Brain, current_bounds
 from freeswing.servo.loop.regulator import LinearRegulator
 from freeswing.servo.loop.trials import hardships
-from freeswing.servo.synthesis import search
+from freeswing.servo.synthesis import gamma_search
 from freeswing.servo.synthesis.state_space import StateSpace
 
 SPEEDS = np.full(6, 3.0)
@@ -125,14 +125,14 @@ def test_a_controller_stays_two_per_cent_above_the_least_gamma(monkeypatch) -> N
         tried.append(gamma)
         return SimpleNamespace(why=None, gamma=gamma)
 
-    monkeypatch.setattr(search, "normalise", lambda problem: None)
-    monkeypatch.setattr(search, "_bracket", lambda n: (None, None))
-    monkeypatch.setattr(search, "_narrowed", lambda *_: (5.0, "made"))
-    monkeypatch.setattr(search, "solve_at", solve_at)
-    monkeypatch.setattr(search, "central_controller", lambda *_: None)
-    monkeypatch.setattr(search, "close", lambda *_: None)
+    monkeypatch.setattr(gamma_search, "normalise", lambda problem: None)
+    monkeypatch.setattr(gamma_search, "_bracket", lambda n: (None, None))
+    monkeypatch.setattr(gamma_search, "_narrowed", lambda *_: (5.0, "made"))
+    monkeypatch.setattr(gamma_search, "solve_at", solve_at)
+    monkeypatch.setattr(gamma_search, "central_controller", lambda *_: None)
+    monkeypatch.setattr(gamma_search, "close", lambda *_: None)
     norm = SimpleNamespace(value=5.0, rate_rad_s=1.0)
-    monkeypatch.setattr(search, "hinf_norm", lambda _: norm)
-    found = search.synthesise(SimpleNamespace(plant=None))
+    monkeypatch.setattr(gamma_search, "hinf_norm", lambda _: norm)
+    found = gamma_search.synthesise(SimpleNamespace(plant=None))
     assert tried == [found.gamma]
     assert 1.017 < found.gamma / found.gamma_least < 1.023

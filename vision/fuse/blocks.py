@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.cdpr.rotation import invert
-from freeswing.vision.fuse.noise import outwards
+from freeswing.vision.fuse.corner_noise import outwards
 from freeswing.vision.fuse.poses import Poses
 from freeswing.vision.fuse.rolling_shutter import rolling_bias
 from freeswing.vision.fuse.run_views import Block, CameraViews

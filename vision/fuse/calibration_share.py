@@ -21,9 +21,9 @@ from freeswing.calib.verdict.calibration_result import read_camera_covariance
 from freeswing.cdpr.files.documents import InputError
 from freeswing.cdpr.measured.pose_errors import TERMS, PoseErrors, error_terms, fitted_terms
 from freeswing.vision.fuse.blocks import blocks
+from freeswing.vision.fuse.corner_noise import Noise, whitened
 from freeswing.vision.fuse.fuse_cameras import Fit, free_of
 from freeswing.vision.fuse.linearised_block import linearised
-from freeswing.vision.fuse.noise import Noise, whitened
 from freeswing.vision.fuse.poses import Poses
 from freeswing.vision.fuse.run_views import Block, CameraViews
 from freeswing.vision.look.watched_target import Watch

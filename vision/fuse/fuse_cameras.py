@@ -3,7 +3,7 @@
 Cameras take their frames at different times, so each corner is compared with the pose carried to
 its own time by the motion, which is taken from the poses themselves and improved with them. What
 squeezed pictures, lenses and the calibration leave beyond pixel noise is found from the residuals,
-camera by camera, and counts as noise (`vision.fuse.noise`).
+camera by camera, and counts as noise (`vision.fuse.corner_noise`).
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.vision.fuse.blocks import blocks
+from freeswing.vision.fuse.corner_noise import Noise, NoiseSums, alike, whitened
 from freeswing.vision.fuse.linearised_block import block_poses, lags, seen_by
 from freeswing.vision.fuse.motion_from_poses import motion_of_poses
-from freeswing.vision.fuse.noise import Noise, NoiseSums, alike, whitened
 from freeswing.vision.fuse.pose_kernels import (
     ROBUST_LIMIT,
     Linear,

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.vision.fuse.blocks import blocks
+from freeswing.vision.fuse.corner_noise import Noise, whitened
 from freeswing.vision.fuse.fuse_cameras import Fit
 from freeswing.vision.fuse.linearised_block import linearised
-from freeswing.vision.fuse.noise import Noise, whitened
 from freeswing.vision.fuse.poses import Poses
 from freeswing.vision.fuse.run_views import Block, CameraViews
 from freeswing.vision.look.watched_target import Watch

@@ -22,7 +22,7 @@ from freeswing.calib.tags.corners import (
     rimmed_cells,
 )
 from freeswing.vision.look.detect import TagFinder, detect_tags
-from freeswing.vision.look.markers import Blob, find_blobs
+from freeswing.vision.look.marker_blobs import Blob, find_blobs
 from freeswing.vision.look.near_kernels import expected_tags
 from freeswing.vision.look.occlusion import Plates
 from freeswing.vision.look.single_pose import Pose, extrapolate, refine_pose, start_pose

@@ -21,8 +21,8 @@ from freeswing.cdpr.rotation import invert
 from freeswing.vision.fuse.blocks import blocks
 from freeswing.vision.fuse.poses import Poses
 from freeswing.vision.fuse.run_views import Block, CameraViews
+from freeswing.vision.look.marker_blobs import ball_shrink
 from freeswing.vision.look.marker_pose import pose_from_one_view, refined
-from freeswing.vision.look.markers import ball_shrink
 from freeswing.vision.look.single_pose import Pose, extrapolate
 from freeswing.vision.look.watched_target import Watch
 

@@ -15,7 +15,7 @@ from freeswing.vision.fuse.run_views import CameraViews
 from freeswing.vision.look.single_pose import whitening
 from freeswing.vision.look.watched_target import Watch
 from freeswing.vision.planar.dots import Spots, followed, moving, named, side_of_dots
-from freeswing.vision.planar.examine import unseen_text
+from freeswing.vision.planar.film_faults import unseen_text
 from freeswing.vision.planar.plane import Items
 
 Array = NDArray[np.float64]

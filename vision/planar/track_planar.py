@@ -30,7 +30,7 @@ from freeswing.vision.look.sightings import collect_sightings
 from freeswing.vision.look.target_check import examined_watch
 from freeswing.vision.look.watched_target import Watch
 from freeswing.vision.planar.dots import named
-from freeswing.vision.planar.examine import moved_text, size_text, twice_text, unseen_text
+from freeswing.vision.planar.film_faults import moved_text, size_text, twice_text, unseen_text
 from freeswing.vision.planar.films import (
     Film,
     FilmedRun,

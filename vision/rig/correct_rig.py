@@ -16,12 +16,13 @@ from numpy.typing import NDArray
 from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.rotation import log_rotation
 from freeswing.vision.fuse.fuse_cameras import LEAST_FLOOR_PX, Fit, fuse
-from freeswing.vision.fuse.growth import growth_of
 from freeswing.vision.fuse.poses import Poses
 from freeswing.vision.fuse.run_views import CameraViews, instants_of
+from freeswing.vision.fuse.tag_growth import growth_of
 from freeswing.vision.look.marker_names import label_markers
 from freeswing.vision.look.watched_target import Watch
 from freeswing.vision.rig.gross_faults import moved_too_far, refuse_disagreement, refuse_gross
+from freeswing.vision.rig.lag_accepted import Missed, aligned
 from freeswing.vision.rig.rig_effects import (
     LEAST_CLOCK_S,
     LEAST_LINE_S,
@@ -35,8 +36,7 @@ from freeswing.vision.rig.rig_effects import (
 )
 from freeswing.vision.rig.rig_kernels import CLOCK, LINE, PER_CAMERA, POSE
 from freeswing.vision.rig.stamp_jitter import stamp_jitter_s, widened_poses, widened_step
-from freeswing.vision.rig.started_apart import Missed, aligned
-from freeswing.vision.rig.untied import untied_shifts
+from freeswing.vision.rig.untied_cameras import untied_shifts
 
 Array = NDArray[np.float64]
 

@@ -21,7 +21,7 @@ from freeswing.vision.fuse.fuse_cameras import Fit
 from freeswing.vision.fuse.run_views import CameraViews
 from freeswing.vision.look.single_pose import start_pose
 from freeswing.vision.look.watched_target import Watch
-from freeswing.vision.rig.pair_lags import Pair
+from freeswing.vision.rig.lag_search import Pair
 from freeswing.vision.rig.rig_effects import base_tag_rays
 
 Array = NDArray[np.float64]

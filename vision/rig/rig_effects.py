@@ -18,9 +18,9 @@ from freeswing.calib.tags.base_tags import SURVEY_STD_M
 from freeswing.cdpr.measured.leaving_out import leaving_out_std
 from freeswing.cdpr.rotation import exp_rotation
 from freeswing.vision.fuse.blocks import blocks
+from freeswing.vision.fuse.corner_noise import whitened
 from freeswing.vision.fuse.fuse_cameras import Fit, fuse
 from freeswing.vision.fuse.linearised_block import linearised
-from freeswing.vision.fuse.noise import whitened
 from freeswing.vision.fuse.poses import Poses
 from freeswing.vision.fuse.run_views import CameraViews
 from freeswing.vision.look.watched_target import Watch

@@ -18,7 +18,7 @@ from freeswing.cdpr.files.number_table import comma_separated
 from freeswing.cdpr.measured.rigid_fit import fit_rigid
 from freeswing.cdpr.measured.target import Untagged
 from freeswing.cdpr.rotation import transform
-from freeswing.vision.untagged.features import FeatureFinder, Features, matched
+from freeswing.vision.untagged.feature_matches import FeatureFinder, Features, matched
 from freeswing.vision.untagged.still_pose import still_pose
 
 Array = NDArray[np.float64]

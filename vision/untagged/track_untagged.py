@@ -39,7 +39,7 @@ from freeswing.vision.track_session import (
 from freeswing.vision.tracking_report import tracking_document
 from freeswing.vision.untagged.adjusted_points import bias_of_features, refined_points
 from freeswing.vision.untagged.feature_bias import PlatformErrors
-from freeswing.vision.untagged.look import collect_points
+from freeswing.vision.untagged.pose_by_matches import collect_points
 from freeswing.vision.untagged.rest_model import rest_model
 
 Array = NDArray[np.float64]

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.cdpr.files.documents import InputError
-from freeswing.cdpr.files.mocap.gaps import without_gaps
+from freeswing.cdpr.files.mocap.fill_values import without_gaps
 from freeswing.cdpr.files.number_table import (
     QUATERNION_TOLERANCE,
     check_times,

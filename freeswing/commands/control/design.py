@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from freeswing.cdpr.driven.model import DrivenModel
     from freeswing.results.control import ControllerResult
     from freeswing.servo.design.controller import Controller
-    from freeswing.servo.design.draws import Cloud
+    from freeswing.servo.design.drawn_robots import Cloud
     from freeswing.servo.design.offer import Order
 
 METHODS = ("hinf", "hinf-fastest", "lqg", "pid", "joint-pid", "mpc", "all")
@@ -121,7 +121,7 @@ def _write(folder: Path, found: Controller, is_first: bool) -> ControllerResult:
 
 def _cloud(model: DrivenModel, identified: str | None) -> Cloud:
     from freeswing.results.driven.estimates import read_identified
-    from freeswing.servo.design.draws import by_identified, by_table_1
+    from freeswing.servo.design.drawn_robots import by_identified, by_table_1
 
     if identified is None:
         return by_table_1(model)

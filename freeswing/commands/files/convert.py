@@ -95,7 +95,7 @@ def _write_markers(source: Path, result: Path, options: Namespace) -> list[str]:
         write_c3d,
         write_trc,
     )
-    from freeswing.cdpr.markers.units import far_apart
+    from freeswing.cdpr.markers.marker_units import far_apart
     from freeswing.cdpr.measured.marker_recording import recording_from_poses
 
     if holds_markers(source):

@@ -97,7 +97,7 @@ def _advise(path: Path, options: Namespace, console: Console) -> None:
 
 def _simulate(path: Path, options: Namespace, console: Console) -> None:
     from freeswing.cdpr.files.documents import InputError
-    from freeswing.homing.acquisition import simulate_homing
+    from freeswing.homing.simulated_acquisition import simulate_homing
 
     if options.poses < 3:
         raise InputError(f"--poses {options.poses}: at least 3 static poses are needed")

@@ -37,7 +37,7 @@ def run(options: Namespace, console: Console) -> None:
     for line in lines(found):
         console.say(line)
     if options.picture:
-        from freeswing.report.comparison import write_picture
+        from freeswing.report.comparison_picture import write_picture
 
         write_picture(Path(options.picture), found)
         console.say(options.picture)

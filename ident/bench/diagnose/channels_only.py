@@ -25,11 +25,11 @@ from freeswing.ident.bench.diagnose.entries import (
     told_entry,
     unscaled_document,
 )
-from freeswing.ident.bench.diagnose.removal import Removed, removals
 from freeswing.ident.bench.diagnose.search import Ground
+from freeswing.ident.bench.diagnose.taken_for_granted import Removed, removals
 from freeswing.ident.bench.diagnose.weigh import Fit
+from freeswing.ident.bench.fit_rounds import WiresVerdict
 from freeswing.ident.bench.identify_bench import BenchResult
-from freeswing.ident.bench.solve import WiresVerdict
 from freeswing.ident.bench.told.contradicted import contradictions
 from freeswing.ident.bench.told.held_out import HeldOut
 

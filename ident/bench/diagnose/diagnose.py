@@ -13,16 +13,16 @@ from freeswing.cdpr.system.progress import Progress
 from freeswing.ident.bench.diagnose.causes import Cause, causes_of, dressed
 from freeswing.ident.bench.diagnose.channels_only import ByChannels, by_channels
 from freeswing.ident.bench.diagnose.errors import Errors, errors_of
-from freeswing.ident.bench.diagnose.removal import Removed, removals
 from freeswing.ident.bench.diagnose.search import Ground, Round, searched
 from freeswing.ident.bench.diagnose.shown import Shown, shown
+from freeswing.ident.bench.diagnose.taken_for_granted import Removed, removals
 from freeswing.ident.bench.diagnose.weigh import Fit
+from freeswing.ident.bench.fit_rounds import FINE, Solved
 from freeswing.ident.bench.held_uncertain import considered
 from freeswing.ident.bench.identify_bench import BenchResult, identify_bench
 from freeswing.ident.bench.mass_verdict import CONTRADICTED, MassVerdict, doubt
 from freeswing.ident.bench.modal import ModalSwing
 from freeswing.ident.bench.runs import Bench
-from freeswing.ident.bench.solve import FINE, Solved
 from freeswing.ident.bench.swing import COMMON
 from freeswing.ident.bench.told.kinds_doubt import (
     with_change,

@@ -26,8 +26,8 @@ from freeswing.ident.bench.diagnose.entries import (
 from freeswing.ident.bench.diagnose.search import Word
 from freeswing.ident.bench.diagnose.shown import Shown
 from freeswing.ident.bench.diagnose.unexplained import remaining
+from freeswing.ident.bench.fit_rounds import Solved
 from freeswing.ident.bench.mass_verdict import MassVerdict
-from freeswing.ident.bench.solve import Solved
 from freeswing.ident.bench.swing import COMMON
 from freeswing.ident.bench.told.contradicted import contradictions, group_sentence
 from freeswing.ident.bench.told.report_objects import objects_document, platform_rows

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from freeswing.ident.bench.diagnose.causes import LENGTHS, SAME
-from freeswing.ident.bench.diagnose.removal import Removed
+from freeswing.ident.bench.diagnose.taken_for_granted import Removed
+from freeswing.ident.bench.fit_rounds import Solved
 from freeswing.ident.bench.mass_verdict import CHECKING
-from freeswing.ident.bench.solve import Solved
 from freeswing.ident.bench.told.contradicted import payload_reasons, surely_contradicted
 
 FORMAT = "freeswing-diagnosis/1"

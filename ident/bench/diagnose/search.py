@@ -11,8 +11,8 @@ from freeswing.cdpr.robot import Array
 from freeswing.cdpr.system.progress import Progress
 from freeswing.ident.bench.diagnose.causes import Cause, dressed, wanting
 from freeswing.ident.bench.diagnose.weigh import Fit, chances
+from freeswing.ident.bench.fit_rounds import FINE
 from freeswing.ident.bench.noise import rescaled
-from freeswing.ident.bench.solve import FINE
 from freeswing.ident.bench.swing import BenchSwing
 from freeswing.ident.diagnose.decision import (
     ACCEPTED,

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from freeswing.cdpr.robot import Array
+from freeswing.ident.bench.fit_rounds import Solved
 from freeswing.ident.bench.modal import SQUARE
 from freeswing.ident.bench.objects import moments, moments_slope
-from freeswing.ident.bench.solve import Solved
 from freeswing.ident.bench.swing import COMMON, IZZ
-from freeswing.ident.bench.told.classic import radii
+from freeswing.ident.bench.told.classic_formula import radii
 
 SAMPLES = "noise of the samples, drag and starts"
 BESIDE_IZZ = [4, 5, 7, 8, 9]  # of a body's ten numbers: Ixx Iyy Ixy Ixz Iyz

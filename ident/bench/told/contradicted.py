@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from freeswing.cdpr.robot import POSE_COORDINATES
+from freeswing.ident.bench.fit_rounds import Solved
 from freeswing.ident.bench.mass_verdict import CONTRADICTED
 from freeswing.ident.bench.priors.wire_priors import UNSTATED_LENGTH_STD_M
 from freeswing.ident.bench.runs import BenchRun
-from freeswing.ident.bench.solve import Solved
 from freeswing.ident.bench.swing import COMMON, IZZ
-from freeswing.ident.bench.told.classic import radii
+from freeswing.ident.bench.told.classic_formula import radii
 
 WEIGH = (
     "Weigh the platform with all that hangs on it: if the declared mass was wrong, all is settled; "

@@ -10,11 +10,11 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from freeswing.cdpr.robot import Array
+from freeswing.ident.bench.fit_rounds import Solved
 from freeswing.ident.bench.modal import CHI, SQUARE
 from freeswing.ident.bench.noise import column_residuals
-from freeswing.ident.bench.solve import Solved
 from freeswing.ident.bench.swing import BenchSwing, Column
-from freeswing.ident.bench.told.classic import sine_period
+from freeswing.ident.bench.told.classic_formula import sine_period
 from freeswing.ident.diagnose.answer.decay import PARTS
 
 Law = Callable[[float, float, Array], Array]

@@ -11,10 +11,10 @@ import numpy as np
 from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.robot import Array
 from freeswing.ident.bench.assemble import assembled
+from freeswing.ident.bench.fit_rounds import Solved
 from freeswing.ident.bench.modal import CREEP
 from freeswing.ident.bench.noise import column_residuals
 from freeswing.ident.bench.runs import Bench, BenchRun
-from freeswing.ident.bench.solve import Solved
 from freeswing.ident.bench.swing import BenchSwing, Column
 from freeswing.ident.likelihood.fit import Solution, fit
 from freeswing.ident.likelihood.fit_blocks import Dense

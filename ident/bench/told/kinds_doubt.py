@@ -15,8 +15,8 @@ from dataclasses import replace
 import numpy as np
 
 from freeswing.cdpr.robot import Array
+from freeswing.ident.bench.fit_rounds import FINE, Solved
 from freeswing.ident.bench.mass_verdict import mass_left_free
-from freeswing.ident.bench.solve import FINE, Solved
 from freeswing.ident.bench.told.scatter_by_kind import is_systematic
 from freeswing.ident.likelihood.fit import Solution, fit
 

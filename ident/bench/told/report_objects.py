@@ -9,10 +9,10 @@ import numpy as np
 
 from freeswing.cdpr.robot import BODY_NAMES, INERTIA_NAMES, Array
 from freeswing.ident.bench.channels import Channel
+from freeswing.ident.bench.fit_rounds import Solved
 from freeswing.ident.bench.modal import SQUARE
 from freeswing.ident.bench.objects import moments, moments_slope, specific, specific_slope
 from freeswing.ident.bench.runs import Bench, BenchRun
-from freeswing.ident.bench.solve import Solved
 from freeswing.ident.bench.swing import IZZ
 from freeswing.ident.bench.told.budget import bent_std
 

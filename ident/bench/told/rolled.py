@@ -14,9 +14,9 @@ import numpy as np
 from freeswing.cdpr.model.statics import equilibrium_at_lengths
 from freeswing.cdpr.robot import POSE_COORDINATES, Array
 from freeswing.cdpr.rotation import matrix_from_angles
+from freeswing.ident.bench.fit_rounds import Solved
 from freeswing.ident.bench.objects import specific
 from freeswing.ident.bench.runs import BenchRun
-from freeswing.ident.bench.solve import Solved
 from freeswing.ident.bench.swing import BenchSwing
 from freeswing.ident.bench.told.budget import ACROSS, budget
 

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.special import fdtr
 
 from freeswing.cdpr.robot import Array
-from freeswing.ident.bench.solve import Solved
+from freeswing.ident.bench.fit_rounds import Solved
 from freeswing.ident.bench.swing import BenchSwing
 from freeswing.ident.diagnose.decision import ACCEPTED
 

@@ -8,9 +8,9 @@ from typing import NamedTuple
 from freeswing.cdpr.robot import Array
 from freeswing.ident.diagnose.answer.deviations import chance_of_nothing
 from freeswing.ident.diagnose.answer.entries import claims
+from freeswing.ident.diagnose.backward_removal import is_no_worse
 from freeswing.ident.diagnose.decision import ACCEPTED
 from freeswing.ident.diagnose.refit import Refit, without
-from freeswing.ident.diagnose.removal import is_no_worse
 from freeswing.ident.diagnose.search import Round
 from freeswing.ident.diagnose.variants import effect_of
 from freeswing.ident.likelihood.fit_swings import LikelihoodFit

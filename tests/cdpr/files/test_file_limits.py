@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from freeswing.cdpr.files.drive_csv import _Table
-from freeswing.cdpr.files.mocap.gaps import without_gaps
+from freeswing.cdpr.files.mocap.fill_values import without_gaps
 from freeswing.cdpr.files.problems import InputError
 from freeswing.cdpr.files.robot_file import read_robot
 from freeswing.cdpr.files.trajectory_files import read_recording, read_trajectory, write_c3d

@@ -9,11 +9,16 @@ import numpy as np
 import pytest
 
 from freeswing.cdpr.files.problems import DataError
-from freeswing.cdpr.markers import exchanged_labels, layout, session_markers, spoiling_markers
+from freeswing.cdpr.markers import (
+    exchanged_labels,
+    layouts_aligned,
+    session_markers,
+    spoiling_markers,
+)
 from freeswing.cdpr.markers.distances import distances, pairs_of
-from freeswing.cdpr.markers.jumps import mended
+from freeswing.cdpr.markers.marker_jumps import mended
+from freeswing.cdpr.markers.marker_units import unit_between
 from freeswing.cdpr.markers.slow_residuals import slow_share
-from freeswing.cdpr.markers.units import unit_between
 from freeswing.cdpr.measured.marker_recording import MarkerRecording
 from freeswing.cdpr.measured.target import Marker, Target
 
@@ -113,15 +118,17 @@ def test_another_way_to_lie_on_a_layout_is_a_rival(behind, apart_m, rival):
     moves = np.stack([SQUARE, SQUARE + np.array([apart_m, 0.0, 0.0])])
     known = np.ones(4, dtype=bool)
     costs = np.array([0.0, behind])
-    found = layout._best(moves, np.full((2, 4), 1e6), costs, SQUARE, known, layout.CLEAR)
+    found = layouts_aligned._best(
+        moves, np.full((2, 4), 1e6), costs, SQUARE, known, layouts_aligned.CLEAR
+    )
     assert (found.rival_m > 0.0) == rival
 
 
 @pytest.mark.parametrize(("open_m", "refused"), [(4.9e-3, False), (5.1e-3, True)])
 def test_a_frame_is_open_by_five_millimetres_at_most(monkeypatch, open_m, refused):
     target = Target((), tuple(Marker(f"m{k}", place, 0.01) for k, place in enumerate(SQUARE)))
-    onto = layout.Alignment(SQUARE, 0 * SQUARE, np.ones(4), np.eye(6), open_m, 0 * SQUARE)
-    told = layout.SessionLayout(SQUARE, 0 * SQUARE, 1e-4, onto)
+    onto = layouts_aligned.Alignment(SQUARE, 0 * SQUARE, np.ones(4), np.eye(6), open_m, 0 * SQUARE)
+    told = layouts_aligned.SessionLayout(SQUARE, 0 * SQUARE, 1e-4, onto)
     monkeypatch.setattr(session_markers, "session_layout", lambda *_: told)
     found = SimpleNamespace(kept_m=1e-4, layout_m=SQUARE, left_out=())
     run = SimpleNamespace(rigidity=found, recording=SimpleNamespace(times_s=np.arange(9.0)))
@@ -145,26 +152,26 @@ def test_a_marker_that_is_four_scales_off_has_a_fifth_of_the_weight():
     places = ball(200)
     off = places.copy()
     off[0] += [0.0, 4e-3, 0.0]
-    weights = layout.align(off, places, 1e-3).weights
+    weights = layouts_aligned.align(off, places, 1e-3).weights
     assert weights[0] / np.median(weights) == pytest.approx(0.2, rel=0.04)
 
 
 def test_one_run_alone_has_the_usual_change_from_run_to_run():
-    found = layout.session_layout(SQUARE, [SQUARE + 0.1], 1e-6)
+    found = layouts_aligned.session_layout(SQUARE, [SQUARE + 0.1], 1e-6)
     assert found.run_std_m == pytest.approx(0.3e-3, rel=0.05)
 
 
 def test_a_drawing_is_good_to_a_fiftieth_of_a_millimetre():
-    found = layout.align_to_target(ball(5) + 0.1, ball(5))
+    found = layouts_aligned.align_to_target(ball(5) + 0.1, ball(5))
     assert np.allclose(1.0 / np.sqrt(found.weights[found.weights > 0.0]), 2e-5, rtol=0.05)
 
 
-def off_by(off_m: float) -> layout.Alignment:
+def off_by(off_m: float) -> layouts_aligned.Alignment:
     """Four markers measured beside a drawing, one of whose numbers is wrong."""
     places = np.array([[0.3, 0.0, 0.0], [-0.3, 0.0, 0.0], [0.0, 0.3, 0.0], [0.0, -0.3, 0.3]])
     wrong = places.copy()
     wrong[3, 2] += off_m
-    return layout.align_to_target(places, wrong)
+    return layouts_aligned.align_to_target(places, wrong)
 
 
 @pytest.mark.parametrize(("off_m", "left_out"), [(2.19e-3, False), (2.255e-3, True)])

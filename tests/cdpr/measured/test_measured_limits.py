@@ -10,8 +10,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from freeswing.cdpr.files.documents import InputError
-from freeswing.cdpr.measured.frame_change import frame_from_points
 from freeswing.cdpr.measured.held_doubled_wild import _steps
+from freeswing.cdpr.measured.recording_to_base_frame import frame_from_points
 from freeswing.cdpr.measured.rigid_fit import is_planar_or_better
 from freeswing.cdpr.measured.target import read_target
 

@@ -13,10 +13,10 @@ from freeswing.cdpr.measured.trajectory import Trajectory
 from freeswing.cdpr.model.batch import evaluate
 from freeswing.cdpr.model.equations import build_model
 from freeswing.cdpr.robot import POSE_COORDINATES
+from freeswing.doctor.footage import calibration_findings
 from freeswing.doctor.geometry import robot_findings
-from freeswing.doctor.motion import run_findings
-from freeswing.doctor.recordings import calibration_findings
 from freeswing.doctor.run_roles import split_findings
+from freeswing.doctor.run_samples import run_findings
 from freeswing.ident.runs import SwingRun
 from freeswing.session.session_file import read_session
 from tests.oracle.scenes.robots import declared_robot

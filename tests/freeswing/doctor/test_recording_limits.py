@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import pytest
 
 from freeswing.calib.footage.first_frames import Condition
-from freeswing.doctor import recordings
+from freeswing.doctor import footage
 
 
 @pytest.mark.parametrize(("copies", "told"), [(27, False), (33, True)])
@@ -25,5 +25,5 @@ def test_three_in_a_hundred_frames_may_repeat_the_one_before(monkeypatch, copies
         lambda recording, least: Condition(1000, copies, is_torn=False),
     )
     recording = SimpleNamespace(path=Path("a.mp4"), name="a")
-    found = list(recordings._recording_findings("run a", recording, None))
+    found = list(footage._recording_findings("run a", recording, None))
     assert any("repeat the one before" in one.text for one in found) == told

@@ -18,7 +18,7 @@ from freeswing.session.bench_keys import _read_place
 from freeswing.session.drive_session import read_drive_session
 from freeswing.session.new_recordings import next_role
 from freeswing.starter.markers import role
-from freeswing.vision.planar.straight_wires import check_hangs_straight
+from freeswing.vision.planar.axes_at_rest import check_hangs_straight
 
 
 def two_wires(**changes) -> SimpleNamespace:

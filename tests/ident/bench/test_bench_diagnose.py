@@ -28,9 +28,9 @@ from freeswing.ident.bench.diagnose.document import (
     experiment_of,
 )
 from freeswing.ident.bench.diagnose.entries import removed_entry
-from freeswing.ident.bench.diagnose.removal import Removed, _wires, no_drag
 from freeswing.ident.bench.diagnose.search import Ground
 from freeswing.ident.bench.diagnose.shown import shown
+from freeswing.ident.bench.diagnose.taken_for_granted import Removed, _wires, no_drag
 from freeswing.ident.bench.diagnose.unexplained import remaining
 from freeswing.ident.bench.diagnose.weigh import Fit
 from freeswing.ident.bench.modal import ModalSwing

@@ -12,14 +12,14 @@ import pytest
 
 from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.model.equations import build_model
-from freeswing.ident.bench import mass_verdict, noise, solve
+from freeswing.ident.bench import fit_rounds, mass_verdict, noise
 from freeswing.ident.bench.channels import Channel, check_moves
 from freeswing.ident.bench.modal import SQUARE
 from freeswing.ident.bench.noise import _colours, rescaled
 from freeswing.ident.bench.runs import Bench, BenchRun, Signal, check_swings
-from freeswing.ident.bench.scatter import scatter_std
+from freeswing.ident.bench.scatter_between_runs import scatter_std
 from freeswing.ident.bench.swing import COMMON, Column
-from freeswing.ident.bench.told.classic import (
+from freeswing.ident.bench.told.classic_formula import (
     BESIDE,
     ClassicRun,
     leaning_sentence,
@@ -51,7 +51,7 @@ def test_a_declared_mass_that_payload_runs_exclude(monkeypatch, declared_kg, con
     model = SimpleNamespace(robot=SimpleNamespace(platform=SimpleNamespace(mass_kg=declared_kg)))
     start = SimpleNamespace(runs=[SimpleNamespace(payloads=("one",))])
     bench = SimpleNamespace(mass_std_kg=None)
-    _, verdict = mass_verdict.weighed_mass(bench, model, (), body(0.1), start, solve.FINE)
+    _, verdict = mass_verdict.weighed_mass(bench, model, (), body(0.1), start, fit_rounds.FINE)
     assert verdict is not None
     assert verdict.contradicted == contradicted, verdict
 
@@ -63,20 +63,22 @@ def test_scatter_is_looked_for_between_enough_runs(monkeypatch, runs, looked) ->
     blocks = body(0.1).unknowns.joined(Unknown(COMMON, np.zeros(1), np.ones(1)))
     fitted = {**vars(body(0.1)), "covariance": np.eye(11)}
     monkeypatch.setattr(
-        solve, "fit", lambda _, unknowns, how: SimpleNamespace(**(fitted | {"unknowns": unknowns}))
+        fit_rounds,
+        "fit",
+        lambda _, unknowns, how: SimpleNamespace(**(fitted | {"unknowns": unknowns})),
     )
-    monkeypatch.setattr(solve, "_rough", lambda swings, unknowns: unknowns)
-    monkeypatch.setattr(solve, "stretched", lambda swings, unknowns: unknowns)
-    monkeypatch.setattr(solve, "_fastest", lambda *_: 1.0)
-    monkeypatch.setattr(solve, "rescaled", lambda swings, *_, **__: swings)
+    monkeypatch.setattr(fit_rounds, "_rough", lambda swings, unknowns: unknowns)
+    monkeypatch.setattr(fit_rounds, "stretched", lambda swings, unknowns: unknowns)
+    monkeypatch.setattr(fit_rounds, "_fastest", lambda *_: 1.0)
+    monkeypatch.setattr(fit_rounds, "rescaled", lambda swings, *_, **__: swings)
     monkeypatch.setattr(
-        solve, "weighed_mass", lambda bench, model, swings, found, *_: (found, None)
+        fit_rounds, "weighed_mass", lambda bench, model, swings, found, *_: (found, None)
     )
-    monkeypatch.setattr(solve, "considered", lambda swings, found, held: found)
-    monkeypatch.setattr(solve, "replace", lambda found, **_: found)
-    monkeypatch.setattr(solve, "scatter_std", lambda found: asked.append(1) or 0.0)
+    monkeypatch.setattr(fit_rounds, "considered", lambda swings, found, held: found)
+    monkeypatch.setattr(fit_rounds, "replace", lambda found, **_: found)
+    monkeypatch.setattr(fit_rounds, "scatter_std", lambda found: asked.append(1) or 0.0)
     start = SimpleNamespace(swings=tuple(range(runs)), unknowns=blocks, runs=[none] * runs)
-    solve.solved(TRIFILAR, Bench(()), start)
+    fit_rounds.solved(TRIFILAR, Bench(()), start)
     assert bool(asked) == looked
 
 
@@ -116,9 +118,9 @@ def test_wires_that_sway_contradicts(shift_mm, contradicted) -> None:
     )  # fmt: skip
     run = SimpleNamespace(lengths_std_m=5e-4)
     swing = SimpleNamespace(lengths_m=np.full(3, 1.0))
-    verdict = solve._wires(found, SimpleNamespace(swings=[swing], runs=[run]))
+    verdict = fit_rounds._wires(found, SimpleNamespace(swings=[swing], runs=[run]))
     assert verdict.contradicted == contradicted, verdict
-    counted = solve._who_is_right(found, verdict)
+    counted = fit_rounds._who_is_right(found, verdict)
     expected = [value[0], 2.0 * value[0]] if contradicted else [0.0, 0.0]
     np.testing.assert_allclose(counted, np.outer(expected, expected), rtol=1e-12)
 

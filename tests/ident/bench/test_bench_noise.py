@@ -10,8 +10,8 @@ import pytest
 from freeswing.ident.bench.averaged import averaged
 from freeswing.ident.bench.mass_verdict import without_prior
 from freeswing.ident.bench.runs import BenchRun, Signal
-from freeswing.ident.bench.scatter import scatter_std
-from freeswing.ident.bench.told.classic import BESIDE, ClassicRun, leaning_sentence
+from freeswing.ident.bench.scatter_between_runs import scatter_std
+from freeswing.ident.bench.told.classic_formula import BESIDE, ClassicRun, leaning_sentence
 from freeswing.ident.likelihood.unknowns import Gaussian, Unknown, Unknowns
 
 WIDE = 0.01

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from freeswing.ident.bench import assemble, solve
+from freeswing.ident.bench import assemble, fit_rounds
 from freeswing.ident.bench.assemble import Guess
 from freeswing.ident.bench.channels import Channel
 from freeswing.ident.bench.first_guesses import _variance
@@ -215,20 +215,20 @@ def test_a_run_whose_izz_is_a_hundredth_off_is_lost(monkeypatch) -> None:
         asked.append(unknowns)
         return SimpleNamespace(**fitted, unknowns=unknowns)
 
-    monkeypatch.setattr(solve, "fit", fit)
-    monkeypatch.setattr(solve, "_rough", lambda swings, unknowns: unknowns)
-    monkeypatch.setattr(solve, "stretched", lambda swings, unknowns: unknowns)
-    monkeypatch.setattr(solve, "_fastest", lambda *_: 1.0)
-    monkeypatch.setattr(solve, "rescaled", lambda swings, *_, **__: swings)
+    monkeypatch.setattr(fit_rounds, "fit", fit)
+    monkeypatch.setattr(fit_rounds, "_rough", lambda swings, unknowns: unknowns)
+    monkeypatch.setattr(fit_rounds, "stretched", lambda swings, unknowns: unknowns)
+    monkeypatch.setattr(fit_rounds, "_fastest", lambda *_: 1.0)
+    monkeypatch.setattr(fit_rounds, "rescaled", lambda swings, *_, **__: swings)
     monkeypatch.setattr(
-        solve, "weighed_mass", lambda bench, model, swings, found, *_: (found, None)
+        fit_rounds, "weighed_mass", lambda bench, model, swings, found, *_: (found, None)
     )
-    monkeypatch.setattr(solve, "considered", lambda swings, found, held: found)
-    monkeypatch.setattr(solve, "replace", lambda found, **_: found)
-    monkeypatch.setattr(solve, "scatter_std", lambda found: 0.0)
+    monkeypatch.setattr(fit_rounds, "considered", lambda swings, found, held: found)
+    monkeypatch.setattr(fit_rounds, "replace", lambda found, **_: found)
+    monkeypatch.setattr(fit_rounds, "scatter_std", lambda found: 0.0)
     none = SimpleNamespace(coordinates=(), signals=())
     ready = SimpleNamespace(swings=tuple(range(5)), unknowns=known, runs=[none] * 5)
-    solve.solved(TRIFILAR, Bench(()), ready)
+    fit_rounds.solved(TRIFILAR, Bench(()), ready)
     priors = [b.prior for one in asked for b in one.blocks if b.name == "scatter"]
     assert priors, "it was looked for"
     assert priors[0].std[0] == pytest.approx(0.01 * 5.0, rel=0.15)

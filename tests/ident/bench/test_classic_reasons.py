@@ -14,7 +14,7 @@ from scipy.integrate import quad
 from freeswing.cdpr.model.equations import build_model
 from freeswing.cdpr.robot import Array, Robot
 from freeswing.ident.bench.assemble import EFFECTS
-from freeswing.ident.bench.told.classic import ClassicRun
+from freeswing.ident.bench.told.classic_formula import ClassicRun
 from freeswing.ident.bench.told.classic_reasons import (
     AMPLITUDE,
     BESIDE,

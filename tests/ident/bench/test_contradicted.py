@@ -10,9 +10,9 @@ import pytest
 
 from freeswing.ident.bench.diagnose.channels_only import ByChannels, channels_document
 from freeswing.ident.bench.diagnose.entries import mass_candidate, mass_found
+from freeswing.ident.bench.fit_rounds import WiresVerdict
 from freeswing.ident.bench.mass_verdict import MassVerdict
 from freeswing.ident.bench.runs import BenchRun, Signal
-from freeswing.ident.bench.solve import WiresVerdict
 from freeswing.ident.bench.told.contradicted import (
     exchange_sentence,
     group_sentence,

@@ -10,7 +10,7 @@ import pytest
 
 from freeswing.cdpr.model.equations import build_model
 from freeswing.cdpr.model.statics import modes
-from freeswing.ident.bench import solve
+from freeswing.ident.bench import fit_rounds
 from freeswing.ident.bench.assemble import EFFECTS
 from freeswing.ident.bench.first_guesses import glimpse, sight
 from freeswing.ident.bench.swing import Column
@@ -82,9 +82,9 @@ def test_long_runs_are_followed_in_growing_stretches(monkeypatch, lasts_s, follo
         asked.append(parts)
         return SimpleNamespace(unknowns=[*unknowns, len(asked)])
 
-    monkeypatch.setattr(solve, "fit", fit)
+    monkeypatch.setattr(fit_rounds, "fit", fit)
     swings: Any = (Swing(span_s=(2.0, 2.0 + lasts_s)), Swing(span_s=(5.0, 9.0)))
     none: Any = []
-    assert solve.stretched(swings, none) == list(range(1, 1 + len(followed_s)))
+    assert fit_rounds.stretched(swings, none) == list(range(1, 1 + len(followed_s)))
     np.testing.assert_allclose([parts[0] for parts in asked], followed_s, rtol=0.05)
     np.testing.assert_allclose([parts[1] for parts in asked], followed_s, rtol=0.05)

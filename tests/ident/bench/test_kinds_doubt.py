@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from freeswing.ident.bench.fit_rounds import Solved
 from freeswing.ident.bench.mass_verdict import MassVerdict, mass_left_free
-from freeswing.ident.bench.solve import Solved
 from freeswing.ident.bench.told import kinds_doubt
 from freeswing.ident.bench.told.kinds_doubt import with_differences, with_kinds_counted
 from freeswing.ident.likelihood.fit import Solution

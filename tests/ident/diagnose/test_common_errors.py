@@ -17,7 +17,7 @@ from freeswing.ident.likelihood.blocks import first_unknowns
 from freeswing.ident.likelihood.calibration_modes import amplitudes_of
 from freeswing.ident.likelihood.fit import fit
 from freeswing.ident.likelihood.fit_swings import ONWARD, Swings
-from freeswing.ident.likelihood.raw_samples import UNIT_NOISE_M
+from freeswing.ident.likelihood.samples_and_noise import UNIT_NOISE_M
 from freeswing.ident.likelihood.session_estimates import begun
 from tests.ident.likelihood.test_calibration_modes import NOISE_M, prepared, runs
 from tests.ident.swings import TRUE_INERTIA, paper_model

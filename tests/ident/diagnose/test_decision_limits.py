@@ -12,12 +12,12 @@ import pytest
 
 from freeswing.cdpr.effects.base import Parameter
 from freeswing.ident.diagnose import (
+    backward_removal,
     decision,
     declared_model,
     diagnose,
     outstanding_runs,
     refit,
-    removal,
 )
 from freeswing.ident.diagnose import unexplained as rest
 from freeswing.ident.diagnose.decision import (
@@ -294,9 +294,9 @@ def test_a_start_that_comes_where_another_was(runs, apart, ends) -> None:
     (0.94, 11.0, True), (0.96, 11.0, False), (0.94, 13.0, False),
 ])  # fmt: skip
 def test_an_effect_that_may_leave_again(monkeypatch, chance, lead, no_worse) -> None:
-    monkeypatch.setattr(removal, "included", lambda *_: chance)
+    monkeypatch.setattr(backward_removal, "included", lambda *_: chance)
     fewer, more = fitted([100.0 + lead], count=1000.0), fitted([100.0], count=1000.0)
-    assert removal.is_no_worse(fewer, more, "effect", np.ones(2)) == no_worse
+    assert backward_removal.is_no_worse(fewer, more, "effect", np.ones(2)) == no_worse
 
 
 @pytest.mark.parametrize(("runs", "enough"), [(2, False), (3, True)])

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
+from freeswing.ident.diagnose.backward_removal import is_no_worse, superfluous
 from freeswing.ident.diagnose.decision import runs_worse
 from freeswing.ident.diagnose.diagnose import diagnose
 from freeswing.ident.diagnose.leave_one_out import Score
 from freeswing.ident.diagnose.lengths.wrong_places import kinematics
 from freeswing.ident.diagnose.outstanding_runs import OUTSTANDING, tempered
 from freeswing.ident.diagnose.refit import refit, without
-from freeswing.ident.diagnose.removal import is_no_worse, superfluous
 from freeswing.ident.diagnose.variants import variants
 from freeswing.ident.likelihood.run_residuals import residuals
 from freeswing.session.load_swings import load_robot, load_swings, load_target

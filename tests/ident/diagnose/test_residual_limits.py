@@ -11,8 +11,8 @@ import pytest
 
 from freeswing.cdpr.effects.base import Parameter
 from freeswing.ident.diagnose import decision, spectrum
+from freeswing.ident.diagnose.backward_removal import superfluous
 from freeswing.ident.diagnose.leave_one_out import Evidence
-from freeswing.ident.diagnose.removal import superfluous
 
 
 @pytest.mark.parametrize(

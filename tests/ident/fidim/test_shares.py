@@ -24,7 +24,7 @@ from freeswing.ident.fidim.shares import Share, Stack, shares_sentence
 from freeswing.ident.fidim.total_least_squares import total_least_squares
 from freeswing.ident.runs import SwingRun
 from freeswing.ident.signals.derivatives import SignalSettings
-from freeswing.ident.signals.prepare import motion_of, prepare_runs, usable
+from freeswing.ident.signals.usable_runs import motion_of, prepare_runs, usable
 from tests.ident.swings import TRUE_INERTIA, paper_model, recorded, swing
 from tests.oracle.recorded.sessions import make_scene, tait_bryan
 from tests.oracle.scenes.robots import declared_robot, true_body

@@ -17,7 +17,7 @@ from freeswing.ident.likelihood.fit_swings import LikelihoodFit, Swings
 from freeswing.ident.likelihood.rest_pose import taut_equilibrium
 from freeswing.ident.likelihood.unknowns import Unknowns
 from freeswing.ident.signals.derivatives import SignalSettings
-from freeswing.ident.signals.prepare import PreparedRun, prepare_runs
+from freeswing.ident.signals.usable_runs import PreparedRun, prepare_runs
 from tests.ident.swings import PAPER_LENGTHS_M, paper_model, recorded, swing
 
 # A light platform: its com_z and moments are those of a plate, which swings at 3 to 4 Hz.

@@ -25,7 +25,7 @@ from freeswing.ident.likelihood.fit import fit
 from freeswing.ident.likelihood.fit_swings import ONWARD, Swings
 from freeswing.ident.likelihood.joint_problem import State
 from freeswing.ident.likelihood.payload_runs import Loads
-from freeswing.ident.likelihood.raw_samples import prepare
+from freeswing.ident.likelihood.samples_and_noise import prepare
 from freeswing.ident.likelihood.unknowns import Gaussian
 from freeswing.ident.runs import Payload
 from tests.ident.swings import TRUE_INERTIA, paper_model, recorded, swing

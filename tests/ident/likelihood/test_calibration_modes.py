@@ -27,7 +27,7 @@ from freeswing.ident.likelihood.fit_swings import ONWARD
 from freeswing.ident.likelihood.session_estimates import ml_estimate
 from freeswing.ident.runs import SwingRun
 from freeswing.ident.signals.derivatives import SignalSettings
-from freeswing.ident.signals.prepare import PreparedRun, motion_of, prepare_runs
+from freeswing.ident.signals.usable_runs import PreparedRun, motion_of, prepare_runs
 from tests.ident.swings import TRUE_INERTIA, paper_model, recorded, swing
 
 SHIFT_M, TURN_RAD, SCALE = 1e-4, 1e-4, 1e-4

@@ -8,8 +8,8 @@ import numpy as np
 
 from freeswing.cdpr.robot import POSE_COORDINATES, Array
 from freeswing.cdpr.rotation import angles_from_matrix, exp_rotation, matrix_from_angles
-from freeswing.ident.likelihood.raw_samples import prepare
 from freeswing.ident.likelihood.run_residuals import Samples, differences
+from freeswing.ident.likelihood.samples_and_noise import prepare
 from tests.ident.swings import recorded, tilted_swing
 
 

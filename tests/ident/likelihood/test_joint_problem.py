@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from freeswing.ident.likelihood.joint_problem import Problem, State
-from freeswing.ident.likelihood.raw_samples import prepare
+from freeswing.ident.likelihood.samples_and_noise import prepare
 from tests.ident.swings import TRUE_INERTIA, paper_model, recorded, swing
 
 

@@ -14,7 +14,7 @@ from freeswing.ident.likelihood.between_runs import jackknife_std, widened
 from freeswing.ident.likelihood.blocks import MODES
 from freeswing.ident.likelihood.calibration_modes import modes_notes
 from freeswing.ident.likelihood.payload_runs import Loads, mass_of
-from freeswing.ident.likelihood.raw_samples import prepare
+from freeswing.ident.likelihood.samples_and_noise import prepare
 from freeswing.ident.likelihood.unknowns import Unknown, Unknowns
 from freeswing.ident.runs import Payload, SwingRun
 from freeswing.ident.signals import residual_colour

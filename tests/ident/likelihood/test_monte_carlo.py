@@ -15,7 +15,7 @@ from benchmarks.identify.identify_monte_carlo import (
 from freeswing.cdpr.model.regressor import regressor
 from freeswing.ident.fidim.fidim import fidim
 from freeswing.ident.signals.derivatives import SignalSettings
-from freeswing.ident.signals.prepare import prepare_runs
+from freeswing.ident.signals.usable_runs import prepare_runs
 from tests.ident.swings import REGULAR, TRUE_INERTIA, paper_model, tilted_swing
 
 DRAWS = 4

@@ -12,8 +12,8 @@ from freeswing.cdpr.model.equations import build_model
 from freeswing.cdpr.robot import Cable, Platform, Robot
 from freeswing.cdpr.rotation import angles_from_matrix, exp_rotation, matrix_from_angles
 from freeswing.ident.likelihood.guess_run_start import first_state
-from freeswing.ident.likelihood.raw_samples import prepare
 from freeswing.ident.likelihood.rest_pose import branches, named_like, rest_near
+from freeswing.ident.likelihood.samples_and_noise import prepare
 from freeswing.ident.runs import SwingRun
 
 INERTIA = np.array([0.004, -0.002, -0.03, 0.011, 0.012, 0.017, 0.0, 0.0, 0.0])

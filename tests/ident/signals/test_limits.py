@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from freeswing.cdpr.robot import POSE_COORDINATES
-from freeswing.ident.signals import derivatives, prepare
+from freeswing.ident.signals import derivatives, usable_runs
 from freeswing.ident.signals import jumps as module
 from freeswing.ident.signals.derivatives import SignalSettings, UnusableRunError
 from freeswing.ident.signals.motions import mean_lengths
@@ -90,12 +90,12 @@ def test_motion_must_stand_out_of_its_noise(monkeypatch, over, usable) -> None:
     signals = SimpleNamespace(
         coordinates=("x", "y"), velocities=velocities, covariances=covariances
     )
-    monkeypatch.setattr(prepare, "signals_of", lambda *_: signals)
+    monkeypatch.setattr(usable_runs, "signals_of", lambda *_: signals)
     if usable:
-        assert prepare._checked_signals(None, SignalSettings()) is signals  # type: ignore[arg-type]
+        assert usable_runs._checked_signals(None, SignalSettings()) is signals  # type: ignore[arg-type]
     else:
         with pytest.raises(UnusableRunError, match=r"is 4\.8 times the noise"):
-            prepare._checked_signals(None, SignalSettings())  # type: ignore[arg-type]
+            usable_runs._checked_signals(None, SignalSettings())  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(("amount", "serves"), [(19.0, True), (21.0, False)])
@@ -103,12 +103,12 @@ def test_free_coordinates_that_tell_the_pose(monkeypatch, amount, serves) -> Non
     """Full poses were measured: where the free ones do not tell them, they serve alone."""
     zetas = np.zeros((3, 6))
     full = SimpleNamespace(lengths_m=np.ones(4), zetas=zetas)
-    monkeypatch.setattr(prepare, "full_motion", lambda *_: full)
-    monkeypatch.setattr(prepare, "free_motion", lambda *_: full)
-    monkeypatch.setattr(prepare, "amplification", lambda *_: np.array([1.0, amount]))
+    monkeypatch.setattr(usable_runs, "full_motion", lambda *_: full)
+    monkeypatch.setattr(usable_runs, "free_motion", lambda *_: full)
+    monkeypatch.setattr(usable_runs, "amplification", lambda *_: np.array([1.0, amount]))
     signals = SimpleNamespace(coordinates=POSE_COORDINATES, select=lambda free: None)
     run = SimpleNamespace(lengths_m=None)
-    found, told = prepare._prepared(paper_model(), run, signals, ("x", "y"))  # type: ignore[arg-type]
+    found, told = usable_runs._prepared(paper_model(), run, signals, ("x", "y"))  # type: ignore[arg-type]
     assert told == amount
     assert (found.free is not None) == serves, found.why_not_free
     assert ("limit 20" in found.why_not_free) == (not serves), found.why_not_free

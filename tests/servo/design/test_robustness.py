@@ -7,7 +7,7 @@ import pytest
 
 from freeswing.cdpr.files.problems import InputError
 from freeswing.results.driven.estimates import read_identified
-from freeswing.servo.design.draws import Cloud, by_identified, by_table_1
+from freeswing.servo.design.drawn_robots import Cloud, by_identified, by_table_1
 from freeswing.servo.design.offer import Order, offer
 from freeswing.servo.design.plant import plant_at
 from freeswing.servo.design.robustness import (

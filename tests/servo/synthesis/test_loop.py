@@ -6,8 +6,8 @@ import pytest
 from freeswing.servo.files.weights_file import USUAL
 from freeswing.servo.synthesis.discretise import pade
 from freeswing.servo.synthesis.four_block import bare, weighted
+from freeswing.servo.synthesis.gamma_search import synthesise
 from freeswing.servo.synthesis.loop import delay_margin, examine
-from freeswing.servo.synthesis.search import synthesise
 from freeswing.servo.synthesis.state_space import StateSpace, append, close, gain, series
 from tests.servo.plants import inca_plant
 

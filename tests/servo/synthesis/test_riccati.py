@@ -5,13 +5,13 @@ import pytest
 
 from freeswing.servo.files.weights_file import USUAL
 from freeswing.servo.synthesis.four_block import weighted
+from freeswing.servo.synthesis.gamma_search import BACK_OFF, synthesise
 from freeswing.servo.synthesis.riccati import (
     StandardProblem,
     central_controller,
     normalise,
     solve_at,
 )
-from freeswing.servo.synthesis.search import BACK_OFF, synthesise
 from freeswing.servo.synthesis.state_space import StateSpace, close
 from freeswing.servo.synthesis.weights import Filter, Part, Weights
 from tests.servo.plants import inca_plant, random_problem

@@ -12,8 +12,8 @@ from freeswing.cdpr.measured.pose_errors import TERMS, PoseErrors
 from freeswing.cdpr.rotation import transform
 from freeswing.vision.fuse import tag_layout
 from freeswing.vision.fuse.calibration_share import RunShare, common_errors
+from freeswing.vision.fuse.corner_noise import Noise
 from freeswing.vision.fuse.fuse_cameras import _Account
-from freeswing.vision.fuse.noise import Noise
 from freeswing.vision.fuse.pose_kernels import Linear
 from freeswing.vision.untagged.still_pose import still_pose
 from tests.vision.scenes import camera

@@ -13,9 +13,9 @@ from freeswing.cdpr.measured.target import Marker, Tag, Target
 from freeswing.cdpr.rotation import exp_rotation
 from freeswing.vision.look.detect import TagFinder
 from freeswing.vision.look.follow import COVERED, NOTHING, OVEREXPOSED, Follower
+from freeswing.vision.look.marker_blobs import find_blobs
 from freeswing.vision.look.marker_names import _acquire, _match, _nearest, _Tracker
 from freeswing.vision.look.marker_pose import pose_from_one_view
-from freeswing.vision.look.markers import find_blobs
 from freeswing.vision.look.occlusion import Plates
 from freeswing.vision.look.target_check import _mistakes, _Seen, examined_watch
 from freeswing.vision.look.watched_target import Watch

@@ -14,7 +14,7 @@ import pytest
 from freeswing.cdpr.files.documents import DataError, InputError
 from freeswing.cdpr.measured.target import Target
 from freeswing.vision.planar import dots as dots_module
-from freeswing.vision.planar import examine, fit_plane, plane, track_planar
+from freeswing.vision.planar import film_faults, fit_plane, plane, track_planar
 from freeswing.vision.planar.dots import Spots, followed, side_of_dots
 from tests.vision.planar.benches_from_above import plate_tag
 
@@ -92,7 +92,7 @@ def size_said(arm_m: float, times: float, cosine: float) -> bool:
     centre = middle - times * arm_m * np.array([cosine, np.sqrt(1.0 - cosine**2)])
     chi = 0.2 * np.sin(np.linspace(0.0, 20.0 * np.pi, 401))
     poses = np.column_stack([chi * centre[1], -chi * centre[0], chi])
-    return examine.size_text(poses, middle, 0.1, "a") is not None
+    return film_faults.size_text(poses, middle, 0.1, "a") is not None
 
 
 @pytest.mark.parametrize(("arm_m", "said"), [(0.048, False), (0.052, True)])
@@ -121,9 +121,9 @@ def moved_said(monkeypatch, series: np.ndarray, known: tuple[np.ndarray, ...] = 
     """Whether a step is found in x beside what oscillations explain."""
     n = len(series)
     base = np.column_stack([np.ones(n), *(one[:n] for one in known)])
-    monkeypatch.setattr(examine, "_oscillations", lambda *_: base)
+    monkeypatch.setattr(film_faults, "_oscillations", lambda *_: base)
     poses = np.column_stack([series, SLOWEST[:n], SLOWEST[:n]])
-    return examine.moved_text(np.arange(float(n)), poses, "a") is not None
+    return film_faults.moved_text(np.arange(float(n)), poses, "a") is not None
 
 
 def step(n: int, share: float = 0.5) -> np.ndarray:

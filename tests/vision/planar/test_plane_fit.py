@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from freeswing.calib.camera.camera import Camera
-from freeswing.vision.planar.examine import moved_text, size_text
+from freeswing.vision.planar.film_faults import moved_text, size_text
 from freeswing.vision.planar.fit_plane import fit_planes
 from freeswing.vision.planar.plane import Items
 from tests.vision.planar.benches_from_above import plate_tag

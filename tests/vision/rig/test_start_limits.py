@@ -12,9 +12,15 @@ import numpy as np
 import pytest
 
 from freeswing.cdpr.files.documents import DataError
-from freeswing.vision.rig import correct_rig, rig_effects, stamp_jitter, started_apart, untied
-from freeswing.vision.rig.pair_lags import _correlations, _is_plausible
-from freeswing.vision.rig.started_apart import Missed, _chosen, deviations_apart
+from freeswing.vision.rig import (
+    correct_rig,
+    lag_accepted,
+    rig_effects,
+    stamp_jitter,
+    untied_cameras,
+)
+from freeswing.vision.rig.lag_accepted import Missed, _chosen, deviations_apart
+from freeswing.vision.rig.lag_search import _correlations, _is_plausible
 from tests.vision.scenes import camera
 
 VIEW = camera()
@@ -32,15 +38,15 @@ def stub(**attributes: Any) -> Any:
     return SimpleNamespace(**attributes)
 
 
-def started(monkeypatch, lag_s: float, deviations: float) -> started_apart.Aligned:
+def started(monkeypatch, lag_s: float, deviations: float) -> lag_accepted.Aligned:
     """Two cameras of 10 Hz, the second so much later."""
     pair = stub(lag_s=lag_s, at_zero_m=0.1)
     view = stub(camera=VIEW, believed=lambda moved: moved)
-    monkeypatch.setattr(started_apart, "own_track", lambda _: stub(step_s=0.1))
-    monkeypatch.setattr(started_apart, "_next", lambda *_: (0, 1, pair))
-    monkeypatch.setattr(started_apart, "_needed", lambda _: True)
-    monkeypatch.setattr(started_apart, "_chosen", lambda *_: (lag_s, 0.1, 0.2, deviations))
-    return started_apart.aligned([view, view], 0, reached)
+    monkeypatch.setattr(lag_accepted, "own_track", lambda _: stub(step_s=0.1))
+    monkeypatch.setattr(lag_accepted, "_next", lambda *_: (0, 1, pair))
+    monkeypatch.setattr(lag_accepted, "_needed", lambda _: True)
+    monkeypatch.setattr(lag_accepted, "_chosen", lambda *_: (lag_s, 0.1, 0.2, deviations))
+    return lag_accepted.aligned([view, view], 0, reached)
 
 
 @pytest.mark.parametrize(("lag_s", "later"), [(0.048, False), (0.052, True)])
@@ -92,12 +98,15 @@ def test_frames_that_two_records_share(shared, compared) -> None:
 )
 def test_cameras_that_base_tags_do_not_hold(monkeypatch, tags, known, judged) -> None:
     """Two tags hold a camera; twenty poses tell where one without them stands."""
-    monkeypatch.setattr(untied, "base_tag_misses", lambda *_: (None, np.ones(tags), None))
-    monkeypatch.setattr(untied, "iterated", reached)
+    monkeypatch.setattr(untied_cameras, "base_tag_misses", lambda *_: (None, np.ones(tags), None))
+    monkeypatch.setattr(untied_cameras, "iterated", reached)
     poses = stub(known=np.arange(60) < known, times_s=np.arange(60.0))
     views = [stub(camera=VIEW, numbers=range(60))] * 2
     with pytest.raises(Reached) if judged else nullcontext():
-        assert untied.untied_shifts(views, stub(tags=(1,)), poses, stub(), 3e-4) == (None, ())
+        assert untied_cameras.untied_shifts(views, stub(tags=(1,)), poses, stub(), 3e-4) == (
+            None,
+            (),
+        )
 
 
 @pytest.mark.parametrize(("known", "looked"), [(19, False), (20, True)])

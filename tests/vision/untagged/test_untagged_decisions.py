@@ -13,8 +13,8 @@ from freeswing.main import main
 from freeswing.vision.fuse.calibration_share import frame_causes
 from freeswing.vision.fuse.poses import Poses
 from freeswing.vision.untagged.adjusted_points import PointSums
-from freeswing.vision.untagged.features import matched
-from freeswing.vision.untagged.look import LEAST_MATCHES, agreed_pose
+from freeswing.vision.untagged.feature_matches import matched
+from freeswing.vision.untagged.pose_by_matches import LEAST_MATCHES, agreed_pose
 from freeswing.vision.untagged.rest_model import (
     CHANGED_GREY,
     CHANGED_SHARE,

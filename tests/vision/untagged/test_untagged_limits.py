@@ -17,8 +17,8 @@ from freeswing.cdpr.measured.target import Marker, Untagged
 from freeswing.cdpr.rotation import transform
 from freeswing.vision.untagged import rest_model as room
 from freeswing.vision.untagged.adjusted_points import PointSums, at_home
-from freeswing.vision.untagged.features import matched
-from freeswing.vision.untagged.look import PointMatcher, agreed_pose
+from freeswing.vision.untagged.feature_matches import matched
+from freeswing.vision.untagged.pose_by_matches import PointMatcher, agreed_pose
 from freeswing.vision.untagged.still_pose import still_pose
 from tests.vision.untagged import boxes
 

@@ -14,7 +14,7 @@ from freeswing.cdpr.robot import POSE_COORDINATES
 from freeswing.cdpr.simulation.free_swing import simulate
 from freeswing.ident.diagnose.answer import next_swing as chosen
 from freeswing.ident.diagnose.leave_one_out import Evidence
-from freeswing.ident.likelihood.raw_samples import prepare
+from freeswing.ident.likelihood.samples_and_noise import prepare
 from tests.ident.swings import TRUE_INERTIA, paper_model, recorded, swing
 
 DURATION_S = 1.5

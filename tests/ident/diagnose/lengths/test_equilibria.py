@@ -23,7 +23,7 @@ from freeswing.ident.diagnose.lengths.joint_lengths import (
 )
 from freeswing.ident.diagnose.lengths.length_rows import LengthRows, length_rows
 from freeswing.ident.diagnose.lengths.place_probabilities import mixed
-from freeswing.ident.likelihood.raw_samples import prepare
+from freeswing.ident.likelihood.samples_and_noise import prepare
 from freeswing.session.load_swings import load_robot, load_swings, load_target
 from freeswing.session.session_file import read_session
 from tests.oracle.recorded.sessions import make_session

@@ -14,7 +14,7 @@ from freeswing.cdpr.robot import POSE_COORDINATES
 from freeswing.ident.diagnose.lengths import equilibria, length_rows
 from freeswing.ident.diagnose.lengths.joint_lengths import Blocks, Normal
 from freeswing.ident.diagnose.lengths.place_probabilities import groups, mixed, set_probabilities
-from freeswing.ident.likelihood.raw_samples import prepare
+from freeswing.ident.likelihood.samples_and_noise import prepare
 from tests.ident.swings import paper_model, recorded, swing
 
 TWO = Blocks({"first": np.array([0]), "second": np.array([1])}, np.full(2, 1e-3), np.full(2, 12e-3))

@@ -10,16 +10,16 @@ import pytest
 
 from freeswing.cdpr.rotation import exp_rotation, log_rotation
 from freeswing.demo.rig import demo_target
-from freeswing.vision.fuse import growth
-from freeswing.vision.fuse.growth import Growth, growth_of
-from freeswing.vision.fuse.noise import Noise, outwards
+from freeswing.vision.fuse import tag_growth
+from freeswing.vision.fuse.corner_noise import Noise, outwards
 from freeswing.vision.fuse.run_views import CameraViews
+from freeswing.vision.fuse.tag_growth import Growth, growth_of
 from freeswing.vision.look.follow import USED
 from freeswing.vision.look.pieces import Piece, save_piece
 from freeswing.vision.look.watched_target import Watch
 from freeswing.vision.rig.correct_rig import Corrected, correct_rig
 from tests.samples import make_filmed as filmed
-from tests.vision.fuse.test_noise import FOCAL, INSTANTS, sightings, stub
+from tests.vision.fuse.test_corner_noise import FOCAL, INSTANTS, sightings, stub
 
 NOISE_PX = 0.015
 SQUARE = np.array([-1.0, -1, 1, -1, 1, 1, -1, 1])
@@ -34,8 +34,8 @@ def found(monkeypatch, px, seed: int, noise_px: float = 0.01) -> Growth:
     errors = pixel + noise_px / FOCAL * rng.normal(size=(n, 8))
     errors += np.array(px)[block.camera_of, None] / FOCAL * outwards(block.rays)
     linear = stub(residuals=errors, jacobians=slopes)
-    monkeypatch.setattr(growth, "blocks", lambda *_: [block])
-    monkeypatch.setattr(growth, "linearised", lambda *_: linear)
+    monkeypatch.setattr(tag_growth, "blocks", lambda *_: [block])
+    monkeypatch.setattr(tag_growth, "linearised", lambda *_: linear)
     poses = stub(times_s=np.zeros(INSTANTS), known=np.ones(INSTANTS, dtype=bool))
     fit = stub(noise=Noise.plain(np.full(2, noise_px)))
     return growth_of(poses, fit, views, stub())
@@ -67,8 +67,8 @@ def test_one_tag_alone_tells_of_no_growth(monkeypatch) -> None:
     )
     block.first, block.starts = 0, np.arange(len(rays) + 1)
     linear = stub(residuals=0.01 / FOCAL * outwards(block.rays), jacobians=slopes)
-    monkeypatch.setattr(growth, "blocks", lambda *_: [block])
-    monkeypatch.setattr(growth, "linearised", lambda *_: linear)
+    monkeypatch.setattr(tag_growth, "blocks", lambda *_: [block])
+    monkeypatch.setattr(tag_growth, "linearised", lambda *_: linear)
     poses = stub(times_s=np.zeros(len(rays)), known=np.ones(len(rays), dtype=bool))
     one = growth_of(poses, stub(noise=Noise.plain(np.full(2, 0.01))), views, stub())
     assert not one.is_real

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from freeswing.cdpr.rotation import exp_rotation
-from freeswing.vision.fuse.motion_from_poses import is_noise, motion_of_poses
-from freeswing.vision.fuse.noise import (
+from freeswing.vision.fuse.corner_noise import (
     Noise,
     NoiseSums,
     alike,
@@ -19,6 +18,7 @@ from freeswing.vision.fuse.noise import (
     turns_of,
     whitened,
 )
+from freeswing.vision.fuse.motion_from_poses import is_noise, motion_of_poses
 
 FOCAL, INSTANTS, TAGS = 500.0, 150, 5
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.cdpr.files.documents import InputError, Reader
-from freeswing.cdpr.measured.frame_change import UP_TURNS, frame_from_points
+from freeswing.cdpr.measured.recording_to_base_frame import UP_TURNS, frame_from_points
 from freeswing.cdpr.rotation import transform
 
 Array = NDArray[np.float64]

@@ -36,7 +36,7 @@ from freeswing.vision.look.pieces import (
 )
 from freeswing.vision.look.single_pose import Pose
 from freeswing.vision.look.watched_target import Watch
-from freeswing.vision.untagged.features import FeatureFinder, Features, matched
+from freeswing.vision.untagged.feature_matches import FeatureFinder, Features, matched
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]

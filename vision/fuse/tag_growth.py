@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from freeswing.cdpr.frozen import freeze
 from freeswing.vision.fuse.blocks import blocks
+from freeswing.vision.fuse.corner_noise import ALIKE, SURE_SIGMAS, outwards, whitened
 from freeswing.vision.fuse.fuse_cameras import Fit, agreeing
 from freeswing.vision.fuse.linearised_block import linearised
-from freeswing.vision.fuse.noise import ALIKE, SURE_SIGMAS, outwards, whitened
 from freeswing.vision.fuse.poses import Poses
 from freeswing.vision.fuse.run_views import CameraViews
 from freeswing.vision.look.watched_target import Watch
@@ -63,7 +63,7 @@ class Growth:
     def causes(self) -> Array:
         """What is left of it in each pose, one column a cause of one deviation, (n, 6, n_c).
 
-        Sightings err alike, as in `vision.fuse.noise`: its variance counts `ALIKE` times.
+        Sightings err alike, as in `vision.fuse.corner_noise`: its variance counts `ALIKE` times.
 
         Source:
             JCGM 100:2008, Guide to the Expression of Uncertainty in Measurement, eq. (13).

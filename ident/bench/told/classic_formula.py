@@ -14,9 +14,9 @@ import numpy as np
 
 from freeswing.cdpr.robot import Array
 from freeswing.cdpr.simulation.parallel_wires import hangs_parallel
+from freeswing.ident.bench.fit_rounds import Solved
 from freeswing.ident.bench.objects import moments
 from freeswing.ident.bench.runs import BenchRun
-from freeswing.ident.bench.solve import Solved
 from freeswing.ident.bench.swing import IZZ, BenchSwing
 from freeswing.ident.bench.told.classic_reasons import (
     BESIDE,

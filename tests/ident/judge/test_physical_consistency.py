@@ -16,7 +16,7 @@ from freeswing.cdpr.files.trajectory_csv import write_csv
 from freeswing.cdpr.robot import POSE_COORDINATES, Array
 from freeswing.ident.estimate import Estimate
 from freeswing.ident.identify import IdentifySettings, identify
-from freeswing.ident.judge.consistency import (
+from freeswing.ident.judge.physical_consistency import (
     LEAST_EXTENT_M,
     Consistency,
     consistency,

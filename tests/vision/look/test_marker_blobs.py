@@ -11,8 +11,8 @@ import pytest
 from freeswing.cdpr.files.trajectory_files import read_trajectory
 from freeswing.cdpr.measured.target import Marker, Target
 from freeswing.cdpr.rotation import exp_rotation, log_rotation
+from freeswing.vision.look.marker_blobs import ball_shrink, find_blobs
 from freeswing.vision.look.marker_pose import pose_from_one_view
-from freeswing.vision.look.markers import ball_shrink, find_blobs
 from freeswing.vision.render.patterns import Sphere
 from freeswing.vision.render.record import record
 from freeswing.vision.render.render_scene import Look, Renderer, Scene, still

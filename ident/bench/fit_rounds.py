@@ -17,7 +17,7 @@ from freeswing.ident.bench.noise import rescaled
 from freeswing.ident.bench.objects import moments, specific
 from freeswing.ident.bench.priors.wire_priors import UNSTATED_LENGTH_STD_M
 from freeswing.ident.bench.runs import Bench
-from freeswing.ident.bench.scatter import WIDE_SCATTER, scatter_block, scatter_std
+from freeswing.ident.bench.scatter_between_runs import WIDE_SCATTER, scatter_block, scatter_std
 from freeswing.ident.bench.swing import COMMON, IZZ, BenchSwing
 from freeswing.ident.bench.two_wires.free_roll import (
     freed,

@@ -16,9 +16,9 @@ from freeswing.ident.bench.assemble import EFFECTS
 from freeswing.ident.bench.diagnose.causes import LENGTHS
 from freeswing.ident.bench.diagnose.search import Ground
 from freeswing.ident.bench.diagnose.weigh import Fit, needed
+from freeswing.ident.bench.fit_rounds import FINE
 from freeswing.ident.bench.priors.wire_priors import UNSTATED_LENGTH_STD_M
 from freeswing.ident.bench.runs import Bench
-from freeswing.ident.bench.solve import FINE
 from freeswing.ident.bench.told.report_objects import RESTS_ON_PRIOR
 from freeswing.ident.diagnose.decision import ACCEPTED, LEAST_GAIN, MOST_WORSE, runs_worse
 from freeswing.ident.likelihood.fit import fit

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.rotation import invert
 from freeswing.vision.fuse.run_views import CameraViews
-from freeswing.vision.rig.pair_lags import OwnTrack, Pair, pair_of
+from freeswing.vision.rig.lag_search import OwnTrack, Pair, pair_of
 
 Array = NDArray[np.float64]
 

@@ -9,10 +9,10 @@ import pytest
 
 from freeswing.cdpr.model.equations import build_model
 from freeswing.cdpr.model.free_motion import admissible_rates
-from freeswing.cdpr.simulation import nearby
+from freeswing.cdpr.simulation import simplified_newton
 from freeswing.cdpr.simulation.free_swing import simulate, tails
-from freeswing.cdpr.simulation.nearby import Surroundings, obeys
 from freeswing.cdpr.simulation.sensitivity import linearise
+from freeswing.cdpr.simulation.simplified_newton import Surroundings, obeys
 from tests.cdpr.model_cases import swing_start
 
 TOLERANCE_M = 1e-9
@@ -62,7 +62,7 @@ def test_what_is_not_near_is_left_to_a_simulation(monkeypatch: pytest.MonkeyPatc
     assert around.motion_at(far, speeds, *arguments) is None
     # Segments that were long enough for a loose tolerance are too long for a tight one.
     assert around.motion_at(zeta, rates, inertia, values, 1e-13) is None
-    monkeypatch.setattr(nearby, "SWEEPS", 0)
+    monkeypatch.setattr(simplified_newton, "SWEEPS", 0)
     assert around.motion_at(zeta, rates, *arguments) is None
 
 
