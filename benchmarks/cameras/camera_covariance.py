@@ -37,10 +37,12 @@ KINDS = {"at rest, 16 poses": None, "waved, 60 Hz": (60.0, 100), "waved, 25 Hz":
 def calibrated(kind, seed, folder):
     """A rig and its true cameras."""
     cameras = films.small_rig(3, seed)
-    if KINDS[kind] is None:
+    filmed = KINDS[kind]
+    if filmed is None:
         return films.calibrate_still(folder, cameras, 16, seed), cameras
     cameras = films.free_running(cameras)
-    return films.calibrate_moving(folder, cameras, *KINDS[kind], seed).rig, cameras
+    rate_hz, count = filmed
+    return films.calibrate_moving(folder, cameras, rate_hz, count, seed).rig, cameras
 
 
 def point_error_mm(found, true):
@@ -53,7 +55,7 @@ def point_error_mm(found, true):
 
 def main() -> None:
     """Print a table and JSON."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--seeds", type=int, default=4)
     options = parser.parse_args()
     cv2.setNumThreads(1)

@@ -20,6 +20,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from functools import partial
 from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -70,7 +71,7 @@ def film(cameras, boards):
             corners, ids, _, _ = crossing.detectBoard(image)
             seconds["opencv"] += time.perf_counter() - start
             if ids is not None and len(ids) >= 8:
-                crossings[c, k, np.ravel(ids)] = np.reshape(corners, (-1, 2))
+                crossings[c, k, np.ravel(ids).astype(int)] = np.reshape(corners, (-1, 2))
             start = time.perf_counter()
             found = ours.detect(image)
             seconds["freeswing"] += time.perf_counter() - start
@@ -92,18 +93,19 @@ def ours(pixels, points, size, covariance=None, board=None):
     stack = pixels[camera, moment]
     noise = None if covariance is None else covariance[camera, moment]
     names = tuple(f"cam{k}" for k in range(len(pixels)))
-    count, best = len(names), np.inf
-
-    def straighten(scene, views):
-        return straightened(scene, views, board, [1] * count)
+    count, best, cameras = len(names), np.inf, ()
 
     for _ in range(REPEATS):
         start = time.process_time()
         views = make_views(camera, moment, stack, covariance_px2=noise)
         starts = start_cameras(names, (size,) * count, ("OPENCV",) * count, points, views)
-        rig = solve_rig(points, starts, straighten=straighten if board else None)
-        best = min(best, time.process_time() - start)
-    return rig.cameras, best
+        if board is None:
+            rig = solve_rig(points, starts)
+        else:
+            flat = partial(straightened, board=board, border_cells=[1] * count)
+            rig = solve_rig(points, starts, straighten=flat)
+        best, cameras = min(best, time.process_time() - start), rig.cameras
+    return cameras, best
 
 
 def peer(name, python, data, size):
@@ -144,7 +146,7 @@ def point_error_mm(found, cameras):
 
 def main() -> None:
     """Print a table and JSON."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--aniposelib", metavar="PYTHON", help="Python that has aniposelib")
     parser.add_argument("--caliscope", metavar="PYTHON", help="Python that has caliscope")
     parser.add_argument("--views", type=int, default=30)
@@ -159,7 +161,7 @@ def main() -> None:
     data = {"pixels": crossings, "points": grid, "size": np.array(size)}
     data["board"] = np.array([COLUMNS, ROWS, SQUARE_M, MARKER_M])
     board = Board("charuco", COLUMNS, ROWS, SQUARE_M, MARKER_M, FAMILY)
-    whole = np.isfinite(crossings).all(axis=(2, 3))
+    whole = np.all(np.isfinite(crossings), axis=(2, 3))
     full = np.where(whole[..., None, None], crossings, np.nan)
     runs = (
         ("freeswing, its own corners", tags[0], None),

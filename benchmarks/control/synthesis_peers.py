@@ -81,7 +81,8 @@ def random_problem(seed: int) -> StandardProblem:
     n, n_u, n_y = int(rng.integers(2, 13)), int(rng.integers(1, 4)), int(rng.integers(1, 4))
     n_w, n_z = n_y + int(rng.integers(0, 4)), n_u + int(rng.integers(0, 4))
     sizes = ((n, n), (n, n_w + n_u), (n_z + n_y, n), (n_z + n_y, n_w + n_u))
-    return StandardProblem(StateSpace(*[rng.standard_normal(size) for size in sizes]), n_y, n_u)
+    A, B, C, D = (rng.standard_normal(size) for size in sizes)
+    return StandardProblem(StateSpace(A, B, C, D), n_y, n_u)
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,7 +25,7 @@ ROBOT = paper_model().robot
 
 
 def nine(
-    coordinates=("x", "y"), noise_m: float = 1e-5, seed: int = 0, **more: object
+    coordinates=("x", "y"), noise_m: float = 1e-5, seed: int = 0, **more: Any
 ) -> list[SwingRun]:
     """One swing about each regular equilibrium, small enough to be nearly sinusoidal."""
     generator = np.random.default_rng(seed)
@@ -154,7 +155,7 @@ def test_a_singular_choice_of_free_coordinates_is_named():
 
 
 def test_the_mass_comes_from_payload_runs():
-    payload = Payload(1.0, [0.25, 0.1, 0.05])
+    payload = Payload(1.0, np.array([0.25, 0.1, 0.05]))
     mass = 8.0
     loaded = tuple(_with_payload(TRUE_INERTIA, payload, mass))
     generator = np.random.default_rng(4)
@@ -196,6 +197,7 @@ def test_the_weighted_form_covers_where_the_published_one_cannot():
         for run, k in zip(runs, REGULAR, strict=True):
             signals = signals_of(run, SignalSettings(pass_hz=12.0, stop_hz=21.0))
             truth = swing(k, 0.02, 0.015).at(signals.times_s)
+            assert run.lengths_m is not None
             motion = free_motion(model, signals, run.lengths_m, truth[0][0])
             noisy.append(noisy_regressor(model, signals, motion))
         found = weighted_fidim(noisy, TRUE_INERTIA)

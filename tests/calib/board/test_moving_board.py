@@ -65,6 +65,7 @@ def test_a_cut_ends_a_motion():
     cameras = free_running(0)
     sightings = recorded(cameras, 0, 100.0, 40, jump_s=3.0)
     line = gather(sightings, 100.0).line
+    assert line is not None
     before = set(line.piece[line.times_s < 0.195].tolist()) - {-1}
     after = set(line.piece[line.times_s > 0.205].tolist()) - {-1}
     assert len(before) >= 3, before

@@ -26,9 +26,13 @@ from tests.places import REAL
 needs_real = pytest.mark.skipif(not REAL.is_dir(), reason="needs ../shared/real")
 
 
+def grey_image(file: Path) -> np.ndarray:
+    return np.asarray(cv2.imread(str(file), cv2.IMREAD_GRAYSCALE), dtype=np.uint8)
+
+
 def board_views(board: Board, files: list[Path]):
     detector = BoardDetector(board)
-    found = [(file.name, detector.detect(cv2.imread(str(file), 0))) for file in files]
+    found = [(file.name, detector.detect(grey_image(file))) for file in files]
     found = [(name, corners) for name, corners in found if corners is not None]
     pixels = np.array([corners.pixels for _, corners in found])
     names = tuple(name for name, _ in found)
@@ -148,7 +152,7 @@ def test_tags_of_25_px_with_known_corners():
     so that neither can come nearer than about 0.15 px.
     """
     folder = REAL / "icra2020_frame0037"
-    image = cv2.imread(str(folder / "0037.png"), cv2.IMREAD_GRAYSCALE)
+    image = grey_image(folder / "0037.png")
     tags = json.loads((folder / "0037.json").read_text())["tags"]
     # listed BR BL TL TR by the pixel's corner; here TL TR BR BL by its centre
     true = {tag["tag_id"]: np.roll(tag["corners"][::-1], 2, axis=0) - 0.5 for tag in tags}
@@ -158,7 +162,7 @@ def test_tags_of_25_px_with_known_corners():
     detector = cv2.aruco.ArucoDetector(tag_dictionary("tag36h11"), parameters)
     quads, ids, _ = detector.detectMarkers(image)
     theirs = [np.reshape(q, (4, 2)) - true[i] for q, i in zip(quads, np.ravel(ids), strict=True)]
-    rng, grid = np.random.default_rng(0), pixel_rays(image.shape[::-1])
+    rng, grid = np.random.default_rng(0), pixel_rays((image.shape[1], image.shape[0]))
     ours = []
     for tag_id, corners in true.items():
         guess = corners + rng.normal(0.0, 0.3, (4, 2))

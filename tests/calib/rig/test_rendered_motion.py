@@ -35,6 +35,7 @@ def test_what_a_lens_does_to_a_tag():
         near[:3, 3] = 0.4 * pose[:3, 3] + 0.45 * camera.position_base_m
         scene = Scene((films.patch().moved(near @ films.FLIP, "base"),), still())
         found = BoardDetector(board).detect(Renderer(camera, scene, Look(), seed).frame(0.0))
+        assert found is not None
         true = camera.project(camera.to_camera(board.points_m @ near[:3, :3].T + near[:3, 3]))
         T_camera_board = (camera.T_camera_base @ near)[None]
         for tag in range(board.n_tags):

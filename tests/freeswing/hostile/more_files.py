@@ -11,6 +11,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import trimesh
+from trimesh.exchange.ply import export_ply
 
 from freeswing.calib.board.board_corners import BoardDetector
 from freeswing.calib.board.declared_board import board_from
@@ -93,7 +94,10 @@ def more_cases(folder: Path) -> dict[str, Case]:
         others = tuple(p for p in (folder / "model").iterdir() if p.stem != part)
         data = (folder / "model" / f"{part}.bin").read_bytes()
         found[f"colmap {part}.bin"] = Case(
-            f"{part}.bin", data, lambda path: colmap_binary.read(path.parent, str), others
+            f"{part}.bin",
+            data,
+            lambda path: colmap_binary.read(path.parent, lambda _: None),
+            others,
         )
     return found
 
@@ -112,11 +116,16 @@ def _videos(folder: Path) -> dict[str, Case]:
     return found
 
 
+def _nobody(said: str) -> None:
+    """Is told."""
+
+
 def _write_colour(path: Path, frames: np.ndarray, codec: str) -> None:
     import av
 
     with av.open(str(path), "w") as container:
         stream = container.add_stream(codec, rate=40)
+        assert isinstance(stream, av.VideoStream)
         stream.width, stream.height = 64, 48
         stream.pix_fmt = "yuvj420p" if codec == "mjpeg" else "yuv420p"
         for frame in frames:
@@ -148,7 +157,7 @@ def _meshes() -> dict[str, Case]:
         data = data.encode() if isinstance(data, str) else bytes(data)
         found[f"mesh {kind}"] = Case(f"body.{suffix}", data, platform_from_mesh)
     for encoding in ("ascii", "binary"):
-        data = trimesh.exchange.ply.export_ply(box, encoding=encoding)
+        data = export_ply(box, encoding=encoding)
         found[f"mesh ply {encoding}"] = Case("body.ply", data, platform_from_mesh)
     return found
 
@@ -250,8 +259,10 @@ def _results() -> dict[str, Case]:
         found[f"result {kind}"] = Case(
             f"{kind}.json", data, lambda path: render_page(read_material("a", path.parent))
         )
-    data = json.dumps(material.identification.to_json()).encode()
-    found["compared"] = Case("identification.json", data, lambda path: read_side(path.parent))
+    identification = material.identification
+    assert identification is not None
+    data = json.dumps(identification.to_json()).encode()
+    found["compared"] = Case("identification.json", data, lambda path: read_side(str(path.parent)))
     return found
 
 
@@ -284,5 +295,5 @@ def piece_of_sightings(path: Path) -> None:
 def _sightings(path: Path) -> bytes:
     blank = FrameView(0, (), (np.eye(3), np.ones(3)))
     follower = a_follower()
-    save_piece(path, Piece.of(range(4), 0.1 * np.arange(4), [blank] * 4), follower)
+    save_piece(path, Piece.of(range(4), [0.0, 0.1, 0.2, 0.3], [blank] * 4), follower)
     return path.read_bytes()

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from freeswing.cdpr.measured.trajectory import Trajectory, unwrapped
-from freeswing.cdpr.model.equations import build_model
+from freeswing.cdpr.model.equations import Model, build_model
 from freeswing.cdpr.robot import Cable, Platform, Robot
 from freeswing.cdpr.rotation import angles_from_matrix, exp_rotation, matrix_from_angles
 from freeswing.ident.likelihood.guess_run_start import first_state
@@ -86,7 +86,7 @@ def test_free_coordinates_start_alike_in_any_branch(axis: str, yaw: float, turns
         np.testing.assert_allclose(mine, theirs, atol=1e-9)
 
 
-def full_poses(model: object, swing: np.ndarray) -> np.ndarray:
+def full_poses(model: Model, swing: np.ndarray) -> np.ndarray:
     """The poses of x, y, chi on the wires."""
     from freeswing.cdpr.model.free_motion import assemble
 

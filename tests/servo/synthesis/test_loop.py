@@ -37,11 +37,12 @@ def test_the_delay_margin_separates_stable_from_unstable(paper):
 
 
 def test_an_integrators_delay_margin_is_that_of_the_textbook():
-    one = StateSpace([[0.0]], [[1.0]], [[2.0]], [[0.0]])
+    unit, none = np.ones((1, 1)), np.zeros((1, 1))
+    one = StateSpace(none, unit, 2.0 * unit, none)
     plant = append(*[one] * 6)
     assert delay_margin(plant, gain(np.eye(6))) == pytest.approx(np.pi / 2 / 2.0, rel=1e-3)
-    assert delay_margin(append(*[StateSpace([[-1.0]], [[1.0]], [[0.5]], [[0.0]])] * 6),
-                        gain(np.eye(6))) == np.inf  # fmt: skip
+    slow = StateSpace(-unit, unit, 0.5 * unit, none)
+    assert delay_margin(append(*[slow] * 6), gain(np.eye(6))) == np.inf
 
 
 def test_a_delay_that_is_designed_in_leaves_more_margin(paper):

@@ -91,7 +91,9 @@ def test_one_camera_starts_from_markers_alone(tmp_path) -> None:
     known = trajectory.is_known
     turn = log_rotation(trajectory.rotations() @ np.swapaxes(rotations, 1, 2))
     error = np.concatenate([trajectory.positions() - positions, turn], axis=1)[known]
-    claimed = trajectory.standard_deviations()[known]
+    claimed = trajectory.standard_deviations()
+    assert claimed is not None
+    claimed = claimed[known]
     ratio = np.sqrt(np.median((error / claimed) ** 2) / 0.455)
     assert known.mean() > 0.95, f"{known.mean():.2f} of the samples known"
     assert 1e3 * np.abs(error[:, :3]).max() < 8.0, f"{1e3 * np.abs(error[:, :3]).max():.3f} mm"
@@ -130,6 +132,7 @@ def test_one_marker_gives_the_reference_point(tmp_path) -> None:
     positions, _ = swing(trajectory.times_s)
     error = trajectory.values - positions
     claimed = trajectory.standard_deviations()
+    assert claimed is not None
     assert trajectory.coordinates == ("x", "y", "z"), trajectory.coordinates
     assert 1e3 * np.abs(error).max() < 0.6, f"{1e3 * np.abs(error).max():.3f} mm"
     ratio = np.sqrt(np.mean((error / claimed) ** 2))
