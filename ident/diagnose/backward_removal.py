@@ -1,13 +1,21 @@
-"""Backward removal: an effect that a later one makes superfluous leaves the model again."""
+"""What leaves the model again: effects made superfluous by later ones, and mere stand-ins."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from freeswing.ident.diagnose.decision import ACCEPTED, CONFOUNDED_DIFFERENCE, included, left_out
-from freeswing.ident.diagnose.refit import Refit
+from freeswing.ident.diagnose.decision import (
+    ACCEPTED,
+    CONFOUNDED_DIFFERENCE,
+    RIVAL,
+    Decision,
+    included,
+    left_out,
+)
+from freeswing.ident.diagnose.refit import Refit, plausible
+from freeswing.ident.diagnose.variants import effect_of
 
 # Of the BIC without an effect to second order, below which leaving it out is worth a fit: beyond,
 # the evidence for it is very strong (Kass, Raftery 1995, Bayes Factors, sec. 3.2).
@@ -49,3 +57,26 @@ def is_no_worse(fewer: Refit, more: Refit, name: str, noise_scales: np.ndarray) 
     by_held_out = 2.0 * float(left_out(fewer, noise_scales).gains(more.score.held_out).sum())
     by_evidence = included(fewer, more, name, noise_scales)
     return by_evidence <= ACCEPTED and by_held_out < CONFOUNDED_DIFFERENCE
+
+
+def outdone(decision: Decision, tried: Mapping[str, Refit]) -> str:
+    """Why what won a round stands in for something else: a sentence, or "".
+
+    Where values that no such effect can have are what is missing with far more probability, nothing
+    of the catalogue is: a drag that drives was answered by a force at 37 Hz of 3e-18.
+
+    Args:
+        decision: of the round.
+        tried: what was fitted in it, by key.
+    """
+    chances = {one.effect: one.probability or 0.0 for one in decision.candidates}
+    refused = {effect_of(key): plausible(one, key) for key, one in tried.items()}
+    impossible = [n for n, said in refused.items() if said and n not in decision.group]
+    leader = max(impossible, key=lambda name: chances[name], default="")
+    mine = sum(chances[name] for name in decision.group)
+    if not leader or mine > RIVAL * (mine + chances[leader]):
+        return ""
+    return (
+        f"the nearest, not the cause: {leader} with values that cannot be explains it better "
+        f"({'; '.join(refused[leader])})"
+    )

@@ -20,7 +20,7 @@ from freeswing.cdpr.effects import effect_named
 from freeswing.cdpr.robot import Array, Robot
 from freeswing.cdpr.system.lifeline import tie_to
 from freeswing.cdpr.system.progress import Progress
-from freeswing.ident.diagnose.backward_removal import is_no_worse, superfluous
+from freeswing.ident.diagnose.backward_removal import is_no_worse, outdone, superfluous
 from freeswing.ident.diagnose.decision import (
     LARGEST_EXCESS_LEFT,
     LEAST_EXCESS_LATER,
@@ -56,13 +56,15 @@ MOST_ROUNDS = 8
 class Round:
     """One round of the search: what stood before, what was decided, what was taken away again.
 
-    Those that cable lengths decide, before any force, say so.
+    Those that cable lengths decide, before any force, say so; those whose winner stands in for
+    something else say why (`outdone`).
     """
 
     before: Refit
     decision: Decision
     removed: tuple[str, ...] = ()
     by_lengths: bool = False
+    stand_in: str = ""
 
     @property
     def after(self) -> Refit:
@@ -107,7 +109,26 @@ class Search:
                 if done.decision.winner is None:
                     break
                 current = done.after
-        return current
+        return self._without_stand_ins(current)
+
+    def _without_stand_ins(self, current: Refit) -> Refit:
+        """The last fit without what came last and stood in for something else.
+
+        Where other effects were still missing, one that stood in for them all led for a while.
+        """
+        while True:
+            won = [k for k, one in enumerate(self.rounds) if one.decision.winner is not None]
+            if not won or not self.rounds[won[-1]].stand_in:
+                return current
+            last = self.rounds[won[-1]]
+            words = [
+                replace(one, verdict="rejected", confounded_with=(), reason=last.stand_in)
+                if one.effect in last.decision.group
+                else one
+                for one in last.decision.candidates
+            ]
+            self.rounds[won[-1] :] = [Round(last.before, Decision(tuple(words)))]
+            current = last.before
 
     def _geometry(self, current: Refit) -> Refit:
         """Kinematics first: what constant cable lengths settle, no force has to explain."""
@@ -172,7 +193,8 @@ class Search:
                 break
             found = fewer
             removed.append(name)
-        return Round(current, replace(decision, winner=found), tuple(removed))
+        stand_in = outdone(decision, tried)
+        return Round(current, replace(decision, winner=found), tuple(removed), stand_in=stand_in)
 
     def _left(self, current: Refit) -> list[str]:
         """Keys of what is not in the model yet: whole effects, and parts of any."""
