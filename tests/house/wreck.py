@@ -354,6 +354,7 @@ HELD = (
         DECISION,
     ),
     Held("ident/diagnose/outstanding_runs.py", ("OUTSTANDING",), DECISION),
+    Held("ident/diagnose/refit.py", ("REWEIGHED",), DECISION),
     Held(
         "ident/diagnose/declared_model.py",
         ("LEAST_RUNS", "SMALL_BESIDE_SWINGS", "AT_THE_NOISE"),

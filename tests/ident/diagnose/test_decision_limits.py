@@ -318,3 +318,38 @@ def test_a_cable_does_not_weigh_less_than_nothing(value, complaints) -> None:
     found = refit.plausible(one, "cable_mass")
     assert len(found) == complaints, found
     assert all("no such effect can have" in text for text in found), found
+
+
+@pytest.mark.parametrize(("left", "fits"), [(110.0, 1), (90.0, 2)])
+def test_a_fit_is_weighed_by_what_it_leaves(monkeypatch, left, fits) -> None:
+    """Its search had stopped at 200 times the noise: what leaves 90 was weighed too loosely."""
+    begun = SimpleNamespace(colour=200.0, swings=SimpleNamespace(), unknowns=None)
+    made = []
+
+    def again(swings, *_):
+        made.append(swings.scales)
+        return SimpleNamespace(colour=left, swings=SimpleNamespace(), unknowns=None)
+
+    monkeypatch.setattr(refit, "colour_of", lambda one, _: one.colour)
+    monkeypatch.setattr(refit, "tempered", lambda *_: ())
+    monkeypatch.setattr(refit, "replace", lambda _, samples, scales: SimpleNamespace(scales=scales))
+    monkeypatch.setattr(refit, "fit", again)
+    monkeypatch.setattr(refit, "rescored", lambda one, _, colour: colour)
+    assert refit.polished(begun, np.ones(2)) == pytest.approx(200.0 if fits == 1 else left)
+    assert [float(scales[0] ** 2) for scales in made] == pytest.approx([200.0, left][:fits])
+
+
+@pytest.mark.parametrize(("amplitude", "refused"), [(0.0, True), (1e-9, False)])
+def test_a_candidate_that_no_step_takes_away_from_nothing_explains_nothing(
+    monkeypatch, amplitude, refused
+) -> None:
+    """Its frequency is no amount."""
+    parts = Parameter("sine_x_m_s2", -3.0, 3.0, 0.05, per_run=True)
+    hz = Parameter("frequency_hz", 0.05, 40.0, 2.0, start=2.0, amplitude=False)
+    model = SimpleNamespace(
+        place_of=lambda _: slice(1, 3), parameters=(None, parts, hz), robot=None
+    )
+    motions = [SimpleNamespace(values=np.array([0.3, one, 37.0])) for one in (0.0, amplitude)]
+    monkeypatch.setattr(refit, "inside", lambda *_: np.array([True, True]))
+    found = SimpleNamespace(model=model, motions=motions)
+    assert refit._does_nothing(found, "harmonic_force") == refused

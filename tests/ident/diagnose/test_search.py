@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from freeswing.ident.diagnose import backward_removal
 from freeswing.ident.diagnose import search as module
-from freeswing.ident.diagnose.decision import Decision
+from freeswing.ident.diagnose.backward_removal import outdone
+from freeswing.ident.diagnose.decision import Candidate, Decision
 from freeswing.ident.diagnose.search import Round, Search
 
 
@@ -47,3 +49,44 @@ def test_errors_of_all_poses_are_not_asked_of_a_model_that_misses_more(
     monkeypatch.setattr(module, "freed", lambda *_: "freed")
     found = Search(np.ones(2), (), workers=1)._freed(current)
     assert (found == "freed") == is_freed
+
+
+def word(effect: str, probability: float, verdict: str = "rejected") -> Candidate:
+    return Candidate(effect, verdict, -100.0, 0.9, (), "", probability)
+
+
+@pytest.mark.parametrize(("fan", "stands_in"), [(0.045, True), (0.055, False)])
+def test_what_impossible_values_explain_far_better_is_none_of_the_catalogue(
+    monkeypatch, fan, stands_in
+) -> None:
+    """A draught that feeds the swing: a drag of less than nothing, and the nearest that can be."""
+    said = {"quadratic_drag": ["coefficient_1_m = -0.16: below 0"]}
+    monkeypatch.setattr(backward_removal, "plausible", lambda _, key: said.get(key, []))
+    words = (word("harmonic_force", fan, "accepted"), word("quadratic_drag", 1.0 - fan))
+    won: Any = Decision(words, None, "harmonic_force", ("harmonic_force",))
+    tried: Any = dict.fromkeys(["harmonic_force", "quadratic_drag"])
+    found = outdone(won, tried)
+    assert bool(found) == stands_in
+    assert not found or "quadratic_drag with values that cannot be" in found
+    assert not outdone(won, {"harmonic_force": tried["harmonic_force"]})
+
+
+@pytest.mark.parametrize(("which", "left"), [(1, 0), (0, 2)])
+def test_a_stand_in_that_came_last_is_taken_back_and_one_that_made_way_is_not(which, left) -> None:
+    fits: Any = [SimpleNamespace(place=k) for k in range(3)]
+    rounds = [
+        Round(
+            fits[k],
+            Decision((word(f"e{k}", 0.9, "accepted"),), fits[k + 1], f"e{k}", (f"e{k}",)),
+            stand_in="the nearest" if k == which else "",
+        )
+        for k in range(2)
+    ]
+    search = Search(np.ones(2), (), workers=1, rounds=[*rounds, Round(fits[2], Decision(()))])
+    last: Any = search._without_stand_ins(fits[2])
+    assert last.place == (1 if which == 1 else 2)
+    assert [one.decision.winner is not None for one in search.rounds][:2] == [True, which == 0]
+    told = search.rounds[-1].decision.candidates
+    assert [(one.verdict, one.reason) for one in told] == (
+        [("rejected", "the nearest")] if left == 0 else []
+    )
