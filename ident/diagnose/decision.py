@@ -18,7 +18,8 @@ from freeswing.ident.diagnose.spectrum import independent_numbers
 from freeswing.ident.diagnose.variants import effect_of, inside, variants
 from freeswing.ident.likelihood.joint_problem import INERTIA_UNIT
 
-# How many are fitted at a time, how near to the best they start, and what is not worth a fit.
+# How many are fitted at a time beyond those that promise so near to the best, and what is not
+# worth a fit.
 REFITTED = 4
 NEARLY_AS_GOOD = 0.5
 LEAST_GAIN = 10.0
@@ -126,9 +127,10 @@ def promising(
     """The next candidates worth fitting, those nearest to the linear best first.
 
     Left-out runs rank well what is well determined; a tether or an offset has more unknowns than
-    a linear step settles beside a large residual, and shows in the likelihood first. At first only
-    those that promise nearly as much as the best; once these were fitted, all that the screen does
-    not exclude follow: beside a large residual it ranks true effects sixth.
+    a linear step settles beside a large residual, and shows in the likelihood first. At first all
+    those that promise nearly as much as the best: beside a large residual the screen ranks true
+    effects sixth, and a drag that was not fitted was answered by its neighbour. Once these were
+    fitted, all that the screen does not exclude follow, a few at a time.
 
     Args:
         current: the fit without any.
@@ -154,7 +156,7 @@ def promising(
         least = max(least, LEAST_PROMISE_LATER) if later else least
         worth = (n for n in ranked if promise[n] > least and gains[n] > LEAST_GAIN)
         further = [n for n in worth if n not in tried]
-        chosen += [n for n in further[:REFITTED] if n not in chosen]
+        chosen += [n for n in further[: REFITTED if tried else None] if n not in chosen]
     return chosen
 
 
