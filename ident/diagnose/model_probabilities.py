@@ -117,6 +117,22 @@ def log_evidence(rival: Rival, counts: Array, independent: Array, weights: Array
     Source:
         MacKay 2003, Information Theory, Inference, and Learning Algorithms, chapter 28.
     """
+    prior = rival.prior.T @ rival.prior
+    squares, curves, change = _likeliest(rival, counts, independent, weights)
+    found = np.sum(weights * log_predictive(squares, counts, independent), axis=1)
+    away = np.einsum("da,ab,db->d", change, prior, change)
+    wider = np.linalg.slogdet(curves[:, :-1, :-1])[1] - np.linalg.slogdet(prior[:-1, :-1])[1]
+    beside = 0.0 if rival.own is None else rival.own.log_evidence(weights)
+    return found - 0.5 * away - 0.5 * wider + beside
+
+
+def _likeliest(
+    rival: Rival, counts: Array, independent: Array, weights: Array
+) -> tuple[Array, Array, Array]:
+    """Squares of the runs (d, r), and curvature and change over [unknowns; residual] there.
+
+    Each run counts as what it leaves does (`log_predictive`).
+    """
     grams = np.swapaxes(rival.triangles, 1, 2) @ rival.triangles
     prior = rival.prior.T @ rival.prior
     squares = np.broadcast_to(grams[:, -1, -1], weights.shape)
@@ -127,11 +143,24 @@ def log_evidence(rival: Rival, counts: Array, independent: Array, weights: Array
         step = -np.linalg.solve(curves[:, :-1, :-1], curves[:, :-1, -1:])[..., 0]
         change = np.column_stack([step, np.ones(len(step))])
         squares = np.einsum("da,rab,db->dr", change, grams, change, optimize=True)
-    found = np.sum(weights * log_predictive(squares, counts, independent), axis=1)
-    away = np.einsum("da,ab,db->d", change, prior, change)
-    wider = np.linalg.slogdet(curves[:, :-1, :-1])[1] - np.linalg.slogdet(prior[:-1, :-1])[1]
-    beside = 0.0 if rival.own is None else rival.own.log_evidence(weights)
-    return found - 0.5 * away - 0.5 * wider + beside
+    return squares, curves, change
+
+
+def numbers_taken(rival: Rival, counts: Array, independent: Array) -> float:
+    """How many numbers of the runs a model's unknowns have taken up: those that data determine.
+
+    Args:
+        rival: the model.
+        counts: how many numbers each run measured, (r,).
+        independent: how many of those that it leaves move independently, (r,).
+
+    Source:
+        Bishop 2006, Pattern Recognition and Machine Learning, sec. 3.5: the effective number of
+        parameters.
+    """
+    _, curves, _ = _likeliest(rival, counts, independent, np.ones((1, len(counts))))
+    kept = np.linalg.solve(curves[0, :-1, :-1], (rival.prior.T @ rival.prior)[:-1, :-1])
+    return float(len(kept) - np.trace(kept))
 
 
 def model_probabilities(rivals: Sequence[Rival], counts: Array, independent: Array) -> Array:
@@ -140,12 +169,15 @@ def model_probabilities(rivals: Sequence[Rival], counts: Array, independent: Arr
     Args:
         rivals: the models.
         counts: how many numbers each run measured, (r,).
-        independent: how many of them a discrepancy moves independently, (r,).
+        independent: how many of those that the first model leaves move independently, (r,).
 
     Source:
         Huggins, Miller 2023, Reproducible model selection using bagged posteriors.
     """
     runs = len(counts)
+    # A model that leaves less knows the inertia better and is charged for that: the numbers that
+    # tell the inertia have to count as well then.
+    independent = independent + numbers_taken(rivals[0], counts, independent) / runs
     weights = runs * np.random.default_rng(SEED).dirichlet(np.ones(runs), DRAWS)
     odds = np.log(CHANCE_OF_EFFECT / (1.0 - CHANCE_OF_EFFECT))
     logs = np.array(
