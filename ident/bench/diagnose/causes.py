@@ -25,6 +25,7 @@ PARTLY = {
     "constant_force": (0, 1),
 }
 ENDS = ("attachment_offset", "anchor_offset")
+HOOKS = "yielding_clamp"
 LENGTHS = "cable_length_bias"
 ALL_WIRES = "all wires"
 # What no run of any bench tells from a cause: the same equations in other words.
@@ -92,6 +93,7 @@ def causes_of(robot: Robot, only: Sequence[str] | None = None) -> tuple[Cause, .
         found.append(Cause(name, "", tuple(own[k] for k in places), directions))
     for name in ENDS:
         found += _ends(robot, name)
+    found += _hooks(robot)
     longer = Parameter("bias_m", -0.1, 0.1, 0.005)
     found.append(Cause(LENGTHS, ALL_WIRES, (longer,), np.zeros((0, 1))))
     return tuple(one for one in found if only is None or one.effect in only)
@@ -109,6 +111,16 @@ def _ends(robot: Robot, name: str) -> list[Cause]:
     found.append(Cause(name, "", alike, together))
     for cable, places in zip(robot.cables, flat, strict=True):
         found.append(Cause(name, cable.name, tuple(own[k] for k in places), eye[:, places]))
+    return found
+
+
+def _hooks(robot: Robot) -> list[Cause]:
+    """All hooks that yield alike, and each one by itself."""
+    own = effect_named(HOOKS).parameters(robot)
+    alike = replace(own[0], name="mass_over_stiffness_s2", part="")
+    found = [Cause(HOOKS, "", (alike,), np.ones((len(own), 1)))]
+    for k, one in enumerate(own):
+        found.append(Cause(HOOKS, one.part, (one,), np.eye(len(own))[:, [k]]))
     return found
 
 

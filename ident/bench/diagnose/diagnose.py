@@ -30,7 +30,7 @@ from freeswing.ident.bench.told.kinds_doubt import (
     with_kinds_counted,
 )
 from freeswing.ident.bench.told.scatter_by_kind import is_systematic
-from freeswing.ident.likelihood.fit import fit
+from freeswing.ident.likelihood.fit import Solution, fit
 
 LEAST_RUNS = 3  # of two, either is predicted by the other alone, drag, wires and all
 FEW = (
@@ -175,7 +175,8 @@ def _start(solved: Solved, scattered: bool = False) -> Fit:
 def _counted(solved: Solved, one: Fit, rounds: Sequence[Round] = ()) -> Solved:
     """A fit with the covariance that its held numbers ask for, and what it says of the mass.
 
-    What fits with causes that cannot be told apart differ by is counted in full.
+    What fits with causes that cannot be told apart differ by is counted in full, and so is what
+    changes with a cause that is probable and that too few runs bear out.
     """
     found = considered(one.swings, one.solution, solved.held)
     mass = solved.mass
@@ -188,14 +189,30 @@ def _counted(solved: Solved, one: Fit, rounds: Sequence[Round] = ()) -> Solved:
     elif mass is not None and mass.contradicted:
         change = doubt(found, mass)
         found = replace(found, covariance=found.covariance + np.outer(change, change))
+    counted = with_rounds(found, rounds)
+    return with_kinds_counted(replace(solved, solution=counted, swings=one.swings, mass=mass))
+
+
+def with_rounds(found: Solution, rounds: Sequence[Round]) -> Solution:
+    """A fit whose covariance counts in full what the rounds of a search could not decide.
+
+    Args:
+        found: the fit.
+        rounds: of the search that led there.
+
+    Source:
+        JCGM 100:2008, Guide to the Expression of Uncertainty in Measurement, sec. F.2.4.5.
+    """
     pairs = [
         (step.winner.solution, rival.solution)
         for step in rounds
         if step.winner is not None
         for rival in step.rivals
     ]
-    counted = with_differences(found, pairs)
-    return with_kinds_counted(replace(solved, solution=counted, swings=one.swings, mass=mass))
+    pairs += [
+        (before.solution, probable.solution) for step in rounds for before, probable in step.unborne
+    ]
+    return with_differences(found, pairs)
 
 
 def _ladder(

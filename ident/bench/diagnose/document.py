@@ -124,7 +124,10 @@ def _candidates(found: BenchDiagnosis) -> list[dict[str, Any]]:
         for word in words:
             name, before = word.cause.effect, told.get(word.cause.effect)
             kept = before is not None and before["verdict"] in ("accepted", "confounded")
-            better = before is None or (word.gain > before["held_out_gain"])
+            better = before is None or _rank(word) > (
+                before["probability"] or 0.0,
+                before["held_out_gain"],
+            )
             if not kept and (better or word.verdict != "rejected"):
                 told[name] = _word(word)
     for one in found.removed:
@@ -136,6 +139,11 @@ def _candidates(found: BenchDiagnosis) -> list[dict[str, Any]]:
         told_entry(n, "not_identifiable", NOT_ON_BENCHES) for n in catalogue() if n not in told
     ]
     return rows + mass_candidate(found.solved)
+
+
+def _rank(word: Word) -> tuple[float, float]:
+    """By which one of an effect's causes stands for all: how probable, then how much it takes."""
+    return word.chance or 0.0, word.gain
 
 
 def _beside_mass(row: dict[str, Any], mass: MassVerdict | None) -> dict[str, Any]:

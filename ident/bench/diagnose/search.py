@@ -62,11 +62,14 @@ class Round:
         words: what became of every cause.
         winner: the fit that goes on, or None.
         rivals: fits with what left-out runs cannot tell from the winner's, under the same noise.
+        unborne: without a winner, the fit without and each with what is probable all the same:
+            too few runs bear it out, and what it would change is not known to be right.
     """
 
     words: tuple[Word, ...]
     winner: Fit | None
     rivals: tuple[Fit, ...] = ()
+    unborne: tuple[tuple[Fit, Fit], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -246,8 +249,11 @@ def _judged(
         elif not reason and group:
             reason = f"{by_block[group[0]].effect} predicts left-out runs better"
         words[name] = Word(cause, verdict, share, chance[name], bic, others, reason)
-    rivals = tuple(weighed[name] for name in group[1:])
-    return Round(tuple(words.values()), weighed[group[0]] if group else None, rivals)
+    told = tuple(words.values())
+    if not group:
+        probable = [name for name in weighed if chance[name] > RIVAL]
+        return Round(told, None, unborne=tuple((before, weighed[name]) for name in probable))
+    return Round(told, weighed[group[0]], tuple(weighed[name] for name in group[1:]))
 
 
 def _complaint(before: Fit, one: Fit, counts: Array) -> str:

@@ -96,6 +96,7 @@ TRANSLATED = {
 }
 ELSEWHERE = {
     "platform_frame",
+    "yielding_clamp",
     "cable_elasticity",
     "winch_creep",
     "cable_length_bias",

@@ -35,6 +35,7 @@ from freeswing.ident.bench.diagnose.unexplained import remaining
 from freeswing.ident.bench.diagnose.weigh import Fit
 from freeswing.ident.bench.modal import ModalSwing
 from freeswing.ident.bench.swing import COMMON, BenchSwing, Column
+from freeswing.ident.likelihood.fit import Solution
 from freeswing.ident.likelihood.fit_blocks import linear_problem
 from freeswing.ident.likelihood.unknowns import Gaussian, Unknown, Unknowns
 from tests.ident.bench.test_swing_slopes import small_bench, trifilar
@@ -297,3 +298,32 @@ def test_the_less_probable_is_not_taken_for_the_one_that_failed(
     verdicts = {word.cause.effect: (word.verdict, word.reason) for word in told.words}
     assert verdicts["torsion_spring"] == ("rejected", "failed")
     assert ("far more probable" in verdicts["cable_mass"][1]) != accepted, verdicts
+    # Where nothing is found, what the probable one would change is not known to be right.
+    unborne = [] if accepted else [(before, weighed[spring.block])]
+    assert list(told.unborne) == unborne
+
+
+def test_what_is_probable_and_not_borne_out_counts_in_full() -> None:
+    """A centre of mass that goes 3 mm with a hook that yields, told to 1 mm without it."""
+    body = Unknown("platform", np.zeros(10), np.ones(10))
+    moved = replace(body, value=np.eye(10)[1] * 3e-3)
+
+    def solution(block: Unknown) -> Solution:
+        told = Unknowns((block,)), 1e-6 * np.eye(10), 0.0, (), np.ones(10), 10, 1
+        return Solution(*told, cast(Any, None))
+
+    rounds = [search.Round((), None, unborne=((fit_of(solution(body)), fit_of(solution(moved))),))]
+    counted = diagnose.with_rounds(solution(body), rounds)
+    assert counted.std("platform")[1] == pytest.approx(np.hypot(1e-3, 3e-3))
+    assert counted.std("platform")[2] == pytest.approx(1e-3)
+
+
+def fit_of(solution: Solution) -> Any:
+    return SimpleNamespace(solution=solution)
+
+
+def test_hooks_yield_alike_or_one_by_one() -> None:
+    causes = causes_of(trifilar(), ["yielding_clamp"])
+    assert [one.part for one in causes] == ["", "0", "1", "2"]
+    np.testing.assert_array_equal(causes[0].directions @ [2.0], [2.0, 2.0, 2.0])
+    np.testing.assert_array_equal(causes[2].directions @ [2.0], [0.0, 2.0, 0.0])
