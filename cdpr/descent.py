@@ -16,6 +16,9 @@ import math
 from dataclasses import dataclass
 from typing import Protocol, TypeVar, cast
 
+# Times the tolerance: a step that promised so much and brought nothing has failed, not converged.
+BROKEN = 10.0
+
 
 @dataclass(frozen=True, slots=True)
 class Stop:
@@ -305,9 +308,12 @@ class Watchdog:
         return best, problem.step(best, 0.0), taken, stop
 
     def _ends(self, promised: float, gain: float, full: bool) -> bool:
-        """Whether nothing is to be gained any more, by what a step promised or a full one did."""
-        settled = promised < self.tolerance or (gain < self.tolerance and full)
-        return settled and abs(gain) < self.tolerance
+        """Whether nothing is to be gained any more, by what a step promised or a full one did.
+
+        One that promised far more has gone too far: that it ends as high as it began is chance.
+        """
+        done = full and promised < BROKEN * self.tolerance
+        return (promised < self.tolerance or done) and abs(gain) < self.tolerance
 
     def _foreseen(self, before: float, gain: float, full: bool) -> bool:
         """Whether the steps to come gain less than the tolerance, after two full ones that fell.
