@@ -5,7 +5,6 @@ from __future__ import annotations
 import casadi as ca
 
 from freeswing.cdpr.effects.base import (
-    AMPLITUDES,
     PAYLOAD,
     Effect,
     Instant,
@@ -29,7 +28,7 @@ class YieldingClamp(Effect):
 
     name = "yielding_clamp"
     summary = "hooks of the wires that give way sideways"
-    separated_by = (PAYLOAD, AMPLITUDES)
+    separated_by = (PAYLOAD,)
     needs_tension = True
 
     def parameters(self, robot: Robot) -> tuple[Parameter, ...]:
