@@ -41,7 +41,10 @@ def honest_covariance(found: LikelihoodFit, scored: Refit) -> Array:
 def chance_of_nothing(found: LikelihoodFit, covariance: Array, name: str) -> float:
     """How often an effect that is not there would be found with values as far from nothing.
 
-    Zero for one whose size each run has for itself.
+    Where amounts are nothing shapes (a centre, a frequency) mean nothing: they are held, and count
+    as values that were free to be fitted. A drag about a centre that moves with it in a bent valley
+    is nowhere nothing, however wide either is told. Zero for one whose size each run has for
+    itself.
 
     Args:
         found: the final fit.
@@ -58,8 +61,12 @@ def chance_of_nothing(found: LikelihoodFit, covariance: Array, name: str) -> flo
     if not amounts.any():
         return 0.0
     away = (block.value - [p.start for p in parameters])[amounts]
-    told = covariance[np.ix_(columns[amounts], columns[amounts])]
-    return float(gammaincc(0.5 * len(away), 0.5 * away @ np.linalg.pinv(told) @ away))
+    free, shapes = columns[amounts], columns[~amounts & block.mask]
+    across = covariance[np.ix_(free, shapes)]
+    told = covariance[np.ix_(free, free)]
+    held = told - across @ np.linalg.pinv(covariance[np.ix_(shapes, shapes)]) @ across.T
+    square = float(away @ np.linalg.pinv(held) @ away)
+    return float(gammaincc(0.5 * (len(free) + len(shapes)), 0.5 * square))
 
 
 def directions(model: Model, places: np.ndarray, covariance: Array) -> list[dict[str, Any]]:

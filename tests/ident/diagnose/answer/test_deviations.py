@@ -55,3 +55,23 @@ def test_values_within_their_deviations_come_by_chance(deviations, chance):
     found, covariance = told_drag(deviations)
     told = chance_of_nothing(found, covariance, "rotational_drag")  # pyright: ignore[reportArgumentType]
     assert told == pytest.approx(chance, rel=0.01)
+
+
+@pytest.mark.parametrize(("deviations", "chance"), [(2.0, 0.135), (6.0, 1.5e-8)])
+def test_what_is_nothing_nowhere_along_a_bent_valley_is_seen(deviations, chance) -> None:
+    """Coefficient and centre of a drag: each known to its own size, together twenty times better.
+
+    Its chance is that of two values, since the centre was fitted too.
+    """
+    model = build_model(declared_robot("three-cable"), ("quadratic_drag",))
+    std, along = 0.03, 0.999
+    size = deviations * std * np.sqrt(1.0 - along**2)
+    block = SimpleNamespace(value=np.array([size, 0.3]), mask=np.ones(2, bool))
+    unknowns = SimpleNamespace(block=lambda _: block, columns=lambda _: np.array([1, 2]))
+    covariance = np.eye(3)
+    covariance[1:, 1:] = [[std**2, along * std * 0.1], [along * std * 0.1, 0.01]]
+    found = SimpleNamespace(model=model, unknowns=unknowns)
+    told = chance_of_nothing(found, covariance, "quadratic_drag")  # pyright: ignore[reportArgumentType]
+    assert told == pytest.approx(chance, rel=0.05)
+    alone = np.diag(np.diag(covariance))
+    assert chance_of_nothing(found, alone, "quadratic_drag") > 0.9  # pyright: ignore[reportArgumentType]
