@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import casadi as ca
 
-from freeswing.cdpr.effects.base import AMPLITUDES, Effect, Instant, Parameter
+from freeswing.cdpr.effects.base import AMPLITUDES, Clues, Effect, Instant, Parameter
 from freeswing.cdpr.model.body import Expression
 from freeswing.cdpr.robot import Robot
 
@@ -30,6 +30,10 @@ class QuadraticDrag(Effect):
         velocity = instant.velocity + ca.cross(instant.omega, lever)
         speed = ca.sqrt(ca.dot(velocity, velocity) + 1e-8)
         return instant.force_at(lever, -values[0] * speed * velocity)
+
+    def shape_guesses(self, clues: Clues) -> tuple[dict[str, float], ...]:
+        """Midway, and at P: a platform may turn about either, where a drag does nothing."""
+        return ({"centre_fraction": 0.5}, {"centre_fraction": 0.0})
 
 
 EFFECT = QuadraticDrag()

@@ -59,6 +59,25 @@ def test_of_several_lines_the_one_that_leaves_least_is_fitted(monkeypatch) -> No
     assert chosen.hz == 2.3
 
 
+@pytest.mark.parametrize("name", ["translational_drag", "quadratic_drag"])
+def test_a_drag_is_looked_for_where_the_platform_turns_and_where_it_does_not(
+    monkeypatch, name
+) -> None:
+    """A quadratic drag at P took 75 of the squares, midway 11, and was not fitted."""
+    left = {0.5: 1000.0, 0.0: 935.0}
+
+    def screened(found, keys, scales, shapes, colour) -> Any:
+        place = shapes[name]["centre_fraction"]
+        return SimpleNamespace(with_candidate=lambda _: left[place], place=place)
+
+    monkeypatch.setattr(module, "Residual", lambda *_: None)
+    monkeypatch.setattr(module, "screen", screened)
+    monkeypatch.setattr(module, "score", lambda cost: SimpleNamespace(cost=cost))
+    fit: Any = SimpleNamespace(model=SimpleNamespace(robot=declared_robot("three-cable")))
+    chosen: Any = Search(np.ones(2), (name,), workers=1)._screens(fit, [name], 1.0)[name]
+    assert chosen.place == 0.0
+
+
 @pytest.mark.slow
 def test_a_fan_whose_line_is_not_the_strongest_is_found(tmp_path) -> None:
     """Of 0.1 N, by x, y and chi alone: 2 % over the noise."""
