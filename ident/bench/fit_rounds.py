@@ -21,6 +21,7 @@ from freeswing.ident.bench.scatter_between_runs import WIDE_SCATTER, scatter_blo
 from freeswing.ident.bench.swing import COMMON, IZZ, BenchSwing
 from freeswing.ident.bench.two_wires.free_roll import (
     freed,
+    held_possible,
     levelled_as,
     rolls_unseen,
     unlevelled,
@@ -133,6 +134,10 @@ def solved(model: Model, bench: Bench, start: Assembled) -> Solved:
     found, mass = weighed_mass(bench, model, swings, found, start, FINE)
     change = doubt(unweighed, mass)
     right = _who_is_right(found, wires) + np.outer(change, change)
+    if model.robot.n_cables == 2:
+        found = replace(found, unknowns=held_possible(found.unknowns, held))
+        for name in held:
+            first = first.known(name, found.unknowns.block(name).prior)
     alone = found
     found = considered(swings, found, held)
     held_scatter = None

@@ -17,7 +17,7 @@ from freeswing.cdpr.rotation import matrix_from_angles
 from freeswing.ident.bench.fit_rounds import Solved
 from freeswing.ident.bench.objects import specific
 from freeswing.ident.bench.runs import BenchRun
-from freeswing.ident.bench.swing import BenchSwing
+from freeswing.ident.bench.swing import IZZ, BenchSwing
 from freeswing.ident.bench.told.budget import ACROSS, budget
 
 ROLLED_RAD = 0.035  # at 2 degrees Izz is known to 0.16 %, level to 0.14 (docs/decisions/benches.md)
@@ -31,14 +31,20 @@ def rolled_sentences(solved: Solved, runs: Sequence[BenchRun]) -> list[str]:
         runs: as fitted, in the order of the swings.
     """
     found = []
+    scaled = any(run.coordinates for run in runs)
     for block in solved.solution.unknowns.names:
         name = block.removeprefix("load.")
         mine = [k for k, run in enumerate(runs) if [one.load for one in run.loads] == [name]]
         if name == block or not mine or solved.swings[0].model.robot.n_cables != 2:
             continue
-        largest, value = budget(solved, block)[0], solved.solution.value(block)
+        value = solved.solution.value(block)
+        if not scaled:
+            std = float(solved.solution.std(block)[IZZ])
+            found.append(_unscaled_sentence(name, 100.0 * std / abs(float(value[IZZ]))))
+            continue
+        largest = budget(solved, block)[0]
         if largest.what in {ACROSS.format(name=one) for one in (name, "the platform")}:
-            share = 100.0 * largest.std_kg_m2 / abs(float(value[6]))
+            share = 100.0 * largest.std_kg_m2 / abs(float(value[IZZ]))
             posed = all(runs[k].coordinates == POSE_COORDINATES for k in mine)
             if all(runs[k].level_std_rad is not None for k in mine):
                 continue
@@ -69,6 +75,16 @@ def _sentence(solved: Solved, name: str, index: int, share: float, posed: bool) 
         f"{name}: {share:.2g} % of its Izz rests on other moments and products, which no run "
         f"tells: {told}, so that yaw turns it about another axis than its z. Lay it so that it "
         f"hangs level ({where}){push}"
+    )
+
+
+def _unscaled_sentence(name: str, percent: float) -> str:
+    return (
+        f"{name}: on two wires tracks of unknown scale leave open what roll would show (moments "
+        f"and products beside Izz, how deep the centres of mass hang): its Izz is known to "
+        f"{percent:.2g} %, and no fit of such runs could know it to better than some 5 %. Measure "
+        "yaw itself (chi_rad, by a sensor or a tag) with all level, or hang it on three wires: "
+        "either gives 1 % or better"
     )
 
 

@@ -144,6 +144,31 @@ def possible_body(block: Unknown, held: Array) -> Unknown:
     return replace(block, value=value, prior=prior, low=low)
 
 
+def held_possible(unknowns: Unknowns, held: Held) -> Unknowns:
+    """Held moments with the spread of bodies that have the Izz found, about the held values.
+
+    Roll pulls at yaw: beside two wires their first spread, twice a hoop through the wires, went
+    through a straight line into most of what an object's Izz was said to be uncertain by.
+
+    Args:
+        unknowns: of a fit in which they were held.
+        held: which are, by block.
+
+    Source:
+        JCGM 100:2008, sec. F.2.4.5: a known difference that is not corrected counts in full.
+    """
+    for name, mask in held.items():
+        block = unknowns.block(name)
+        prior, believed = block.prior, possible_body(block, mask).prior
+        if prior is None or believed is None:
+            continue
+        changed = believed.std != prior.std
+        off = np.where(changed, block.value - believed.mean, 0.0)
+        spread = np.hypot(believed.std, off)
+        unknowns = unknowns.known(name, Gaussian(believed.mean, spread, believed.source))
+    return unknowns
+
+
 def sides(robot: Robot, unknowns: Unknowns) -> list[Unknowns]:
     """The platform's centre of mass on either side of the line of the wires' lower ends."""
     block = unknowns.block("platform")

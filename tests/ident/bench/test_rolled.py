@@ -52,7 +52,8 @@ def told(
     signals = tuple(Signal(name, TIMES) for name in names)
     placed = (Placed("cube", np.eye(3), np.zeros(3)),)
     run = BenchRun("a", "identify", TIMES, signals, np.full(2, WIRE_M), loads=placed)
-    solution = SimpleNamespace(unknowns=blocks, value=lambda name: BODIES[name])
+    stds = {name: 0.1 * np.abs(body) for name, body in BODIES.items()}
+    solution = SimpleNamespace(unknowns=blocks, value=BODIES.get, std=stds.get)
     return rolled.rolled_sentences(SimpleNamespace(solution=solution, swings=(swing,)), [run])
 
 
@@ -83,6 +84,16 @@ def test_what_helps_is_said_where_it_matters(monkeypatch: pytest.MonkeyPatch) ->
     assert "spirit level" in yaw
     assert "not measured" in yaw
     assert told("wire lengths", POSE_COORDINATES, monkeypatch) == []
+    assert told("wire lengths", ("chi",), monkeypatch) == []
+
+
+def test_a_track_of_unknown_scale_says_which_run_would_help(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Whatever its budget's largest line is: the bound of such sessions is 4.7 %."""
+    (track,) = told("wire lengths", (), monkeypatch)
+    assert "known to 10 %" in track
+    assert "chi_rad" in track
 
 
 @pytest.mark.parametrize(("roll_deg", "said"), [(1.7, 0), (2.3, 1)])

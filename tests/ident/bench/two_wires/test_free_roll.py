@@ -19,7 +19,13 @@ from freeswing.ident.bench.identify_bench import identify_bench
 from freeswing.ident.bench.objects import moments
 from freeswing.ident.bench.runs import Bench, BenchRun, Load, Placed, Signal
 from freeswing.ident.bench.two_wires import free_roll
-from freeswing.ident.bench.two_wires.free_roll import between, possible_body, rolls_unseen, sides
+from freeswing.ident.bench.two_wires.free_roll import (
+    between,
+    held_possible,
+    possible_body,
+    rolls_unseen,
+    sides,
+)
 from freeswing.ident.bench.two_wires.level import lean
 from freeswing.ident.likelihood.unknowns import Gaussian, Unknown, Unknowns
 from freeswing.session.load_bench import load_bench
@@ -58,6 +64,20 @@ def of_izz(height: float, width: float) -> float:
 def test_roll_shows_what_two_wires_leave_unseen(wires, held, scaled, free) -> None:
     model = SimpleNamespace(robot=SimpleNamespace(n_cables=wires))
     assert rolls_unseen(model, held, scaled) == free
+
+
+def test_held_moments_spread_as_those_of_bodies_that_have_this_izz() -> None:
+    """Held at 0.07 where 0.032 is likeliest, +- 0.04: what that is off by counts beside it."""
+    found = held_possible(Unknowns((body(),)), {"platform": HELD}).block("platform")
+    np.testing.assert_array_equal(found.value, body().value)
+    assert found.prior is not None
+    np.testing.assert_allclose(found.prior.std[4:6], np.hypot(IZZ, 0.07 - 0.8 * IZZ))
+    others = np.r_[0:4, 6:10]
+    np.testing.assert_array_equal(found.prior.std[others], STD[others])
+    nothing = held_possible(Unknowns((body(),)), {"platform": np.zeros(10, bool)})
+    spread = nothing.block("platform").prior
+    assert spread is not None
+    np.testing.assert_array_equal(spread.std, STD)
 
 
 def test_moments_across_are_those_of_a_body_with_this_izz() -> None:
