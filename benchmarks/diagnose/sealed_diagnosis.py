@@ -6,6 +6,7 @@ makes the sessions of sealed_sessions.py in OUT (those that are not there), runs
 `freeswing diagnose` on each as a user would, and prints the confusion matrix, the false alarms,
 the smallest size found of each effect, and prediction errors before and after beside the noise.
 A session that has a result is not run again, and kinds take turns, so that a run may be stopped.
+With --visibility what is missed is told apart by how far it stands out of the noise at all.
 Figures go to OUT/sealed_diagnosis.json too; reliability.py draws the probabilities.
 """
 
@@ -32,11 +33,12 @@ from tests.oracle.recorded.cases import TIERS, Case  # noqa: E402
 from tests.oracle.scenes.effects import SIZES  # noqa: E402
 
 FLOOR_FACTOR = 1.5
+SEEN = 4.0  # deviations of all data together, below which no diagnosis can be asked for an effect
 TIMEOUT_S = 1800
 
 
-def diagnosed(case: Case, root: Path) -> dict[str, Any]:
-    """One case's row: its result, made unless it is there."""
+def diagnosed(case: Case, root: Path, with_visibility: bool = False) -> dict[str, Any]:
+    """One case's row: its result, made unless it is there; how visible what was missed is."""
     made(case, root, with_visibility=False)
     folder = root / case.name
     result, timing = folder / "results" / "diagnosis.json", folder / "truth" / "diagnosis_s.json"
@@ -50,7 +52,10 @@ def diagnosed(case: Case, root: Path) -> dict[str, Any]:
             return {"case": case.name, "kind": case.kind, "failed": done.stderr.strip()[-300:]}
         timing.write_text(json.dumps(time.perf_counter() - start))
     document = json.loads(result.read_text())
-    return judged(case, document, json.loads(timing.read_text()), folder)
+    row = judged(case, document, json.loads(timing.read_text()), folder)
+    if with_visibility and case.kind in ("single", "pair") and not right(row):
+        row["visibility"] = made(case, root, with_visibility=True)["visibility"]
+    return row
 
 
 def judged(case: Case, document: dict[str, Any], seconds: float, folder: Path) -> dict[str, Any]:
@@ -171,6 +176,10 @@ def summary(rows: list[dict[str, Any]]) -> list[str]:
         of_kind = [row for row in rows if row["kind"] == kind]
         if of_kind:
             lines.append(f"right answers, {kind}: {sum(map(right, of_kind))} of {len(of_kind)}")
+    known = {row["case"]: row["visibility"] for row in rows if "visibility" in row}
+    unseen = sum(size < SEEN for size in known.values())
+    lines.append(f"of those missed below {SEEN:g} deviations: {unseen} of {len(known)} known")
+    lines += [f"  {name}: {size:.1f} deviations" for name, size in known.items()]
     return lines + reliability(rows)
 
 
@@ -181,11 +190,14 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--tier", choices=TIERS, default="quick")
     parser.add_argument("--only", help="cases whose name holds this")
     parser.add_argument("--draw", type=int, default=0, help="another number: other seeds")
+    parser.add_argument(
+        "--visibility", action="store_true", help="how far what is missed stands out: a minute each"
+    )
     options = parser.parse_args(arguments)
     rows = []
     print(f"{'case':66s} ok?   before    after      s answer (errors over the noise floor)")
     for case in telling_first(selected(options.tier, options.only, options.draw)):
-        rows.append(diagnosed(case, options.out))
+        rows.append(diagnosed(case, options.out, options.visibility))
         print(line(rows[-1]), flush=True)
     print("\n".join(summary(rows)))
     (options.out / "sealed_diagnosis.json").write_text(json.dumps(rows, indent=1) + "\n")
