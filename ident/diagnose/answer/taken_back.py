@@ -66,18 +66,21 @@ def _before_last(accepted: Sequence[Round], last: Refit, name: str, noise_scales
 def unseen(
     accepted: Sequence[Round], final: LikelihoodFit, spread: Array
 ) -> list[tuple[str, float]]:
-    """Effects that forces were accepted for whose values are nothing, with the chance of that.
+    """Effects of an answer whose values are nothing, with the chance of that.
 
-    The one that came last comes first, then those that are likeliest nothing.
+    The one that came last comes first, then those that are likeliest nothing. Geometry that cable
+    lengths have settled is asked as well, where forces were let to say how far it is off, but for
+    places that lengths cannot tell apart: one of them may be nothing because another says the same.
 
     Args:
         accepted: rounds of the search that count.
         final: the last fit as it would be told.
         spread: covariance of its shared unknowns as it would be told, (p, p).
     """
-    settled = {effect_of(one.decision.key) for one in accepted if one.by_lengths}
+    by_lengths = [one.decision.group for one in accepted if one.by_lengths]
+    places = {name for group in by_lengths if len(group) > 1 for name in group}
     names = [effect_of(one.decision.key) for one in reversed(accepted)]
-    asked = [n for n in dict.fromkeys(names) if n not in settled and n in final.model.effects]
+    asked = [n for n in dict.fromkeys(names) if n not in places and n in final.model.effects]
     chances = {name: chance_of_nothing(final, spread, name) for name in asked}
     doubted = [name for name in asked if chances[name] >= 1.0 - ACCEPTED]
     return [(n, chances[n]) for n in sorted(doubted, key=lambda n: (n != names[0], -chances[n]))]

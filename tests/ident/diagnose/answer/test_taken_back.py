@@ -23,8 +23,8 @@ from tests.oracle.scenes.robots import declared_robot
 WHITE = np.ones(2)
 
 
-def won(name: str, before: Any = "before", by_lengths: bool = False) -> Any:
-    decision = SimpleNamespace(key=name, group=(name,))
+def won(name: str, before: Any = "before", by_lengths: bool = False, others: tuple = ()) -> Any:
+    decision = SimpleNamespace(key=name, group=(name, *others))
     return SimpleNamespace(by_lengths=by_lengths, decision=decision, before=before)
 
 
@@ -60,15 +60,18 @@ def test_no_last_effect_is_told_whose_values_are_nothing_within_their_deviations
         assert "not accepted" in fewer.note
 
 
-def test_the_last_is_asked_first_and_lengths_are_believed():
+@pytest.mark.parametrize(("others", "asked"), [(("pulley_axis",), False), ((), True)])
+def test_the_last_is_asked_first_and_a_group_of_lengths_is_believed(others, asked):
+    """Poses 20 ms late were found; a point that lengths moved beside them was told as nothing."""
     found, covariance = told(rotational_drag=0.5, swivel_viscous=1.5, pulley_friction=1.0)
     rounds = [
-        won("rotational_drag", by_lengths=True),
+        won("rotational_drag", by_lengths=True, others=others),
         won("pulley_friction"),
         won("swivel_viscous"),
     ]
     assert [name for name, _ in unseen(rounds, found, covariance)] == [
         "swivel_viscous",
+        *(["rotational_drag"] if asked else []),
         "pulley_friction",
     ]
 
