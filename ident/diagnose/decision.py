@@ -14,7 +14,7 @@ from freeswing.ident.diagnose.lengths.wrong_places import WrongPlace
 from freeswing.ident.diagnose.model_probabilities import LeftOut, Rival, model_probabilities
 from freeswing.ident.diagnose.refit import Refit, plausible
 from freeswing.ident.diagnose.screen import known_rows
-from freeswing.ident.diagnose.spectrum import independent_numbers
+from freeswing.ident.diagnose.spectrum import independent_numbers, lengths_off
 from freeswing.ident.diagnose.variants import effect_of, inside, variants
 from freeswing.ident.likelihood.joint_problem import INERTIA_UNIT
 
@@ -168,7 +168,7 @@ def settles(decision: Decision, current: Refit, noise_scales: Array) -> bool:
     if decision.winner is None:
         return False
     gain = left_out(current, noise_scales).share(decision.winner.score.held_out)
-    return gain >= LEAST_SHARE_EXPLAINED or excess_of(decision.winner) < LEAST_EXCESS_LATER
+    return gain >= LEAST_SHARE_EXPLAINED or lacks_little(decision.winner)
 
 
 def _best_of_each(ranked: list[str]) -> list[str]:
@@ -309,7 +309,7 @@ def _complaint(current: Refit, one: Refit, name: str, noise_scales: Array, later
             f"{worse} of {len(gains)} left-out runs are predicted worse with it, and its gain is "
             "within the scatter from run to run"
         )
-    if later and (excess < LEAST_EXCESS_LATER or gain < LEAST_GAIN_LATER):
+    if later and (lacks_little(current) or gain < LEAST_GAIN_LATER):
         return (
             f"it would remove {100 * gain:.0f} % of an excess of {100 * excess:.0f} % over the "
             "noise: too little to claim another effect"
@@ -335,6 +335,11 @@ def left_out(current: Refit, noise_scales: Array) -> LeftOut:
 def excess_of(current: Refit) -> float:
     """How much more than the noise predicts the left-out runs' squares are, as a share."""
     return current.held_out / float(current.evidence.counts.sum()) - 1.0
+
+
+def lacks_little(current: Refit) -> bool:
+    """Whether samples of left-out runs and the stated lengths are as their noise leaves them."""
+    return excess_of(current) < LEAST_EXCESS_LATER and not lengths_off(current.fit)
 
 
 def _winner(

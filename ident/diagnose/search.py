@@ -23,11 +23,11 @@ from freeswing.cdpr.system.progress import Progress
 from freeswing.ident.diagnose.backward_removal import is_no_worse, outdone, superfluous
 from freeswing.ident.diagnose.decision import (
     LARGEST_EXCESS_LEFT,
-    LEAST_EXCESS_LATER,
     Decision,
     by_lengths,
     decided,
     excess_of,
+    lacks_little,
     promising,
     settles,
 )
@@ -102,7 +102,7 @@ class Search:
         current = self._freed(self._geometry(current))
         with self.pool_of() as self.pool:
             for index in range(MOST_ROUNDS):
-                if index and (excess_of(current) < LEAST_EXCESS_LATER or too_small(current.fit)):
+                if index and (lacks_little(current) or too_small(current.fit)):
                     break
                 done = self._round(current, index)
                 self.rounds.append(done)

@@ -309,7 +309,10 @@ HELD = (
     Held("ident/diagnose/backward_removal.py", ("LARGEST_RISE",), RESIDUALS),
     Held(
         "ident/diagnose/spectrum.py",
-        ("LOWEST_HZ", "LINES", "HANN_WIDTH", "SMALLEST_RESIDUAL_M", "SMALLEST_RESIDUAL_RAD"),
+        (
+            "LOWEST_HZ", "LINES", "HANN_WIDTH", "SMALLEST_RESIDUAL_M", "SMALLEST_RESIDUAL_RAD",
+            "LENGTHS_BY_CHANCE",
+        ),
         RESIDUALS,
     ),
     Held(

@@ -58,6 +58,7 @@ def plain(monkeypatch):
     monkeypatch.setattr(decision, "included", lambda *_: 1.0)
     monkeypatch.setattr(decision, "unknowns", lambda current, key: (2, 0))
     monkeypatch.setattr(decision, "effect_of", lambda key: key)
+    monkeypatch.setattr(decision, "lengths_off", lambda _: False)
 
 
 @pytest.mark.parametrize(("chance", "passes"), [(0.94, False), (0.96, True)])
@@ -131,6 +132,20 @@ def test_a_further_effect_must_be_worth_its_place(excess, gain, passes) -> None:
     text = _complaint(before, after, "effect", np.ones(2), later=True)
     assert (text == "") == passes, text
     assert _complaint(before, after, "effect", np.ones(2), later=False) == ""
+
+
+@pytest.mark.parametrize("off", [False, True])
+def test_lengths_that_are_off_want_a_further_effect_at_the_noise_too(monkeypatch, off) -> None:
+    """A bias of 2 mm beside a displaced anchor: 51 of 20 500 squares, in 21 stated lengths."""
+    monkeypatch.setattr(decision, "lengths_off", lambda _: off)
+    count = 1e6
+    before = fitted([count / 4] * 4, 1e6, count)
+    after = fitted([(count - 5000.0) / 4] * 4, 0.0, count)
+    text = _complaint(before, after, "effect", np.ones(2), later=True)
+    assert (text == "") == off, text
+    winner = Decision((), before, "effect", ("effect",))
+    assert settles(winner, fitted([count] * 4, 1e6, count), np.ones(2))
+    assert settles(winner, before, np.ones(2)) != off
 
 
 def test_an_excess_counts_as_half_a_per_cent_at_least() -> None:
