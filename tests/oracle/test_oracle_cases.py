@@ -5,9 +5,11 @@ from __future__ import annotations
 import json
 from collections import Counter
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from benchmarks.diagnose.sealed_diagnosis import summary
 from freeswing.session.load_swings import load_target
 from freeswing.session.marker_runs import read_marker_runs
 from freeswing.session.session_file import read_session
@@ -105,3 +107,15 @@ def test_larger_drag_is_more_visible(sessions: dict[str, SessionTruth]) -> None:
     small, large = (visibility(sessions[size], "bologna-4") for size in ("small", "large"))
     assert small > 1.0, f"small {small:.2f}"
     assert 10.0 < large / small < 20.0, f"rate 16 times larger: {small:.2f} to {large:.2f}"
+
+
+@pytest.mark.parametrize(("seen", "below"), [(3.9, 1), (4.1, 0)])
+def test_what_hardly_stands_out_is_counted_apart_and_judged_as_ever(
+    seen: float, below: int
+) -> None:
+    row: dict[str, Any] = {"case": "faint", "kind": "single", "effects": [["tether", "small"]]}
+    row |= {"found": [], "wrong": [], "accepted": [], "after_over_floor": 1.0, "visibility": seen}
+    lines = summary([row])
+    assert "right answers, single: 0 of 1" in lines
+    assert f"of those missed below 4 deviations: {below} of 1 known" in lines
+    assert f"  faint: {seen} deviations" in lines

@@ -32,6 +32,7 @@ def test_effects_are_added_one_after_another(monkeypatch, there, found) -> None:
     monkeypatch.setattr(module, "rescored", lambda base, *_: anything(fit=None, left=base.left))
     monkeypatch.setattr(Search, "_freed", lambda self, current: current)
     monkeypatch.setattr(module, "excess_of", lambda current: 100.0)
+    monkeypatch.setattr(module, "lacks_little", lambda _: False)
     monkeypatch.setattr(module, "too_small", lambda _: False)
     search = Search(np.ones(2), (), workers=1)
     last: Any = search.run(anything(left=there))
