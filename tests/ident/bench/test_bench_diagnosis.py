@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from freeswing.main import main
-from tests.oracle.recorded.benches import CLEAN, Hidden, make_bench
+from tests.oracle.recorded.benches import CLEAN, PLATFORM_COM_M, Hidden, make_bench
 from tests.samples.expectations import result
 
 MASS_KG = 1.2  # of the platform, for which effects over the mass are told
@@ -149,19 +149,22 @@ def test_hooks_that_yield_sideways_are_never_wrong_and_sure(
 ) -> None:
     """Wires seem longer by tension over stiffness, without sagging: 2 mm, 8 mm of one of them.
 
-    Nothing is named that is not there, and what Izz may be off by is claimed.
+    Nothing is named that is not there, and what Izz and the centre of mass may be off by is
+    claimed: com_x was 3.9 deviations off.
     """
     truth = make_bench(tmp_path, 3, 3, seen, 6.0, (2, 1, 2), hidden)
     out = tmp_path / "out"
     assert main(["diagnose", str(tmp_path), "--results", str(out), "--quiet"]) == 0
     told = result(out, "diagnosis")
-    assert told["accepted"] == [], told["accepted"]
+    assert set(accepted(told)) <= {"yielding_clamp"}, told["accepted"]
     platform, load = (
         {row["name"]: row for row in one["parameters"]} for one in told["objects_after"]
     )
     izz, own = platform["Izz_P_kg_m2"], load["Izz_kg_m2"]
     assert abs(izz["value"] - truth.platform_izz_p) < 3.0 * izz["std"], izz
     assert abs(own["value"] - truth.load_izz) < 3.0 * own["std"], own
+    centre = platform["com_x_m"]
+    assert abs(centre["value"] - PLATFORM_COM_M[0]) < 3.0 * centre["std"], centre
 
 
 @pytest.mark.slow
