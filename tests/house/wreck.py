@@ -480,7 +480,6 @@ HELD = (
     Held("vision/fuse/tag_layout.py", ("_REJECT",), FUSE),
     Held("vision/look/detect.py", ("_LEAST_PERIMETER_RATE",), LOOK),
     Held("vision/look/marker_blobs.py", ("_EDGE_LEVEL", "_CENTRE_FLOOR_PX"), LOOK),
-    Held("vision/untagged/adjusted_points.py", ("_REST_STD_PX",), UNTAGGED),
     Held("calib/camera/impossible_lenses.py", ("SHORTEST_FOCAL", "LONGEST_FOCAL",), BOARD),
     Held(
         "calib/scene/scene_verdict.py",
@@ -689,11 +688,16 @@ HELD = (
     Held("vision/untagged/feature_matches.py", ("RATIO", "MOST_ANGLE_COS",), UNTAGGED),
     Held(
         "vision/untagged/pose_by_matches.py",
-        ("LEAST_MATCHES", "INLIER_PX", "FEATURE_STD_PX"),
+        ("LEAST_MATCHES", "INLIER_PX"),
         UNTAGGED,
     ),
     Held("vision/untagged/adjusted_points.py", ("_FAR",), UNTAGGED),
     Held("vision/untagged/feature_bias.py", ("LEAST_FRAMES",), FEATURES),
+    Held(
+        "vision/untagged/aligned_patches.py",
+        ("FARTHEST_PX", "LEAST_LIKENESS", "LEAST_FACING"),
+        "tests/vision/untagged/test_aligned_patches.py",
+    ),
     Held(
         "vision/untagged/rest_model.py",
         (

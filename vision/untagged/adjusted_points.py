@@ -28,7 +28,6 @@ Ints = NDArray[np.int64]
 _INSTANTS = 120  # of each run: more add little to points that each of them shows
 _STEPS = 3
 _FAR = 0.003  # rad: a sighting farther off than 3 px at f = 1000 px is no sighting of the point
-_REST_STD_PX = 0.3  # of a feature at rest: what is beyond three of it weighs less
 
 
 class PointSums:
@@ -97,11 +96,11 @@ def refined_points(
         for views, poses in runs:
             _add_run(sums, views, watch, poses)
         for camera in cameras:
-            if camera.name in model.seen:
-                which, features = model.seen[camera.name]
+            if camera.name in model.at_rest:
+                seen = model.at_rest[camera.name]
                 pose = camera.T_camera_base @ model.T_base_rest
-                rays = camera.normalise(features.pixels)
-                sums.add(which, np.tile(pose, (len(which), 1, 1)), rays)
+                rays = camera.normalise(seen.pixels)
+                sums.add(seen.which, np.tile(pose, (len(seen.which), 1, 1)), rays)
         points = sums.moved()
     return at_home(points, model, cameras)
 
@@ -172,12 +171,12 @@ def at_home(points_m: Array, model: RestModel, cameras: Sequence[Camera]) -> tup
         propagation; poses as by Murray, Li, Sastry 1994, A Mathematical Introduction to
         Robotic Manipulation, ch. 2.
     """
-    seen = [camera for camera in cameras if camera.name in model.seen]
-    which = [model.seen[camera.name][0] for camera in seen]
-    pixels = np.concatenate([model.seen[camera.name][1].pixels for camera in seen])
-    camera_of = np.repeat(np.arange(len(seen)), [len(own) for own in which])
-    std = np.full(len(pixels), _REST_STD_PX)
-    points = points_m[np.concatenate(which)]
-    T, covariance = still_pose(seen, camera_of, points, pixels, std, model.T_base_rest)
+    own = [camera for camera in cameras if camera.name in model.at_rest]
+    seen = [model.at_rest[camera.name] for camera in own]
+    pixels = np.concatenate([one.pixels for one in seen])
+    camera_of = np.repeat(np.arange(len(seen)), [len(one.which) for one in seen])
+    points = points_m[np.concatenate([one.which for one in seen])]
+    std = np.concatenate([one.std_px for one in seen])
+    T, covariance = still_pose(own, camera_of, points, pixels, std, model.T_base_rest)
     home = np.linalg.inv(model.T_base_rest) @ T
     return points_m @ home[:3, :3].T + home[:3, 3], covariance

@@ -16,7 +16,7 @@ from freeswing.calib.camera.camera import Camera
 from freeswing.calib.footage.copied_frames import with_copies
 from freeswing.calib.footage.frame_times import frame_times, needed
 from freeswing.cdpr.files.documents import InputError
-from freeswing.cdpr.rotation import exp_rotation
+from freeswing.cdpr.rotation import exp_rotation, transform
 from freeswing.vision.look.follow import (
     NOTHING,
     REPEATED,
@@ -36,6 +36,7 @@ from freeswing.vision.look.pieces import (
 )
 from freeswing.vision.look.single_pose import Pose
 from freeswing.vision.look.watched_target import Watch
+from freeswing.vision.untagged.aligned_patches import Aligned, Patches, SmoothImage, align_seen
 from freeswing.vision.untagged.feature_matches import FeatureFinder, Features, matched
 
 Array = NDArray[np.float64]
@@ -46,8 +47,6 @@ Image = NDArray[np.uint8]
 LEAST_MATCHES = 12
 # Between a match and the pose of the others: beyond it is another patch.
 INLIER_PX = 3.0
-# Noise of a feature's middle: a tenth of a pixel, more for larger blobs.
-FEATURE_STD_PX = 0.1
 _MARGIN_PX = 60
 _ROUNDS = 400
 
@@ -60,6 +59,7 @@ class PointMatcher:
     watch: Watch
     numbers: Ints
     at_rest: Features
+    patches: Patches
     past: list[tuple[float, Pose]] = field(default_factory=list)
     base_rays: dict[int, Array] = field(default_factory=dict)
     before: dict[int, tuple[float, float, float, float]] = field(default_factory=dict)
@@ -72,52 +72,54 @@ class PointMatcher:
         """The points in a frame: those that one pose explains."""
         left, top, right, bottom = self._box or (0, 0, image.shape[1], image.shape[0])
         features = self._finder.look(image[top:bottom, left:right], left, top)
-        view = self._view(features)
+        view = self._view(features, SmoothImage.of(image[top:bottom, left:right], left, top))
         if view.status != USED and self._box is not None:
             self._box = None
-            view = self._view(self._finder.look(image))
+            view = self._view(self._finder.look(image), SmoothImage.of(image))
         return view
 
     def forget(self) -> None:
         """As before the first frame, so that a piece does not depend on the one before."""
         self._box = None
 
-    def _view(self, features: Features) -> FrameView:
+    def _view(self, features: Features, image: SmoothImage) -> FrameView:
         own, seen = matched(self.at_rest.descriptors, features.descriptors)
         pixels = features.pixels[seen]
         rays = self.camera.normalise(pixels)
         fine = np.isfinite(rays[:, 0])
         own, seen, rays = own[fine], seen[fine], rays[fine]
-        solved = agreed_pose(self.watch.marker_positions_m[self.numbers[own]], rays, self.camera)
+        points = self.watch.marker_positions_m
+        solved = agreed_pose(points[self.numbers[own]], rays, self.camera)
         if solved is None:
             return FrameView(NOTHING, (), None)
         pose, inside = solved
         self._box = self._around(features.pixels[seen[inside]])
-        first = self.watch.first_marker
-        sightings = tuple(
-            self._sighting(
-                first + int(self.numbers[own[k]]),
-                features.pixels[seen[k]],
-                rays[k],
-                float(features.sizes_px[seen[k]]),
-            )
-            for k in inside.tolist()
-        )
-        return FrameView(USED, sightings, pose)
-
-    def _sighting(self, thing: int, pixel: Array, ray: Array, size_px: float) -> Sighting:
-        std_px = FEATURE_STD_PX * np.hypot(1.0, size_px) / np.sqrt(2.0)
-        _, slope, _ = self.camera.project_jacobian(np.array([[*ray, 1.0]]))
-        back = np.linalg.inv(slope[0, :, :2])
-        rays, covariance = np.zeros(8), np.zeros((8, 8))
-        rays[:2], covariance[:2, :2] = ray, std_px**2 * back @ back.T
-        return Sighting(thing, rays, covariance, np.full(4, pixel[1]), size_px, std_px)
+        which, found = align_seen(self.patches, image, self.camera, transform(*pose), points)
+        if len(which) < LEAST_MATCHES:
+            return FrameView(NOTHING, (), None)
+        things = self.watch.first_marker + which
+        return FrameView(USED, sightings_of(things, found, self.camera), pose)
 
     def _around(self, pixels: Array) -> tuple[int, int, int, int]:
         width, height = self.camera.size_px
         low = np.maximum(np.floor(pixels.min(axis=0)).astype(int) - _MARGIN_PX, 0)
         high = np.ceil(pixels.max(axis=0)).astype(int) + _MARGIN_PX
         return int(low[0]), int(low[1]), int(min(high[0], width)), int(min(high[1], height))
+
+
+def sightings_of(things: Ints, found: Aligned, camera: Camera) -> tuple[Sighting, ...]:
+    """What of the `Watch` is where, as rays with covariance."""
+    rays, covariances = np.zeros((len(things), 8)), np.zeros((len(things), 8, 8))
+    rays[:, :2] = camera.normalise(found.pixels)
+    ahead = np.concatenate([rays[:, :2], np.ones((len(rays), 1))], axis=1)
+    back = np.linalg.inv(camera.project_jacobian(ahead)[1][:, :, :2])
+    covariances[:, :2, :2] = found.std_px[:, None, None] ** 2 * back @ np.swapaxes(back, 1, 2)
+    return tuple(
+        Sighting(int(thing), ray, covariance, np.full(4, pixel[1]), 0.0, float(std))
+        for thing, ray, covariance, pixel, std in zip(
+            things, rays, covariances, found.pixels, found.std_px, strict=True
+        )
+    )
 
 
 def agreed_pose(points_m: Array, rays: Array, camera: Camera) -> tuple[Pose, Ints] | None:
@@ -152,6 +154,7 @@ def collect_points(
     camera: Camera,
     watch: Watch,
     at_rest: tuple[Ints, Features],
+    patches: Patches,
     recording: Recording,
     frame_rate_hz: float | None,
 ) -> list[Path]:
@@ -162,6 +165,7 @@ def collect_points(
         camera: its lens.
         watch: the platform's points.
         at_rest: points that this camera sees at rest, and their features there.
+        patches: of all points.
         recording: the frames.
         frame_rate_hz: serves where the recording has no stamps.
 
@@ -170,14 +174,15 @@ def collect_points(
     """
     stamps = needed(frame_times(recording, frame_rate_hz), recording)
     digest = hashlib.sha256(repr((stamps.rate_hz, stamps.stamps)).encode())
-    digest.update(np.ascontiguousarray(at_rest[1].descriptors).tobytes())
+    for array in (at_rest[1].descriptors, patches.greys, patches.tangents):
+        digest.update(np.ascontiguousarray(array).tobytes())
     inputs = input_hash(camera, watch, recording, b"untagged" + digest.digest())
     paths: list[Path] = []
     while is_whole(path := piece_path(folder, camera.name, inputs, len(paths))):
         paths.append(path)
     if paths and len(load_piece(paths[-1]).numbers) < FRAMES_A_PIECE:
         return paths
-    matcher = PointMatcher(camera, watch, *at_rest)
+    matcher = PointMatcher(camera, watch, *at_rest, patches)
     frames = islice(with_copies(read_frames(recording)), len(paths) * FRAMES_A_PIECE, None)
     while (first := next(frames, None)) is not None:
         matcher.forget()

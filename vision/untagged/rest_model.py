@@ -18,7 +18,9 @@ from freeswing.cdpr.files.number_table import comma_separated
 from freeswing.cdpr.measured.rigid_fit import fit_rigid
 from freeswing.cdpr.measured.target import Untagged
 from freeswing.cdpr.rotation import transform
+from freeswing.vision.untagged.aligned_patches import Patches
 from freeswing.vision.untagged.feature_matches import FeatureFinder, Features, matched
+from freeswing.vision.untagged.rest_patches import SeenAtRest, patches_at_rest
 from freeswing.vision.untagged.still_pose import still_pose
 
 Array = NDArray[np.float64]
@@ -50,6 +52,8 @@ class RestModel:
         points_m: platform frame, (n, 3).
         T_base_rest: platform to base at rest, by the named points, (4, 4).
         seen: by camera name: points, and their features at rest, in one order.
+        patches: of all points.
+        at_rest: by camera name, where it sees them at rest.
         frame_covariance: how well the marks give its frame: of position (m) and small rotation in
             the base frame, (6, 6).
     """
@@ -57,6 +61,8 @@ class RestModel:
     points_m: Array
     T_base_rest: Array
     seen: Mapping[str, tuple[Ints, Features]]
+    patches: Patches
+    at_rest: Mapping[str, SeenAtRest]
     frame_covariance: Array
 
 
@@ -129,7 +135,8 @@ def rest_model(
     for camera, own, feature in zip(seen, features_of, found, strict=True):
         rows = np.flatnonzero((own >= 0) & good)
         by_camera[camera.name] = (numbers[rows], feature.select(own[rows]))
-    return RestModel(inside, T_base_rest, by_camera, covariance)
+    placed, patches, at_rest = patches_at_rest(seen, rests, inside, T_base_rest, by_camera)
+    return RestModel(placed, T_base_rest, by_camera, patches, at_rest, covariance)
 
 
 def _errors(camera: Camera, points: Array, pixels: Array) -> Array:

@@ -38,6 +38,7 @@ from freeswing.vision.track_session import (
 )
 from freeswing.vision.tracking_report import tracking_document
 from freeswing.vision.untagged.adjusted_points import bias_of_features, refined_points
+from freeswing.vision.untagged.aligned_patches import overlap
 from freeswing.vision.untagged.feature_bias import PlatformErrors
 from freeswing.vision.untagged.pose_by_matches import collect_points
 from freeswing.vision.untagged.rest_model import rest_model
@@ -96,6 +97,7 @@ def track_untagged(
                 camera,
                 watch,
                 model.seen[camera.name],
+                model.patches,
                 recording,
                 frame_rate_hz,
             ),
@@ -117,8 +119,10 @@ def track_untagged(
     noise = read_calibration_noise(results / "calibration.json")
     frame = frame_of_platform(model.frame_covariance + rest, model.T_base_rest)
     errors = PlatformErrors(frame, bias)
+    shared = max(overlap(seen.pixels) for seen in model.at_rest.values())
     tracks = [
-        _grown(track_run(name, views, watch, settings, noise, errors)) for name, views in sources
+        _grown(track_run(name, views, watch, settings, noise, errors), shared)
+        for name, views in sources
     ]
     focal_px = float(np.mean([camera.focal_px.mean() for camera in cameras]))
     told = _how_well(len(model.points_m), errors, focal_px)
@@ -206,14 +210,14 @@ def _fused(
     return runs
 
 
-def _grown(track: RunTrack) -> RunTrack:
-    """Deviations as large as the residuals say: features err together where patches do."""
+def _grown(track: RunTrack, shared: float) -> RunTrack:
+    """Deviations as large as the residuals say, each pixel being in so many patches."""
     squares, count = track.after.total
     freedom = count - 6 * track.known
     trajectory = track.trajectory
     if trajectory is None or trajectory.covariances is None or freedom <= 0:
         return track
-    growth = max(1.0, squares / freedom)
+    growth = shared * max(1.0, squares / freedom)
     covariances = trajectory.covariances * growth
     root = float(np.sqrt(growth))
     return replace(

@@ -17,8 +17,10 @@ from freeswing.cdpr.measured.target import Marker, Untagged
 from freeswing.cdpr.rotation import transform
 from freeswing.vision.untagged import rest_model as room
 from freeswing.vision.untagged.adjusted_points import PointSums, at_home
+from freeswing.vision.untagged.aligned_patches import Aligned
 from freeswing.vision.untagged.feature_matches import matched
-from freeswing.vision.untagged.pose_by_matches import PointMatcher, agreed_pose
+from freeswing.vision.untagged.pose_by_matches import agreed_pose, sightings_of
+from freeswing.vision.untagged.rest_patches import SeenAtRest
 from freeswing.vision.untagged.still_pose import still_pose
 from tests.vision.untagged import boxes
 
@@ -70,11 +72,18 @@ def test_a_match_three_pixels_off_is_another_patch(off_px, inside) -> None:
     assert len(found[1]) == inside
 
 
-def test_a_small_blob_is_seen_to_a_tenth_of_a_pixel() -> None:
-    matcher = SimpleNamespace(camera=boxes.cameras()[0])
-    seen = PointMatcher._sighting(matcher, 0, np.zeros(2), np.zeros(2), 1.0)
-    focal = boxes.cameras()[0].focal_px[0]
-    assert focal * np.sqrt(seen.covariance[0, 0]) == pytest.approx(0.1, rel=0.15)
+def test_a_deviation_in_pixels_becomes_one_of_rays() -> None:
+    """Through a lens that distorts: by differences of its rays."""
+    camera, pixels = boxes.cameras()[0], np.array([[60.0, 420.0], [330.0, 240.0]])
+    found = Aligned(pixels, np.array([0.1, 0.02]))
+    seen = sightings_of(np.array([5, 9]), found, camera)
+    assert [one.thing for one in seen] == [5, 9]
+    for one, pixel, std in zip(seen, pixels, found.std_px, strict=True):
+        steps = [camera.normalise(pixel + e) - camera.normalise(pixel - e) for e in np.eye(2)]
+        slope = np.stack(steps, axis=1) / 2.0
+        np.testing.assert_allclose(one.rays[:2], camera.normalise(pixel), rtol=1e-12)
+        wanted = std**2 * slope @ slope.T
+        np.testing.assert_allclose(one.covariance[:2, :2], wanted, rtol=1e-4)
 
 
 @pytest.mark.parametrize(("off_px", "counts"), [(2.8, True), (3.2, False)])
@@ -137,6 +146,7 @@ def modelled(monkeypatch, count: int, off_px: float) -> room.RestModel:
     monkeypatch.setattr(room, "FeatureFinder", Finder)
     monkeypatch.setattr(room, "matched", lambda *_: (both, both))
     monkeypatch.setattr(room, "triangulate", lambda *_: points)
+    monkeypatch.setattr(room, "patches_at_rest", lambda _c, _r, inside, *_: (inside, None, {}))
     monkeypatch.setattr(room, "_named_frame", lambda *_: (np.eye(4), np.zeros(6)))
     rests = {camera.name: np.zeros((480, 640), np.uint8) for camera in cameras}
     untagged = Untagged(Path("rest"), Path("clicks.csv"), ())
@@ -161,21 +171,21 @@ def test_a_click_is_good_to_half_a_pixel(tmp_path) -> None:
     assert found["cam0", "A"][2] == pytest.approx(0.5, rel=0.15)
 
 
-def test_a_feature_at_rest_is_good_to_a_third_of_a_pixel() -> None:
-    """Beside what features of one pixel say of the frame."""
+def test_the_frame_at_rest_is_as_good_as_what_is_seen_there() -> None:
+    """Patches of 0.3 px say 0.3 of what features of one pixel say of the frame."""
     cameras, rest = boxes.cameras(), transform(np.eye(3), boxes.HOME_M)
     points = np.random.default_rng(1).uniform(-0.1, 0.1, (50, 3))
     pixels = [camera.project(camera.to_camera(points + boxes.HOME_M)) for camera in cameras]
     every = np.arange(50)
-    seen = {
-        camera.name: (every, SimpleNamespace(pixels=one))
+    at_rest = {
+        camera.name: SeenAtRest(every, one, np.full(50, 0.3))
         for camera, one in zip(cameras, pixels, strict=True)
     }
-    model = SimpleNamespace(seen=seen, T_base_rest=rest)
+    model = SimpleNamespace(at_rest=at_rest, T_base_rest=rest)
     _, covariance = at_home(points, model, cameras)
     count = len(cameras)
     camera_of, every = np.repeat(np.arange(count), 50), np.tile(points, (count, 1))
     _, alone = still_pose(
         cameras, camera_of, every, np.concatenate(pixels), np.ones(50 * count), rest
     )
-    assert np.sqrt(np.trace(covariance) / np.trace(alone)) == pytest.approx(0.3, rel=0.15)
+    assert np.sqrt(np.trace(covariance) / np.trace(alone)) == pytest.approx(0.3, rel=0.05)
