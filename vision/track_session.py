@@ -22,8 +22,9 @@ from typing import Any, Protocol
 
 from freeswing.calib.board.recordings import Recording, find_recordings
 from freeswing.calib.camera.camera import Camera
-from freeswing.calib.footage.first_frames import condition_of, torn_text
+from freeswing.calib.footage.first_frames import condition_of
 from freeswing.calib.footage.frame_times import frame_times, needed
+from freeswing.calib.footage.interlacing import torn_text
 from freeswing.cdpr.files.documents import DataError, InputError
 from freeswing.cdpr.measured.trajectory import Trajectory
 from freeswing.cdpr.system.progress import Progress

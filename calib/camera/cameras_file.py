@@ -16,9 +16,8 @@ from freeswing.calib.camera.impossible_lenses import question_lens
 from freeswing.calib.camera.lens_models import PARAMETER_NAMES
 from freeswing.cdpr.files.documents import Problems, Reader, load_toml, replace_file
 from freeswing.cdpr.files.toml_text import toml_text
+from freeswing.cdpr.files.unit_quaternions import declared_quaternion
 from freeswing.cdpr.rotation import matrix_from_quaternion, quaternion_from_matrix, transform
-
-_UNIT_TOLERANCE = 1e-3  # a quaternion written with three decimals
 
 
 def read_cameras(path: Path | str) -> tuple[Camera, ...]:
@@ -82,7 +81,7 @@ def _camera(entry: Reader) -> Camera | None:
         entry.add("params", f"focal length {params[0]:g} px must be above 0")
     if not entry.problems:
         question_lens(entry, model, size, params)
-    quaternion = entry.unit_vector("q_camera_base", 4, _UNIT_TOLERANCE)
+    quaternion = declared_quaternion(entry, "q_camera_base")
     position = entry.vector("t_camera_base_m", 3)
     clock_offset = entry.optional_number("clock_offset_s") or 0.0
     line_time = entry.optional_number("line_time_s") or 0.0

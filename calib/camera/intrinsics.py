@@ -9,12 +9,12 @@ import numpy as np
 from freeswing.calib.board.board_pose import best_poses, view_errors
 from freeswing.calib.board.planar_pose import (
     board_poses,
-    flatness_errors,
     focal_guess,
     homographies,
 )
 from freeswing.calib.camera.camera import Camera
 from freeswing.calib.camera.lens_models import FISHEYE, PARAMETER_NAMES, Array
+from freeswing.calib.camera.off_plane_views import DroppedView, drop_false_boards
 from freeswing.calib.rig.bundle_adjustment import ROUGHLY_CONVERGED, Adjustment, adjust
 from freeswing.calib.rig.normal_equations import Problem
 from freeswing.calib.rig.reprojection import Scene
@@ -23,28 +23,10 @@ from freeswing.calib.rig.views import Views
 from freeswing.cdpr.files.documents import DataError
 
 LEAST_VIEWS = 4  # three tell five numbers of a lens (Zhang 2000, sec. 3.1); one more checks
-# Of the board: one that fills the image is off a plane by 3 % in a fisheye, by 5 at k1 = -0.3.
-FLATNESS_LIMIT = 0.06
-# Times the usual: a board twice as near is off by two to four times as much.
-_FLATNESS_OUTLIER = 8.0
-_FLATNESS_FLOOR = 0.01  # a board over a third of the image's width is off by 0.5 to 1 %
 _FOCAL_STARTS = (0.5, 0.8, 1.2, 2.0)
 _FISHEYE_STARTS = (0.3, 0.4, 0.5, 0.7)
 _GOOD_PX = 1.0  # detection leaves a tenth: what is above is looked for from other focal lengths
 _START_VIEWS = 16
-
-
-@dataclass(frozen=True, slots=True)
-class DroppedView:
-    """A view left out: where it is, its error and the limit it broke."""
-
-    label: str
-    error: float
-    limit: float
-    unit: str
-
-    def __str__(self) -> str:
-        return f"{self.label}: {self.error:.3g} {self.unit} (limit {self.limit:.3g})"
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,21 +77,6 @@ def start_camera(
     views, poses = views.select(good), poses[good]
     errors = view_errors(camera, board_points_m, poses, views.pixels)
     return CameraStart(camera, poses, views, dropped, float(np.median(errors)))
-
-
-def drop_false_boards(board_points_m: Array, views: Views) -> tuple[Views, tuple[DroppedView, ...]]:
-    """Leave out views whose corners are no image of a plane (false detections)."""
-    if not len(views):
-        return views, ()
-    errors = flatness_errors(board_points_m[:, :2], views.pixels)
-    usual = float(np.nanmedian(errors))
-    limit = min(FLATNESS_LIMIT, max(_FLATNESS_FLOOR, _FLATNESS_OUTLIER * usual))
-    bad = ~(errors <= limit)
-    dropped = tuple(
-        DroppedView(views.label[i], 100.0 * errors[i], 100.0 * limit, "% of the board off a plane")
-        for i in np.flatnonzero(bad)
-    )
-    return views.select(~bad), dropped
 
 
 def _best_lens(

@@ -1,8 +1,7 @@
-"""What is wrong with the pictures themselves: copies of the frame before, and half pictures.
+"""Frames that only repeat the one before, told by what changed, and how many are too many.
 
 A recorder that runs faster than its source repeats frames; a lossy codec then stores a copy as
-"nothing changed", which is not quite the same numbers. Interlaced video holds two moments in one
-frame, one in the even rows, one in the odd ones: what moves is torn into combs.
+"nothing changed", which is not quite the same numbers.
 """
 
 from __future__ import annotations
@@ -13,7 +12,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from freeswing.calib.footage.change_kernels import bends, largest_tile_change
+from freeswing.calib.footage.change_kernels import largest_tile_change
 
 Image = NDArray[np.uint8]
 Array = NDArray[np.float64]
@@ -26,16 +25,12 @@ COPY_SHIFT_PX = 0.08
 """Edges of a copy stand still but for the codec (x264: 0.04 px at crf 18; in 95 % of copies less
 than this at crf 23). Of 22 frames at which a platform turned round, one moved less: it tells
 nothing that the frame before did not."""
+MOST_COPIES = 0.03
+"""Of the frames looked at: fewer are a platform that turns round, or do not matter."""
 _EDGE_GREY = 8.0  # a pixel, mean of a tile: below, noise of some grey values would tell a shift
 _LEAST_GREY = 3.0
 """Where no frame around changes by more (mean of some tile), nothing moves: nothing is a copy."""
 _AROUND = 2
-_MOVED_GREY = 24.0
-"""A pixel that changes by more was passed by an edge."""
-_LEAST_MOVED = 200  # pixels: one edge of 20 px that went by ten
-COMB_RATIO = 1.1
-"""Bend from row to row over bend from every second row to the next, where things move. Pictures of
-one moment have 0.3 to 0.5 (1.0 would be pure noise), two moments in one frame 1.4 and more."""
 
 
 def largest_change(before: Image, image: Image) -> float:
@@ -98,7 +93,6 @@ def _judged(
     return frame, alike and largest_shift_px(before, frame[2]) < COPY_SHIFT_PX
 
 
-def comb_ratio(before: Image, image: Image) -> float:
-    """How torn the moving parts of a frame are, NaN where too little moves."""
-    count, near, far = bends(before, image, int(_MOVED_GREY))
-    return float(near / max(far, 1)) if count >= _LEAST_MOVED else float("nan")
+def are_many(copies: int, frames: int) -> bool:
+    """Whether so many copies among so many frames are worth a word."""
+    return copies > MOST_COPIES * frames

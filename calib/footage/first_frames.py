@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from freeswing.calib.board.recordings import Recording, read_frames
-from freeswing.calib.footage.copied_frames import COMB_RATIO, comb_ratio, with_copies
+from freeswing.calib.footage.copied_frames import with_copies
+from freeswing.calib.footage.interlacing import comb_ratio, is_torn
 
 _ENOUGH_MOVING = 12  # pairs of frames with motion, of which the median is taken
 _MOST_FRAMES = 150
@@ -42,14 +43,4 @@ def condition_of(recording: Recording, least: int = 0) -> Condition:
         moving = int(np.isfinite(ratios).sum())
         if frames >= max(_MOST_FRAMES, least) or (moving >= _ENOUGH_MOVING and frames >= least):
             break
-    told = np.array(ratios)[np.isfinite(ratios)]
-    is_torn = len(told) > 0 and float(np.median(told)) > COMB_RATIO
-    return Condition(frames, copies, is_torn)
-
-
-def torn_text(recording: Recording) -> str:
-    """What to say of a recording whose frames are torn."""
-    return (
-        f"{recording.path}: interlaced: its even rows show another moment than its odd ones. Film "
-        "progressive, or keep one field (ffmpeg -vf field), and calibrate at that size"
-    )
+    return Condition(frames, copies, is_torn(ratios))

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from freeswing.calib.board.motion_pieces import Timeline, in_pieces
 from freeswing.calib.camera.camera import Camera
-from freeswing.calib.camera.intrinsics import CameraStart, DroppedView, start_camera
+from freeswing.calib.camera.intrinsics import CameraStart, start_camera
 from freeswing.calib.camera.lens_models import Array
+from freeswing.calib.camera.off_plane_views import DroppedView
 from freeswing.calib.rig.board_sag_and_growth import shape_std_m
 from freeswing.calib.rig.bundle_adjustment import (
     ROUGHLY_CONVERGED,

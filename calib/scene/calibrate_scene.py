@@ -17,13 +17,9 @@ from freeswing.calib.scene.clicked_points import (
     read_clicks,
     surveyed_sightings,
 )
+from freeswing.calib.scene.frame_by_survey import placed_points, roughly_in_base, tied_to_survey
 from freeswing.calib.scene.lab_map import LabMap, map_of
-from freeswing.calib.scene.map_frame import (
-    placed_points,
-    roughly_in_base,
-    tied_to_survey,
-    with_distances,
-)
+from freeswing.calib.scene.scale_by_distances import with_distances
 from freeswing.calib.scene.scene_rig import rig_of_map, rig_part
 from freeswing.calib.scene.scene_verdict import (
     SceneChecks,

@@ -13,29 +13,18 @@ import numpy as np
 
 from freeswing.calib.camera.camera import Camera
 from freeswing.calib.camera.lens_models import Array
-from freeswing.calib.rig.bundle_adjustment import ROUGHLY_CONVERGED, Adjustment, adjust
+from freeswing.calib.rig.bundle_adjustment import ROUGHLY_CONVERGED, adjust
 from freeswing.calib.rig.normal_equations import Problem
 from freeswing.calib.rig.reprojection import Scene, camera_slices
 from freeswing.calib.rig.reprojection_kernels import WARP
 from freeswing.calib.rig.solve_rig import Rig, free_unknowns
 from freeswing.calib.rig.views import Views, make_views
+from freeswing.calib.scene.blob_sizes import feature_variance, small_blobs
+from freeswing.calib.scene.chosen_points import agreeing, chosen_points
 from freeswing.calib.scene.lab_map import LabMap
 from freeswing.calib.scene.stills import Still
 from freeswing.cdpr.rotation import invert
 
-# A match that is wrong lies anywhere: 4 deviations leave 1 good sighting in 3000 out.
-MATCH_SIGMAS = 4.0
-# Seen three times a point tests itself; of two sightings one cannot be told to be wrong.
-LEAST_SIGHTINGS = 3
-# Points taken from each image, longest tracks first: 600 at 0.3 px place a camera of the rig to
-# 0.02 px; images of the walk need only hold together what those see.
-POINTS_A_CAMERA, POINTS_A_STILL = 600, 120
-# A blob's middle errs in proportion to its size; noise of pixels bounds that of the smallest.
-LEAST_SIZE_PX = 1.0
-# The picture of a blob's middle is not the middle of its picture where it is seen obliquely: they
-# are apart by size^2 / f times the slope, all to one side. A room of 4 m: blobs above the median
-# moved focal lengths by 0.5 to 0.9 %, six deviations, those below this limit by one or two.
-OBLIQUE_BLOB_PX = 0.012
 _MOST_SWEEPS = 2
 
 
@@ -57,7 +46,7 @@ def rig_of_map(found: LabMap, stills: Sequence[Still], model: str) -> Rig:
     result = adjust(scene, problem, rounds=1, converged=ROUGHLY_CONVERGED)
     trimmed = 0
     for _ in range(_MOST_SWEEPS):
-        keep = _kept(result, problem)
+        keep = agreeing(result, problem)
         if keep.all():
             break
         trimmed += int((~keep).sum())
@@ -116,57 +105,6 @@ def _start(found: LabMap, stills: Sequence[Still], model: str) -> tuple[Scene, V
     return Scene(cameras, boards, np.zeros(WARP), np.zeros((0, 3))), views
 
 
-def feature_variance(size_px: Array) -> Array:
-    """Variance of features by the size of their blobs, up to a common factor, (m,).
-
-    Source:
-        Lowe 2004, Distinctive Image Features from Scale-Invariant Keypoints: places are as
-        good as their scale; a sum of independent variances.
-    """
-    return LEAST_SIZE_PX**2 + size_px**2
-
-
-def small_blobs(image: np.ndarray, size_px: Array, focal_px: Array) -> np.ndarray:
-    """Sightings of blobs so small that a slanted view does not move their middles, bool (m,).
-
-    Of an image that has few of them its smallest count.
-
-    Args:
-        image: image of each sighting, (m,).
-        size_px: size of the blob in each, (m,).
-        focal_px: focal length of each image, (n,).
-
-    Source:
-        Heikkila 2000, Geometric camera calibration using circular control points, sec. 3.3.
-    """
-    apart = size_px**2 / focal_px[image]
-    small = apart < OBLIQUE_BLOB_PX
-    for index in np.unique(image):
-        own = np.flatnonzero(image == index)
-        if small[own].sum() < POINTS_A_STILL:
-            small[own[np.argsort(apart[own], kind="stable")[:POINTS_A_STILL]]] = True
-    return small
-
-
-def chosen_points(camera: np.ndarray, point: np.ndarray, walk: np.ndarray) -> np.ndarray:
-    """The points that are adjusted: of every image the most often seen, sorted.
-
-    Args:
-        camera: camera of each sighting, (m,).
-        point: point of each, (m,).
-        walk: whether a camera is an image of the walk, (n_cameras,).
-    """
-    sightings = np.bincount(point)
-    chosen: set[int] = set()
-    for index, carried in enumerate(walk):
-        own = point[camera == index]
-        own = own[sightings[own] >= LEAST_SIGHTINGS]
-        order = np.argsort(-sightings[own], kind="stable")
-        most = POINTS_A_STILL if carried else POINTS_A_CAMERA
-        chosen |= set(own[order[:most]].tolist())
-    return np.array(sorted(chosen), dtype=int)
-
-
 def _unknowns(cameras: tuple[Camera, ...], walk: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Which unknowns are free, and which lenses are one."""
     free = free_unknowns(cameras, held_pose=0)
@@ -182,15 +120,6 @@ def _unknowns(cameras: tuple[Camera, ...], walk: np.ndarray) -> tuple[np.ndarray
     leaders = np.tile(np.arange(lens) + slices[int(carried[0])].start, len(many))
     free[followers] = False
     return free, np.stack([followers, leaders])
-
-
-def _kept(result: Adjustment, problem: Problem) -> np.ndarray:
-    """Sightings that agree, of points that are still seen often enough, bool (n_views,)."""
-    views = problem.views
-    error = np.linalg.norm(result.residuals_px[:, 0], axis=-1)
-    keep = error <= MATCH_SIGMAS * result.sigma_px[views.camera]
-    sightings = np.bincount(views.piece[keep], minlength=len(result.scene.T_base_boards))
-    return keep & (sightings[views.piece] >= LEAST_SIGHTINGS)
 
 
 def scaled(rig: Rig, factor: float) -> Rig:

@@ -10,12 +10,11 @@ from numpy.typing import NDArray
 from freeswing.cdpr.driven.record import DriveRecord
 from freeswing.cdpr.files.documents import InputError, replace_file
 from freeswing.cdpr.files.number_table import check_times, comma_separated, read_lines, read_numbers
+from freeswing.cdpr.files.unit_quaternions import wrong_recorded
 
 Array = NDArray[np.float64]
 
 POSE_COLUMNS = ("x_m", "y_m", "z_m", "qw", "qx", "qy", "qz")
-# A camera's quaternion written with 3 digits is off by less; scaled or swapped entries by more.
-NORM_TOLERANCE = 1e-2
 DIGITS = "%.12g"
 
 
@@ -129,7 +128,7 @@ class _Table:
         known = np.isfinite(poses)
         partial = known.any(axis=1) & ~known.all(axis=1)
         norms = np.linalg.norm(poses[:, 3:], axis=1, keepdims=True)
-        wrong = known.all(axis=1) & (np.abs(norms[:, 0] - 1.0) > NORM_TOLERANCE)
+        wrong = known.all(axis=1) & wrong_recorded(norms[:, 0])
         for rows, says in (
             (partial, "holds part of a pose; leave all seven cells empty or none"),
             (wrong, "the quaternion's norm is not 1; the order is w x y z"),

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from freeswing.cdpr.files.documents import read_text
 from freeswing.cdpr.files.problems import InputError
+from freeswing.cdpr.files.unit_quaternions import wrong_recorded
 
 Array = NDArray[np.float64]
 
@@ -19,8 +20,6 @@ MOST_TEXT_BYTES = 64 * 2**20
 MOST_ROWS = 2_000_000
 MOST_COLUMNS = 4000
 LARGEST_NUMBER = 1e12
-# Quaternions are written with two decimals and more; scaled or shuffled entries are off by more.
-QUATERNION_TOLERANCE = 0.02
 MISSING = ("", "nan", "-nan", "+nan", "na", "n/a", "null")
 
 
@@ -135,7 +134,7 @@ def check_quaternions(path: Path | str, table: NumberTable, q: Array, order: str
         InputError: naming the line.
     """
     norm = np.linalg.norm(q, axis=1)
-    wrong = np.flatnonzero(np.abs(norm - 1.0) > QUATERNION_TOLERANCE)
+    wrong = np.flatnonzero(wrong_recorded(norm))
     if len(wrong):
         raise InputError(
             f"{path}: line {table.lines[wrong[0]]}: the quaternion's length is "

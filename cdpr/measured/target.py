@@ -16,6 +16,7 @@ from freeswing.cdpr.files.documents import (
     inside,
     load_toml,
 )
+from freeswing.cdpr.files.unit_quaternions import declared_quaternion
 from freeswing.cdpr.robot import frozen_array
 from freeswing.cdpr.rotation import matrix_from_quaternion, quaternion_from_matrix, transform
 
@@ -24,7 +25,6 @@ Array = NDArray[np.float64]
 SMALLEST_M = 1e-4  # a tenth of a millimetre: neither printed nor seen
 LARGEST_TAG_M = 3.0  # a tag wider than a room's wall; 5 mm taken for metres is above it
 LARGEST_MARKER_M = 0.5  # wider than any; 5 mm taken for metres is above it
-QUATERNION_TOLERANCE = 1e-3  # written with three decimals
 # Of named points' extent: nearer to one line they leave the turn about it to a click's error.
 LEAST_BREADTH = 0.1  # of named points' extent: nearer to a line the turn about it is hardly told
 UNIT_CORNERS = 0.5 * np.array([[-1.0, 1, 0, 0], [1, 1, 0, 0], [1, -1, 0, 0], [-1, -1, 0, 0]])
@@ -198,7 +198,7 @@ def _read_tag_values(reader: Reader) -> tuple[str, int, float, Array, Array, flo
         reader.string("family"),
         reader.integer("id", minimum=0),
         reader.number("size_m", above=0.0),
-        reader.unit_vector("q_platform_tag", 4, QUATERNION_TOLERANCE),
+        declared_quaternion(reader, "q_platform_tag"),
         reader.vector("t_platform_tag_m", 3),
         reader.optional_number("std_m", above=0.0),
     )

@@ -15,8 +15,6 @@ if TYPE_CHECKING:
 
 LOOKED_AT = 100
 """Frames looked at for copies: a recorder that repeats frames does so many times in as many."""
-MOST_COPIES = 0.03
-"""Fewer are a platform that turns round, or do not matter."""
 VIDEO_SUFFIXES = (".mkv", ".avi", ".mp4", ".mov")
 IMAGE_SUFFIXES = (".png", ".bmp", ".tif", ".tiff", ".pgm", ".jpg", ".jpeg")
 
@@ -99,8 +97,10 @@ def footage_findings(subject: str, folder: Path, frame_rate_hz: float | None) ->
 def _recording_findings(
     subject: str, recording: Recording, frame_rate_hz: float | None
 ) -> Iterator[Finding]:
-    from freeswing.calib.footage.first_frames import condition_of, torn_text
+    from freeswing.calib.footage.copied_frames import are_many
+    from freeswing.calib.footage.first_frames import condition_of
     from freeswing.calib.footage.frame_times import frame_times
+    from freeswing.calib.footage.interlacing import torn_text
 
     times = frame_times(recording, frame_rate_hz)
     for remark in times.remarks:
@@ -111,7 +111,7 @@ def _recording_findings(
     condition = condition_of(recording, LOOKED_AT)
     if condition.is_torn:
         yield Finding("error", subject, torn_text(recording))
-    if condition.copies > MOST_COPIES * condition.frames:
+    if are_many(condition.copies, condition.frames):
         text = f"{condition.copies} of the first {condition.frames} frames repeat the one before"
         remedy = "record at the source's own rate; copies are left out"
         yield Finding("warning", subject, text, remedy)

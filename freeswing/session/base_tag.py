@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.cdpr.files.documents import Reader
+from freeswing.cdpr.files.unit_quaternions import declared_quaternion
 from freeswing.cdpr.measured.target import (
     LARGEST_TAG_M,
-    QUATERNION_TOLERANCE,
     SMALLEST_M,
     UNIT_CORNERS,
 )
@@ -56,7 +56,7 @@ def _by_centre(reader: Reader) -> Array | None:
         reader.add("corners_base_m", "missing (or centre_base_m, q_base_tag and size_m)")
         return None
     centre = reader.vector("centre_base_m", 3)
-    turn = reader.unit_vector("q_base_tag", 4, QUATERNION_TOLERANCE)
+    turn = declared_quaternion(reader, "q_base_tag")
     size = reader.number("size_m", above=SMALLEST_M, maximum=LARGEST_TAG_M)
     if not (np.isfinite(centre).all() and np.isfinite(turn).all() and np.isfinite(size)):
         return None

@@ -7,12 +7,11 @@ import math
 import numpy as np
 
 from freeswing.cdpr.files.documents import Reader
+from freeswing.cdpr.files.unit_quaternions import wrong_recorded
 from freeswing.cdpr.robot import POSE_COORDINATES
 from freeswing.cdpr.rotation import matrix_from_quaternion
 from freeswing.ident.bench.channels import Channel
 from freeswing.ident.bench.runs import KnownBody, Load, Placed
-
-UNIT_QUATERNION = 0.02  # a rounded one is still one
 
 
 def read_channels(reader: Reader) -> tuple[Channel, ...]:
@@ -160,7 +159,7 @@ def _read_place(reader: Reader) -> Placed | None:
     if not (np.isfinite(q).all() and np.isfinite(shift).all()):
         return None
     length = float(np.linalg.norm(q))
-    if abs(length - 1.0) > UNIT_QUATERNION:
+    if wrong_recorded(np.array(length)):
         reader.add("q_platform_load", f"has length {length:.4g}, must be 1 (order w, x, y, z)")
         return None
     return Placed(name, matrix_from_quaternion(q / length), shift)

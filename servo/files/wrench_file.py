@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from freeswing.cdpr.files.documents import InputError, replace_file
 from freeswing.cdpr.files.number_table import check_width, comma_separated, read_lines, read_numbers
+from freeswing.cdpr.files.unit_quaternions import DECLARED_OFF, wrong_declared
 from freeswing.cdpr.frozen import freeze
 from freeswing.servo.synthesis.state_space import Array
 
 POSE_COLUMNS = ("x_m", "y_m", "z_m", "qw", "qx", "qy", "qz")
 WRENCH_COLUMNS = ("fx_N", "fy_N", "fz_N", "mx_N_m", "my_N_m", "mz_N_m")
 COLUMNS = (*POSE_COLUMNS, *WRENCH_COLUMNS)
-NORM_TOLERANCE = 1e-3  # a quaternion written with three decimals
 # A moment of this many times all tensions at their limit on the longest arm is no moment in N m;
 # newton millimetres are 1000 times too large.
 MOST_MOMENT = 2.0
@@ -97,11 +97,11 @@ def _check_rows(
             f"+-{reach_m[axis]:.3g} m{unit}"
         )
     norms = np.linalg.norm(values[:, 3:7], axis=1)
-    wrong = np.flatnonzero(np.abs(norms - 1.0) > NORM_TOLERANCE)
+    wrong = np.flatnonzero(wrong_declared(norms))
     if len(wrong):
         raise InputError(
             f"{path}: line {lines[wrong[0]]}: the quaternion's length is "
-            f"{norms[wrong[0]]:.6g}, must be 1 within {NORM_TOLERANCE:g}"
+            f"{norms[wrong[0]]:.6g}, must be 1 within {DECLARED_OFF:g}"
         )
     large = np.argwhere(np.abs(values[:, 10:]) > MOST_MOMENT * most_moment)
     if len(large):

@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 from freeswing.cdpr.files.documents import InputError
 from freeswing.cdpr.files.mocap.fill_values import without_gaps
 from freeswing.cdpr.files.number_table import (
-    QUATERNION_TOLERANCE,
     check_times,
     read_lines,
     read_numbers,
 )
+from freeswing.cdpr.files.unit_quaternions import wrong_recorded
 from freeswing.cdpr.measured.marker_recording import MarkerRecording
 from freeswing.cdpr.measured.trajectory import Trajectory
 from freeswing.cdpr.rotation import matrix_from_quaternion
@@ -174,8 +174,8 @@ def read_motive_body(path: Path | str) -> Trajectory | None:
     values, times = _numbers(path, lines, head.layout)
     quaternion = values[:, [turn + 3, turn, turn + 1, turn + 2]]  # Motive writes X Y Z W
     length = np.linalg.norm(quaternion, axis=1)
-    off = np.nanmax(np.abs(length - 1.0), initial=0.0)
-    if off > QUATERNION_TOLERANCE:
+    if wrong_recorded(length).any():
+        off = np.nanmax(np.abs(length - 1.0))
         raise InputError(f"{path}: rigid body {name}: a quaternion's length is off 1 by {off:.3g}")
     positions = head.layout.metres * values[:, place : place + 3]
     R = matrix_from_quaternion(quaternion / length[:, None])

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from freeswing.calib.camera import intrinsics, lens_choice
+from freeswing.calib.camera import intrinsics, lens_choice, off_plane_views
 from freeswing.cdpr.files.documents import DataError
 
 
@@ -69,9 +69,9 @@ def test_a_better_lens_gains_a_fiftieth(monkeypatch, share, advice) -> None:
 )  # fmt: skip
 def test_a_board_is_flat(monkeypatch, usual, error, kept) -> None:
     monkeypatch.setattr(
-        intrinsics, "flatness_errors", lambda *_: np.array([usual, usual, usual, error])
+        off_plane_views, "flatness_errors", lambda *_: np.array([usual, usual, usual, error])
     )
-    _, dropped = intrinsics.drop_false_boards(np.zeros((4, 3)), Sighted(4))
+    _, dropped = off_plane_views.drop_false_boards(np.zeros((4, 3)), Sighted(4))
     assert len(dropped) == (0 if kept else 1)
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from freeswing.calib.footage.copied_frames import comb_ratio, largest_change
+from freeswing.calib.footage.copied_frames import largest_change
+from freeswing.calib.footage.interlacing import comb_ratio
 
 
 @pytest.mark.parametrize("shape", [(64, 96), (75, 101)])

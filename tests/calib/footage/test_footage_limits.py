@@ -13,8 +13,9 @@ import pytest
 
 from freeswing.calib.footage import copied_frames, first_frames
 from freeswing.calib.footage.container_times import evened
-from freeswing.calib.footage.copied_frames import comb_ratio, largest_shift_px, with_copies
+from freeswing.calib.footage.copied_frames import largest_shift_px, with_copies
 from freeswing.calib.footage.frame_times import _from_container
+from freeswing.calib.footage.interlacing import comb_ratio
 from freeswing.cdpr.files.documents import DataError
 
 

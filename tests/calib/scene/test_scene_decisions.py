@@ -11,17 +11,12 @@ import pytest
 from freeswing.calib.camera.camera import Camera
 from freeswing.calib.rig.normal_equations import Problem
 from freeswing.calib.scene.calibrate_scene import calibrate_scene, refuse_untied
+from freeswing.calib.scene.chosen_points import chosen_points
 from freeswing.calib.scene.clicked_points import Click, clicked, read_clicks
+from freeswing.calib.scene.frame_by_survey import roughly_in_base, similarity, tied_to_survey
 from freeswing.calib.scene.lab_map import LabMap
-from freeswing.calib.scene.map_frame import (
-    DISTANCE_SIGMAS,
-    roughly_in_base,
-    scale_of,
-    similarity,
-    tied_to_survey,
-    with_distances,
-)
-from freeswing.calib.scene.scene_rig import chosen_points, rig_of_map, rig_part
+from freeswing.calib.scene.scale_by_distances import DISTANCE_SIGMAS, scale_of, with_distances
+from freeswing.calib.scene.scene_rig import rig_of_map, rig_part
 from freeswing.calib.scene.scene_verdict import (
     SceneChecks,
     growth_of,

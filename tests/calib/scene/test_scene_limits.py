@@ -12,9 +12,11 @@ import numpy as np
 import pytest
 
 from freeswing.calib.scene import stills
+from freeswing.calib.scene.blob_sizes import feature_variance, small_blobs
+from freeswing.calib.scene.chosen_points import agreeing, chosen_points
 from freeswing.calib.scene.clicked_points import read_clicks
-from freeswing.calib.scene.map_frame import scale_of, similarity
-from freeswing.calib.scene.scene_rig import _kept, chosen_points, feature_variance, small_blobs
+from freeswing.calib.scene.frame_by_survey import similarity
+from freeswing.calib.scene.scale_by_distances import scale_of
 from freeswing.calib.scene.tape_measured import Distance
 from freeswing.cdpr.files.documents import DataError, InputError
 
@@ -43,7 +45,7 @@ def test_a_sighting_four_deviations_off_is_another_patch(sigmas, kept) -> None:
     scene = SimpleNamespace(T_base_boards=np.zeros((1, 4, 4)))
     result = SimpleNamespace(residuals_px=off, sigma_px=np.array([0.2]), scene=scene)
     views = SimpleNamespace(camera=np.zeros(4, int), piece=np.zeros(4, int))
-    assert _kept(result, SimpleNamespace(views=views)).sum() == kept
+    assert agreeing(result, SimpleNamespace(views=views)).sum() == kept
 
 
 @pytest.mark.parametrize(("sightings", "chosen"), [(2, 0), (3, 1)])
