@@ -10,18 +10,15 @@ from numpy.typing import NDArray
 
 from freeswing.cdpr.files.documents import DataError
 from freeswing.homing.arrow_least_squares import ArrowSolution
-from freeswing.homing.fit_start_pose import GOOD_FIT, LOSS_LIMIT, StartFit, StartProblem
+from freeswing.homing.fit_start_pose import LOSS_LIMIT, StartFit, StartProblem
 from freeswing.homing.guess_from_tensions import TensionEnergy, free_indices
 from freeswing.homing.homing_files import Homing, ReadingNoise
 from freeswing.homing.many_starts import far_rows, many_starts, rank_starts
+from freeswing.homing.misfit import is_good, is_near
 from freeswing.homing.reading_mistakes import likely_mistake
 from freeswing.homing.rest_readings import RestModel
 
 Array = NDArray[np.float64]
-
-# Mean squares over the noise's: a geometry that is some millimetres off leaves tens to thousands,
-# a wrong start, unit or sign a million and more.
-_FAR_OFF = 1e4
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +42,7 @@ class Judgement:
             return False
         squares = np.sort((solution.linearization.residuals**2).sum(axis=1))
         kept = squares[: int(np.ceil(self.share * len(squares)))]
-        return float(kept.sum()) < GOOD_FIT * problem.degrees
+        return is_good(float(kept.sum()), problem.degrees)
 
 
 PLAIN = Judgement(np.inf, 1.0)
@@ -67,7 +64,7 @@ def best_fit(
     near = _solve_from(problem, homing.noise, begun, ROBUST)
     if ROBUST.explains(near, problem):
         return problem.finish(near, homing.noise)
-    if near is not None and near.converged and 2 * near.cost < _FAR_OFF * problem.degrees:
+    if near is not None and near.converged and is_near(2 * near.cost, problem.degrees):
         return problem.finish(near, homing.noise)
     starts = many_starts(energy, homing.robot.n_cables)
     wide = _solve_from(problem, homing.noise, guess_widely(homing, starts), ROBUST)

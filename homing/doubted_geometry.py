@@ -8,10 +8,8 @@ import numpy as np
 
 from freeswing.homing.fit_start_pose import StartFit, StartProblem
 from freeswing.homing.homing_files import GeometryNoise, Homing
+from freeswing.homing.misfit import is_beyond_doubt
 from freeswing.homing.rest_readings import RestModel
-
-# Chi-square a degree of freedom: more than unlucky readings leave.
-DOUBTFUL_FIT = 4.0
 
 
 def with_geometry_in_doubt(homing: Homing, model: RestModel, fit: StartFit) -> StartFit:
@@ -25,7 +23,7 @@ def with_geometry_in_doubt(homing: Homing, model: RestModel, fit: StartFit) -> S
     Source:
         Schwarz 1978, Estimating the Dimension of a Model.
     """
-    if fit.chi_square < DOUBTFUL_FIT * fit.degrees:
+    if is_beyond_doubt(fit.chi_square, fit.degrees):
         return fit
     doubted = StartProblem(homing, model, GeometryNoise())
     first = doubted.solve(homing.noise, fit.poses, doubted.start_border(fit.poses[0]))

@@ -22,12 +22,12 @@ from freeswing.homing.arrow_least_squares import (
     solve_arrow,
 )
 from freeswing.homing.homing_files import GeometryNoise, Homing, ReadingNoise
+from freeswing.homing.misfit import is_good
 from freeswing.homing.rest_readings import RestModel
 
 Array = NDArray[np.float64]
 
 LOSS_LIMIT = 3.0  # deviations: Huber's loss keeps 95 % of efficiency at 1.3, all of it at 3
-GOOD_FIT = 9.0  # mean squares over the noise's that readings of some start pose leave at most
 _SMALLEST_NOISE = 1e-7
 _SCALE_ROUNDS = 3
 
@@ -230,7 +230,7 @@ class StartProblem:
             return self._determined(linearization, weights)
         except DataError as few:
             squares = (weights * linearization.residuals**2).sum(axis=1)
-            if float(squares.sum()) < GOOD_FIT * self.degrees:
+            if is_good(float(squares.sum()), self.degrees):
                 raise
             raise self._not_found(solution, squares) from few
 

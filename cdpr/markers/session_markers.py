@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,11 +13,13 @@ from freeswing.cdpr.markers.common_frame import common_frame
 from freeswing.cdpr.markers.contradicting_samples import stand_outs
 from freeswing.cdpr.markers.distances import pairs_of, typical_distances
 from freeswing.cdpr.markers.exchanged_labels import renamed
-from freeswing.cdpr.markers.layouts_aligned import Alignment, SessionLayout, align, session_layout
+from freeswing.cdpr.markers.layout_of_session import SessionLayout, session_layout
+from freeswing.cdpr.markers.layouts_aligned import Alignment, align
 from freeswing.cdpr.markers.marker_jumps import Jump, Mended, mended
 from freeswing.cdpr.markers.marker_units import unit_between
 from freeswing.cdpr.markers.slow_residuals import slow_share
 from freeswing.cdpr.markers.spoiling_markers import Rigidity, marker_weights, rigidity
+from freeswing.cdpr.markers.undecided_marker import refuse_undecided
 from freeswing.cdpr.measured.marker_recording import MarkerRecording
 from freeswing.cdpr.measured.pose_errors import PoseErrors
 from freeswing.cdpr.measured.rigid_fit import fit_rigid, pose_covariances
@@ -28,10 +30,6 @@ from freeswing.cdpr.measured.trajectory import Trajectory
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-# Another marker that may be the one that is off, and would move the platform by more than this: no
-# result is better than one that claims tenths of a millimetre. Less is said as a warning (of one
-# recording of Bologna alone, 3.4 mm of one marker explains what 1.7 and 1.0 mm of two do).
-MOST_OPEN_M = 5e-3
 FEWEST_SAMPLES = 8  # a mean layout and each marker's deviation to a quarter of itself
 
 
@@ -114,7 +112,7 @@ def examine(
 
 
 def common_layout(target: Target, runs: Sequence[Examined]) -> SessionLayout:
-    """The one layout of the session; see `cdpr.markers.layouts_aligned.session_layout`.
+    """The one layout of the session; see `cdpr.markers.layout_of_session.session_layout`.
 
     Raises:
         DataError: where which marker is off cannot be told, and the answer matters.
@@ -123,12 +121,8 @@ def common_layout(target: Target, runs: Sequence[Examined]) -> SessionLayout:
     noise = float(np.median([run.rigidity.kept_m for run in runs]))
     samples = min(len(run.recording.times_s) for run in runs)
     found = session_layout(target.marker_positions_m, layouts, noise / np.sqrt(samples))
-    onto = found.from_target
-    if onto is not None and onto.rival_m > MOST_OPEN_M:
-        raise DataError(
-            f"{open_question(target, onto)}; which, the distances between them do not tell: "
-            "measure position_m of these markers again, or add a marker"
-        )
+    if found.from_target is not None:
+        refuse_undecided(target, found.from_target)
     return found
 
 
@@ -219,16 +213,3 @@ def _frame_covariance(onto: Alignment) -> Array:
     shift = np.linalg.eigvalsh(onto.covariance[:3, :3])[-1]
     moved = shift + reach**2 * np.linalg.eigvalsh(onto.covariance[3:, 3:])[-1]
     return onto.covariance * max(1.0, (0.5 * onto.rival_m) ** 2 / moved)
-
-
-def open_question(target: Target, onto: Alignment) -> str:
-    """The ways in which the markers may be off, none of which their distances exclude."""
-    ways = (", ".join(_off(target, change)) for change in (onto.change_m, onto.rival_change_m))
-    return f"the markers do not lie as target.toml says: {' or '.join(ways)} off"
-
-
-def _off(target: Target, change: Array) -> Iterator[str]:
-    sizes = np.linalg.norm(np.nan_to_num(change), axis=1)
-    for k in np.argsort(-sizes)[:2]:
-        if sizes[k] > 0.25 * sizes.max():
-            yield f"{target.marker_names[k]} by {1e3 * sizes[k]:.1f} mm"

@@ -6,7 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from freeswing.cdpr.markers.session_markers import RunMarkers, open_question
+from freeswing.cdpr.markers.session_markers import RunMarkers
+from freeswing.cdpr.markers.undecided_marker import open_question
 from freeswing.doctor.finding import Finding
 from freeswing.session.marker_runs import MarkerRuns
 

@@ -8,7 +8,7 @@ from functools import partial
 from freeswing.cdpr.files.problems import DataError, InputError
 from freeswing.cdpr.files.trajectory_files import holds_markers, read_recording
 from freeswing.cdpr.markers.from_recording import fixes_poses
-from freeswing.cdpr.markers.layouts_aligned import SessionLayout
+from freeswing.cdpr.markers.layout_of_session import SessionLayout
 from freeswing.cdpr.markers.session_markers import (
     Examined,
     RunMarkers,

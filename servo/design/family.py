@@ -11,7 +11,7 @@ from freeswing.servo.design.controller import HALF_HOLD_S, Controller, finished
 from freeswing.servo.design.hinf import design_hinf
 from freeswing.servo.design.lqg import design_lqg
 from freeswing.servo.design.mpc import design_mpc
-from freeswing.servo.design.pid import task_pid
+from freeswing.servo.design.pid import slowest_filters, task_pid
 from freeswing.servo.design.plant import Plant
 from freeswing.servo.design.tuning import Noise, fastest
 from freeswing.servo.synthesis.state_space import Array, StateSpace
@@ -21,8 +21,6 @@ METHODS = ("hinf", "hinf-fastest", "pid", "joint-pid", "lqg", "mpc")
 # Of the weights' own rates, 10 % apart; twice the paper's 5 rad/s are what a step of 0.2 m leaves
 # of the currents, as for the others (`tuning.SPEEDS_RAD_S`).
 SHARES = np.geomspace(0.4, 2.4, 20)
-# A derivative filtered slower than ten times the robot's fastest mode lags where that mode is.
-BEYOND_MODES = 10.0
 
 
 def design(
@@ -96,7 +94,7 @@ def _makers(plant: Plant, gear: Array) -> dict[str, Callable[[Array], StateSpace
     modes = np.abs(plant.system.poles())
     # The slower half of the modes are those of position, the faster those of orientation.
     fastest_modes = np.repeat([np.sort(modes)[5], modes.max()], 3)
-    filters = np.where(fastest_modes > 0.0, BEYOND_MODES * fastest_modes, 0.0)
+    filters = slowest_filters(fastest_modes)
     felt = gear.T @ gear
     # The inertia that one motor feels when the platform is moved: M_o shared out over all motors.
     inertia = np.trace(plant.mass[:3, :3]) / np.trace(felt[:3, :3])

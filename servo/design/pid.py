@@ -13,6 +13,13 @@ from freeswing.servo.synthesis.state_space import Array, StateSpace
 
 # The derivative is filtered this many times faster than the loop: less costs phase, more noise.
 FILTER = 10.0
+# A derivative filtered slower than ten times the robot's fastest mode lags where that mode is.
+BEYOND_MODES = 10.0
+
+
+def slowest_filters(fastest_modes_rad_s: Array) -> Array:
+    """How slow the derivative's filter of each axis may be, (6,), by the fastest mode it meets."""
+    return np.where(fastest_modes_rad_s > 0.0, BEYOND_MODES * fastest_modes_rad_s, 0.0)
 
 
 def task_pid(mass: Array, speeds_rad_s: Array, slowest_filter_rad_s: Array) -> StateSpace:

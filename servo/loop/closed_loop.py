@@ -14,14 +14,13 @@ from freeswing.servo.design.schedule import Schedule
 from freeswing.servo.files.task_file import Task
 from freeswing.servo.loop.camera import CameraFeed, Sighting
 from freeswing.servo.loop.friction import FrictionFeed
+from freeswing.servo.loop.held_or_lost import is_lost
 from freeswing.servo.loop.regulator import Regulator
 from freeswing.servo.robot_now import Here, Motors, Survey, pose6, pose7
 from freeswing.servo.synthesis.state_space import Array
+from freeswing.servo.tensions.demanded_tensions import OBJECTIVE_N
 from freeswing.servo.tensions.loop_kernels import NEAREST, Currents, distribute
-from freeswing.servo.tensions.robot_wrenches import OBJECTIVE_N
 
-# A platform this far from where it is asked to be is lost, not late.
-LOST_M = 1.0
 # The encoders' differences are smoothed over about this long before they count as rates.
 RATE_FILTER_S = 0.005
 
@@ -92,7 +91,7 @@ def run_loop(loop: Loop) -> Run:
     lost = None
     for k in range(count):
         pose, angles = pose6(body.state), body.angles()
-        if not np.abs(pose[:3] - asked[k, :3]).max() < LOST_M:
+        if is_lost(pose[:3] - asked[k, :3]):
             lost, count = float(times[k]), k
             break
         wrench, answer = brain.decide(float(times[k]), asked[k], pose, angles)

@@ -8,13 +8,10 @@ import numpy as np
 
 from freeswing.servo.files.task_file import Task
 from freeswing.servo.loop.closed_loop import Run
+from freeswing.servo.loop.held_or_lost import is_held, is_shaking
 from freeswing.servo.synthesis.state_space import Array
 
 SETTLED_S = 1.0  # what is left is read over the last second of each step, as the paper's Fig. 14
-# Ten times what friction leaves of the paper's own controller on a robot as it was identified: a
-# platform this far off after its step is not being controlled.
-HELD_M = 0.05
-HELD_RAD = 0.35
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,13 +99,13 @@ def _why(run: Run, steps: tuple[Step, ...], slack: tuple[str, ...]) -> str:
         return f"lost at {run.lost_s:.2f} s: the platform ran away"
     if slack:
         return f"cable {', '.join(slack)} went slack"
-    far = [step for step in steps if step.left_m > HELD_M or step.left_rad > HELD_RAD]
+    far = [step for step in steps if not is_held(step.left_m, step.left_rad)]
     if far:
         return (
             f"{1e3 * far[0].left_m:.0f} mm and {far[0].left_rad:.2f} rad are left of the step at "
             f"{far[0].begins_s:g} s"
         )
-    shaken = [step for step in steps if step.jitter_m > HELD_M]
+    shaken = [step for step in steps if is_shaking(step.jitter_m)]
     if shaken:
         size, begin = 1e3 * shaken[0].jitter_m, shaken[0].begins_s
         return f"shaking by {size:.0f} mm after the step at {begin:g} s"

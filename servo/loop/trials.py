@@ -10,11 +10,12 @@ from freeswing.servo.design.schedule import Schedule
 from freeswing.servo.files.controller_file import Stored
 from freeswing.servo.files.task_file import Task
 from freeswing.servo.files.weights_file import Camera
+from freeswing.servo.loop.anti_windup import LinearRegulator
 from freeswing.servo.loop.closed_loop import Loop, Run, current_bounds, run_loop
 from freeswing.servo.loop.friction import FrictionFeed
 from freeswing.servo.loop.judge import Judgement, judge
 from freeswing.servo.loop.predictive import Bounds, PredictiveRegulator
-from freeswing.servo.loop.regulator import LinearRegulator, Regulator
+from freeswing.servo.loop.regulator import Regulator
 from freeswing.servo.robot_now import Survey, motors_of
 from freeswing.servo.synthesis.state_space import Array
 

@@ -14,8 +14,8 @@ from freeswing.servo.design.lqg import design_lqg
 from freeswing.servo.design.pid import task_pid
 from freeswing.servo.files.task_file import Task, Watch
 from freeswing.servo.files.wrench_file import _check_rows
+from freeswing.servo.loop.anti_windup import LinearRegulator
 from freeswing.servo.loop.closed_loop import _Brain, current_bounds
-from freeswing.servo.loop.regulator import LinearRegulator
 from freeswing.servo.loop.trials import hardships
 from freeswing.servo.synthesis import gamma_search
 from freeswing.servo.synthesis.state_space import StateSpace

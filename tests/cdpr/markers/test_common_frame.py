@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from freeswing.cdpr.markers.common_frame import common_frame
-from freeswing.cdpr.markers.layouts_aligned import session_layout
+from freeswing.cdpr.markers.layout_of_session import session_layout
 from freeswing.cdpr.measured.trajectory import Trajectory
 from freeswing.cdpr.rotation import exp_rotation, log_rotation
 

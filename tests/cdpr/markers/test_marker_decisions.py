@@ -11,6 +11,8 @@ import pytest
 from freeswing.cdpr.files.problems import DataError
 from freeswing.cdpr.markers import (
     exchanged_labels,
+    layout_against_target,
+    layout_of_session,
     layouts_aligned,
     session_markers,
     spoiling_markers,
@@ -118,7 +120,7 @@ def test_another_way_to_lie_on_a_layout_is_a_rival(behind, apart_m, rival):
     moves = np.stack([SQUARE, SQUARE + np.array([apart_m, 0.0, 0.0])])
     known = np.ones(4, dtype=bool)
     costs = np.array([0.0, behind])
-    found = layouts_aligned._best(
+    found = layouts_aligned.best_way(
         moves, np.full((2, 4), 1e6), costs, SQUARE, known, layouts_aligned.CLEAR
     )
     assert (found.rival_m > 0.0) == rival
@@ -128,7 +130,7 @@ def test_another_way_to_lie_on_a_layout_is_a_rival(behind, apart_m, rival):
 def test_a_frame_is_open_by_five_millimetres_at_most(monkeypatch, open_m, refused):
     target = Target((), tuple(Marker(f"m{k}", place, 0.01) for k, place in enumerate(SQUARE)))
     onto = layouts_aligned.Alignment(SQUARE, 0 * SQUARE, np.ones(4), np.eye(6), open_m, 0 * SQUARE)
-    told = layouts_aligned.SessionLayout(SQUARE, 0 * SQUARE, 1e-4, onto)
+    told = layout_of_session.SessionLayout(SQUARE, 0 * SQUARE, 1e-4, onto)
     monkeypatch.setattr(session_markers, "session_layout", lambda *_: told)
     found = SimpleNamespace(kept_m=1e-4, layout_m=SQUARE, left_out=())
     run = SimpleNamespace(rigidity=found, recording=SimpleNamespace(times_s=np.arange(9.0)))
@@ -157,12 +159,12 @@ def test_a_marker_that_is_four_scales_off_has_a_fifth_of_the_weight():
 
 
 def test_one_run_alone_has_the_usual_change_from_run_to_run():
-    found = layouts_aligned.session_layout(SQUARE, [SQUARE + 0.1], 1e-6)
+    found = layout_of_session.session_layout(SQUARE, [SQUARE + 0.1], 1e-6)
     assert found.run_std_m == pytest.approx(0.3e-3, rel=0.05)
 
 
 def test_a_drawing_is_good_to_a_fiftieth_of_a_millimetre():
-    found = layouts_aligned.align_to_target(ball(5) + 0.1, ball(5))
+    found = layout_against_target.align_to_target(ball(5) + 0.1, ball(5))
     assert np.allclose(1.0 / np.sqrt(found.weights[found.weights > 0.0]), 2e-5, rtol=0.05)
 
 
@@ -171,7 +173,7 @@ def off_by(off_m: float) -> layouts_aligned.Alignment:
     places = np.array([[0.3, 0.0, 0.0], [-0.3, 0.0, 0.0], [0.0, 0.3, 0.0], [0.0, -0.3, 0.3]])
     wrong = places.copy()
     wrong[3, 2] += off_m
-    return layouts_aligned.align_to_target(places, wrong)
+    return layout_against_target.align_to_target(places, wrong)
 
 
 @pytest.mark.parametrize(("off_m", "left_out"), [(2.19e-3, False), (2.255e-3, True)])

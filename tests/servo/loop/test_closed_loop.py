@@ -13,10 +13,10 @@ from freeswing.servo.driven_file import read_driven
 from freeswing.servo.files.controller_file import Stored, read_controller, to_document
 from freeswing.servo.files.task_file import Task, Watch
 from freeswing.servo.files.weights_file import USUAL, Camera, Goals
+from freeswing.servo.loop.anti_windup import LinearRegulator
 from freeswing.servo.loop.closed_loop import Loop, run_loop
 from freeswing.servo.loop.feasible_path import leaves_workspace
 from freeswing.servo.loop.judge import judge
-from freeswing.servo.loop.regulator import LinearRegulator
 from freeswing.servo.loop.trials import Trial, carry_out, hardships, without_coulomb
 from freeswing.servo.robot_now import Survey, motors_of, pose6, pose7
 from freeswing.servo.synthesis.state_space import StateSpace

@@ -8,8 +8,8 @@ from freeswing.servo.driven_file import read_driven
 from freeswing.servo.files.task_file import Task, Watch
 from freeswing.servo.files.weights_file import USUAL, Camera, Goals
 from freeswing.servo.loop import closed_loop
+from freeswing.servo.loop.anti_windup import LinearRegulator
 from freeswing.servo.loop.closed_loop import Loop, run_loop
-from freeswing.servo.loop.regulator import LinearRegulator
 from freeswing.servo.loop.trials import without_coulomb
 from freeswing.servo.robot_now import pose7
 from tests.oracle.witnesses import mujoco_driven
