@@ -26,7 +26,7 @@ from freeswing.vision.look.follow import STATUS_NAMES, USED
 from freeswing.vision.look.watched_target import Watch
 from freeswing.vision.recorded_alone import recorded_by_two
 from freeswing.vision.rig.correct_rig import Corrected, correct_rig
-from freeswing.vision.rig.rig_effects import Finding
+from freeswing.vision.rig.rig_step import Finding
 from freeswing.vision.settings import Settings
 
 Array = NDArray[np.float64]

@@ -22,7 +22,7 @@ from freeswing.vision.look.pieces import Piece, load_piece
 from freeswing.vision.look.sightings import collect_sightings
 from freeswing.vision.look.target_check import examined_watch
 from freeswing.vision.look.watched_target import Watch
-from freeswing.vision.rig.rig_effects import Finding
+from freeswing.vision.rig.rig_step import Finding
 from freeswing.vision.track_session import RecordedRun, run_recordings, sightings_folder
 
 Array = NDArray[np.float64]

@@ -32,7 +32,7 @@ from freeswing.cdpr.measured.target import Target
 from freeswing.cdpr.rotation import exp_rotation, log_rotation
 from freeswing.vision.render.patterns import charuco_patch, plain_patch
 from freeswing.vision.render.record import record
-from freeswing.vision.rig.rig_effects import moved_by
+from freeswing.vision.rig.moved_cameras import moved_by
 from tests.vision.films import tracked
 from tests.vision.scenes import (
     SurveyedTag,

@@ -20,9 +20,9 @@ from scipy.optimize import linprog
 from freeswing.cdpr.driven.statics import holding_wrench
 from freeswing.servo.driven_file import read_driven
 from freeswing.servo.robot_now import pose7
-from freeswing.servo.tensions.demanded_tensions import demands_at_rest
 from freeswing.servo.tensions.loop_kernels import distribute_rows
 from freeswing.servo.tensions.methods import KERNELS
+from freeswing.servo.tensions.robot_wrenches import demands_at_rest
 
 REPEATS = 50
 

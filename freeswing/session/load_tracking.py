@@ -8,7 +8,7 @@ from freeswing.cdpr.files.documents import DataError
 from freeswing.results.files import read_document
 from freeswing.results.tracking import Tracking
 from freeswing.session.session_file import Session
-from freeswing.vision.rig.rig_effects import Finding
+from freeswing.vision.rig.rig_step import Finding
 from freeswing.vision.tracked_runs import FoundCameras
 
 

@@ -23,7 +23,7 @@ from freeswing.servo.design.tuning import RATES_RAD_S
 from freeswing.servo.synthesis.four_block import bare, weighted
 from freeswing.servo.synthesis.norm import hinf_norm
 from freeswing.servo.synthesis.state_space import Array, close
-from freeswing.servo.tensions.demanded_tensions import held_at_rest
+from freeswing.servo.tensions.robot_wrenches import held_at_rest
 
 # A modulus margin below this is a loop that rings: failing, though not unstable yet.
 FAILING = 0.2

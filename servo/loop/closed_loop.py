@@ -18,8 +18,8 @@ from freeswing.servo.loop.held_or_lost import is_lost
 from freeswing.servo.loop.regulator import Regulator
 from freeswing.servo.robot_now import Here, Motors, Survey, pose6, pose7
 from freeswing.servo.synthesis.state_space import Array
-from freeswing.servo.tensions.demanded_tensions import OBJECTIVE_N
 from freeswing.servo.tensions.loop_kernels import NEAREST, Currents, distribute
+from freeswing.servo.tensions.robot_wrenches import OBJECTIVE_N
 
 # The encoders' differences are smoothed over about this long before they count as rates.
 RATE_FILTER_S = 0.005

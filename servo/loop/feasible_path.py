@@ -7,7 +7,7 @@ import numpy as np
 from freeswing.cdpr.driven.model import DrivenModel
 from freeswing.servo.files.task_file import Task
 from freeswing.servo.synthesis.state_space import Array
-from freeswing.servo.tensions.demanded_tensions import held_at_rest
+from freeswing.servo.tensions.robot_wrenches import held_at_rest
 
 # Places looked at on each way: a step of a metre is seen every 2 cm.
 PLACES = 51

@@ -180,7 +180,7 @@ HELD = (
     Held("servo/loop/anti_windup.py", ("OUTPUT_NOISE",), LAWS),
     Held("servo/loop/trials.py", ("LATE_S",), LAWS),
     Held("servo/synthesis/gamma_search.py", ("BACK_OFF",), LAWS),
-    Held("servo/tensions/demanded_tensions.py", ("OBJECTIVE_N",), LAWS),
+    Held("servo/tensions/robot_wrenches.py", ("OBJECTIVE_N",), LAWS),
     Held("servo/loop/judge.py", ("SETTLED_S",), SERVO),
     Held("servo/loop/held_or_lost.py", ("HELD_M", "HELD_RAD", "LOST_M"), SERVO),
     Held("servo/design/hinf.py", ("NOTHING",), SERVO),
@@ -430,11 +430,11 @@ HELD = (
     Held(
         "vision/look/follow.py",
         (
-            "_BASE_EVERY", "_SEARCH_EVERY", "_EAGER_SEARCHES", "_FACING", "_DARK_SPREAD",
-            "_SATURATED", "_BRIGHT_SHARE",
+            "_BASE_EVERY", "_SEARCH_EVERY", "_EAGER_SEARCHES", "_FACING",
         ),
         LOOK,
     ),
+    Held("vision/look/lighting.py", ("_DARK_SPREAD", "_SATURATED", "_BRIGHT_SHARE"), LOOK),
     Held("calib/tags/edge_pixels.py", ("LEAST_CELL",), EDGES),
     Held("calib/tags/pattern_fit.py", ("EDGE_SETTLED",), f"{EDGES}::{LAST_STEP}"),
     Held("calib/tags/pattern_fit.py", ("MOST_BLUR",), f"{TAGS}::test_blur_up_to_six_pixels"),
@@ -492,7 +492,8 @@ HELD = (
     Held("ident/diagnose/lengths/equilibria.py", ("COM_M", "FORCE_M_S2"), PLACES),
     Held("vision/rig/lag_search.py", ("_PLAUSIBLE", "_PLAUSIBLE_M"), START),
     Held("servo/files/task_file.py", ("POSITION_STD_M", "ANGLE_STD_RAD"), SERVO),
-    Held("vision/fuse/fuse_cameras.py", ("LEAST_FLOOR_PX", "_REJECT"), FUSE),
+    Held("vision/fuse/corner_noise.py", ("LEAST_FLOOR_PX",), FUSE),
+    Held("vision/fuse/rejected_sightings.py", ("_REJECT",), FUSE),
     Held("vision/fuse/calibration_share.py", ("_LEFT_OUT",), FUSE),
     Held("vision/fuse/tag_growth.py", ("USUAL_PX",), "tests/vision/fuse/test_tag_growth.py"),
     Held(
@@ -581,12 +582,15 @@ HELD = (
         ("_SMALLEST_ARM_RADII", "_SMALLEST_ARM_SHARE", "_WORTHWHILE"),
         HOMING,
     ),
-    Held("vision/rig/correct_rig.py", ("SIGMAS",), RIG),
+    Held("vision/rig/real_effects.py", ("SIGMAS",), RIG),
     Held(
-        "vision/rig/rig_effects.py",
-        ("MOVED_PX", "LEAST_CLOCK_S", "LEAST_LINE_S"),
-        "tests/vision/rig/test_rig_limits.py",
+        "vision/rig/real_effects.py",
+        (
+            "LEAST_CLOCK_S", "LEAST_LINE_S",
+        ),
+        'tests/vision/rig/test_rig_limits.py',
     ),
+    Held("vision/rig/moved_cameras.py", ("MOVED_PX",), 'tests/vision/rig/test_rig_limits.py'),
     Held(
         "freeswing/doctor/run_roles.py",
         ("FEWEST_IDENTIFY",),
@@ -702,11 +706,11 @@ HELD = (
     Held(
         "vision/untagged/rest_model.py",
         (
-            "CHANGED_GREY", "CHANGED_SHARE", "WORST_PX", "LEAST_POINTS", "WORST_NAMED_M",
-            "CLICK_STD_PX",
+            "CHANGED_GREY", "CHANGED_SHARE", "WORST_PX", "LEAST_POINTS",
         ),
         UNTAGGED,
     ),
+    Held("vision/untagged/named_points.py", ("WORST_NAMED_M", "CLICK_STD_PX"), UNTAGGED),
     Held(
         "cdpr/measured/target.py",
         (
@@ -763,7 +767,7 @@ HELD = (
     ),
     Held("vision/rig/correct_rig.py", ("_LEAST_KNOWN",), START),
     Held("vision/rig/lag_search.py", ("_LEAST_OVERLAP",), START),
-    Held("vision/rig/rig_effects.py", ("_KEEP_SCORE", "STRETCH_S", "LEAST_PARTS"), START),
+    Held("vision/rig/rig_step.py", ("_KEEP_SCORE", "STRETCH_S", "LEAST_PARTS"), START),
     Held("vision/rig/stamp_jitter.py", ("LEAST_JITTER_S", "_LEAST_FRAMES", "_FLOOR_PX"), START),
     Held("vision/rig/untied_cameras.py", ("_LEAST_TAGS", "_LEAST_KNOWN"), START),
     Held("calib/rig/bundle_adjustment.py", ("_COMMON_FREEDOM", "_LEAST_FREEDOM"), RIG_START),

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from freeswing.vision.rig.rig_effects import moved_by
+from freeswing.vision.rig.moved_cameras import moved_by
 from tests.vision.films import KNOCK_RAD, LATE_S, cameras, film, track
 
 

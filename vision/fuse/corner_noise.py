@@ -24,6 +24,8 @@ from freeswing.vision.fuse.pose_kernels import Linear
 from freeswing.vision.fuse.run_views import Block, CameraViews
 from freeswing.vision.look.single_pose import whitening
 
+LEAST_FLOOR_PX = 0.002  # no lens is known better
+
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
@@ -263,3 +265,11 @@ def least_sizes(shares: Array, squares: Array) -> Array:
         for k in np.flatnonzero(known):
             sizes[k] = max(0.0, sizes[k] + right[k] - matrix[k] @ sizes)
     return sizes / scale
+
+
+def floor_px(excess: Array) -> float:
+    """The median excess (n,) of sightings' mean squares over the pixels' noise, as a deviation."""
+    if not len(excess):
+        return LEAST_FLOOR_PX
+    # The median of a mean of eight squares lies near 0.92 of its mean.
+    return float(np.sqrt(max(np.median(excess) / 0.92, LEAST_FLOOR_PX**2)))

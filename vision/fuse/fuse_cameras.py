@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.vision.fuse.blocks import blocks
-from freeswing.vision.fuse.corner_noise import Noise, NoiseSums, alike, whitened
+from freeswing.vision.fuse.corner_noise import Noise, NoiseSums, alike, floor_px, whitened
 from freeswing.vision.fuse.linearised_block import block_poses, lags, seen_by
 from freeswing.vision.fuse.motion_from_poses import motion_of_poses
 from freeswing.vision.fuse.pose_kernels import (
@@ -26,14 +26,13 @@ from freeswing.vision.fuse.pose_kernels import (
     solve_block,
 )
 from freeswing.vision.fuse.poses import Poses, unknown_poses
+from freeswing.vision.fuse.rejected_sightings import agreeing
 from freeswing.vision.fuse.run_views import Block, CameraViews
 from freeswing.vision.look.watched_target import Watch
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-LEAST_FLOOR_PX = 0.002  # no lens is known better
-_REJECT = 16.0  # mean square: four deviations in all numbers of a sighting
 _MOTION_PASSES = 4
 
 
@@ -135,11 +134,6 @@ def _usual(variances: Sequence[Array]) -> Array | None:
     return np.sqrt(np.median(found, axis=0)) if len(found) else None
 
 
-def agreeing(scores: Array) -> Mask:
-    """Which sightings agree with the poses, by their mean squared whitened residual, (n_o,)."""
-    return (scores >= 0.0) & (scores < _REJECT)
-
-
 def free_of(watch: Watch) -> int:
     """6 where the target gives a pose, 3 where it is a reference point alone."""
     return 6 if watch.platform_points >= 3 else 3
@@ -232,13 +226,7 @@ class _Account:
 
     def floors(self) -> Array:
         """Noise beyond the pixels', by camera: the median excess, safe against outliers."""
-        floors = np.full(len(self.used), LEAST_FLOOR_PX)
-        for camera, parts in enumerate(self.samples):
-            excess = np.concatenate([np.zeros(0), *parts])
-            if len(excess):
-                # The median of a mean of eight squares lies near 0.92 of its mean.
-                floors[camera] = np.sqrt(max(np.median(excess) / 0.92, LEAST_FLOOR_PX**2))
-        return floors
+        return np.array([floor_px(np.concatenate([np.zeros(0), *parts])) for parts in self.samples])
 
     def fit(self) -> Fit:
         return Fit(

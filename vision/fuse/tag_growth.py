@@ -18,9 +18,10 @@ from numpy.typing import NDArray
 from freeswing.cdpr.frozen import freeze
 from freeswing.vision.fuse.blocks import blocks
 from freeswing.vision.fuse.corner_noise import ALIKE, SURE_SIGMAS, outwards, whitened
-from freeswing.vision.fuse.fuse_cameras import Fit, agreeing
+from freeswing.vision.fuse.fuse_cameras import Fit
 from freeswing.vision.fuse.linearised_block import linearised
 from freeswing.vision.fuse.poses import Poses
+from freeswing.vision.fuse.rejected_sightings import agreeing
 from freeswing.vision.fuse.run_views import CameraViews
 from freeswing.vision.look.watched_target import Watch
 

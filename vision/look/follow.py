@@ -22,6 +22,7 @@ from freeswing.calib.tags.corners import (
     rimmed_cells,
 )
 from freeswing.vision.look.detect import TagFinder, detect_tags
+from freeswing.vision.look.lighting import is_covered, is_overexposed, is_saturated
 from freeswing.vision.look.marker_blobs import Blob, find_blobs
 from freeswing.vision.look.near_kernels import expected_tags
 from freeswing.vision.look.occlusion import Plates
@@ -50,9 +51,6 @@ _BASE_EVERY = 40  # frames: cameras are knocked once, not forty times a second
 _SEARCH_EVERY = 10  # frames: searches of the whole image are slow
 _EAGER_SEARCHES = 5  # a platform that was hidden for a moment comes back at once
 _FACING = 0.25  # cosine: a tag seen from 75 degrees is a few pixels wide
-_DARK_SPREAD = 5.0  # grey levels: a room has more, a covered lens only its noise
-_SATURATED = 253.0  # of 255: what is brighter has been cut off
-_BRIGHT_SHARE = 0.3  # of an image: a lamp and its reflections cover less
 _KEPT_POSES = 3
 
 
@@ -114,7 +112,7 @@ class Follower:
         if self.count % _BASE_EVERY == 0 and self.watch.base_tags:
             found |= self._look_at_base(image)
         self.count += 1
-        bright = {k for k, fit in found.items() if fit.black + fit.contrast > _SATURATED}
+        bright = {k for k, fit in found.items() if is_saturated(fit.black + fit.contrast)}
         kept = {k: fit for k, fit in found.items() if k not in bright}
         pose = self._settle(kept, time_s, predicted)
         if pose is not None:
@@ -233,9 +231,9 @@ class Follower:
         if any(s.thing >= self.watch.first_marker for s in sightings):
             return USED
         coarse = image[::8, ::8]
-        if bright or float(np.mean(coarse > _SATURATED)) > _BRIGHT_SHARE:
+        if bright or is_overexposed(coarse):
             return OVEREXPOSED
-        if float(coarse.std()) < _DARK_SPREAD:
+        if is_covered(coarse):
             return COVERED
         return NOTHING
 

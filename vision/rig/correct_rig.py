@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.rotation import log_rotation
-from freeswing.vision.fuse.fuse_cameras import LEAST_FLOOR_PX, Fit, fuse
+from freeswing.vision.fuse.corner_noise import LEAST_FLOOR_PX
+from freeswing.vision.fuse.fuse_cameras import Fit, fuse
 from freeswing.vision.fuse.poses import Poses
 from freeswing.vision.fuse.run_views import CameraViews, instants_of
 from freeswing.vision.fuse.tag_growth import growth_of
@@ -23,26 +24,15 @@ from freeswing.vision.look.marker_names import label_markers
 from freeswing.vision.look.watched_target import Watch
 from freeswing.vision.rig.gross_faults import moved_too_far, refuse_disagreement, refuse_gross
 from freeswing.vision.rig.lag_accepted import Missed, aligned
-from freeswing.vision.rig.rig_effects import (
-    LEAST_CLOCK_S,
-    LEAST_LINE_S,
-    Finding,
-    RigStep,
-    frame_squares_px2,
-    iterated,
-    moved_cameras,
-    repose_by_base_tags,
-    rig_step,
-)
+from freeswing.vision.rig.moved_cameras import moved_cameras, repose_by_base_tags
+from freeswing.vision.rig.real_effects import LEAST_CLOCK_S, LEAST_LINE_S, is_real
 from freeswing.vision.rig.rig_kernels import CLOCK, LINE, PER_CAMERA, POSE
+from freeswing.vision.rig.rig_step import Finding, RigStep, frame_squares_px2, iterated, rig_step
 from freeswing.vision.rig.stamp_jitter import stamp_jitter_s, widened_poses, widened_step
 from freeswing.vision.rig.untied_cameras import untied_shifts
 
 Array = NDArray[np.float64]
 
-# A rig has two dozen numbers that could be off, deviations are good to some ten percent, and what
-# is changed for nothing spoils every pose: six of them leave no room for chance.
-SIGMAS = 6.0
 _LEAST_KNOWN = 20  # poses: two dozen numbers of a rig do not follow from fewer
 
 
@@ -238,16 +228,6 @@ def _estimate(
     deviation = np.where(clock_free, step.deviations[:, CLOCK], step.deviations[:, CLOCK].max())
     sure = is_real(clocks, deviation, LEAST_CLOCK_S)
     return np.where(sure, clocks, 0.0), np.where(real, total[:, LINE], 0.0), step, jitter
-
-
-def is_real(values: Array, deviations: Array, least: float) -> NDArray[np.bool_]:
-    """Which values are surely not zero, and large enough to matter.
-
-    Source:
-        Bishop 2006, Pattern Recognition and Machine Learning, sec. 2.3: deviations of a
-        Gaussian.
-    """
-    return np.abs(values) > np.maximum(least, SIGMAS * deviations)
 
 
 def _longest_lines(views: Sequence[CameraViews]) -> Array:

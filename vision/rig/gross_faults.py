@@ -22,7 +22,7 @@ from freeswing.vision.fuse.run_views import CameraViews
 from freeswing.vision.look.single_pose import start_pose
 from freeswing.vision.look.watched_target import Watch
 from freeswing.vision.rig.lag_search import Pair
-from freeswing.vision.rig.rig_effects import base_tag_rays
+from freeswing.vision.rig.moved_cameras import base_tag_rays
 
 Array = NDArray[np.float64]
 

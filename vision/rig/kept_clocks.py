@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from freeswing.calib.camera.camera import Camera
-from freeswing.vision.rig.rig_effects import Finding
+from freeswing.vision.rig.rig_step import Finding
 
 MOST_APART_S = 1e-3
 """Cameras of one trigger keep their clocks from run to run to microseconds, free-running ones drift

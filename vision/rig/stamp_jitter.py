@@ -20,8 +20,8 @@ from freeswing.vision.fuse.linearised_block import linearised
 from freeswing.vision.fuse.poses import Poses
 from freeswing.vision.fuse.run_views import CameraViews
 from freeswing.vision.look.watched_target import Watch
-from freeswing.vision.rig.rig_effects import RigStep
 from freeswing.vision.rig.rig_kernels import CLOCK, LINE
+from freeswing.vision.rig.rig_step import RigStep
 
 Array = NDArray[np.float64]
 

@@ -20,8 +20,9 @@ from freeswing.vision.fuse.fuse_cameras import Fit, fuse
 from freeswing.vision.fuse.poses import Poses
 from freeswing.vision.fuse.run_views import CameraViews
 from freeswing.vision.look.watched_target import Watch
-from freeswing.vision.rig.rig_effects import base_tag_misses, iterated
+from freeswing.vision.rig.moved_cameras import base_tag_misses
 from freeswing.vision.rig.rig_kernels import CLOCK, PER_CAMERA, POSE
+from freeswing.vision.rig.rig_step import iterated
 
 Array = NDArray[np.float64]
 

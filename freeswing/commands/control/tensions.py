@@ -47,8 +47,8 @@ def run(options: Namespace, console: Console) -> None:
     from freeswing.cdpr.system.confine import results_folder
     from freeswing.servo.driven_file import read_driven
     from freeswing.servo.files.wrench_file import read_wrenches, write_shares
-    from freeswing.servo.tensions.demanded_tensions import demands_at_rest
     from freeswing.servo.tensions.methods import distribute_all
+    from freeswing.servo.tensions.robot_wrenches import demands_at_rest
 
     path, model = read_driven(options.robot)
     if not np.isfinite(options.objective) or options.objective < 0.0:

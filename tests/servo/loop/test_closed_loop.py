@@ -129,7 +129,7 @@ def test_the_same_seed_gives_the_same_run(model, stored):
 
 def test_a_regulator_that_asks_in_vain_does_not_wind_up():
     integrator = StateSpace(np.eye(6), 0.01 * np.eye(6), np.eye(6), np.zeros((6, 6)), 1e-3)
-    regulator = LinearRegulator(integrator)
+    regulator, asked = LinearRegulator(integrator), np.zeros(6)
     for _ in range(5000):
         asked = regulator.wrench(np.ones(6), np.zeros(6), True)
         regulator.applied(np.minimum(asked, 1.0))
@@ -144,8 +144,11 @@ def test_a_regulator_that_asks_in_vain_does_not_wind_up():
 def test_a_task_that_leaves_the_workspace_says_where_and_when(model):
     assert leaves_workspace(model, step_to(0.1)) is None
     said = leaves_workspace(model, step_to(1.2))
+    assert said is not None
     assert "at 0.1 s it leaves the feasible workspace" in said
-    assert "leaves the frame" in leaves_workspace(model, step_to(1.4))
+    said = leaves_workspace(model, step_to(1.4))
+    assert said is not None
+    assert "leaves the frame" in said
 
 
 def test_hardships_are_other_robots_than_the_controllers(model):
@@ -185,6 +188,7 @@ def test_a_predictive_controller_reaches_its_place_through_a_file(model, tmp_pat
     path.write_text(json.dumps(to_document(found)))
     stored = read_controller(path)
     assert stored.predictor is not None
+    assert found.predictor is not None
     np.testing.assert_array_equal(stored.predictor.gain, found.predictor.gain)
     outcome = carry_out(Trial("", step_to(0.1), without_coulomb(model), model), stored)
     assert outcome.judgement.held, outcome.judgement.why

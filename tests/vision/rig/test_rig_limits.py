@@ -15,7 +15,6 @@ from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.rotation import exp_rotation, invert
 from freeswing.vision.fuse.corner_noise import Noise
 from freeswing.vision.fuse.fuse_cameras import Fit
-from freeswing.vision.rig.correct_rig import is_real
 from freeswing.vision.rig.gross_faults import (
     Evidence,
     _size_of_tags,
@@ -26,7 +25,9 @@ from freeswing.vision.rig.gross_faults import (
 from freeswing.vision.rig.kept_clocks import with_kept_clocks
 from freeswing.vision.rig.lag_accepted import Missed, _chosen, _needed, deviations_apart
 from freeswing.vision.rig.lag_search import OwnTrack, _candidates, _correlations, _fitted
-from freeswing.vision.rig.rig_effects import LEAST_CLOCK_S, LEAST_LINE_S, Finding, was_moved
+from freeswing.vision.rig.moved_cameras import was_moved
+from freeswing.vision.rig.real_effects import LEAST_CLOCK_S, LEAST_LINE_S, is_real
+from freeswing.vision.rig.rig_step import Finding
 from freeswing.vision.rig.untied_cameras import is_sure, was_knocked
 from tests.vision.scenes import camera
 

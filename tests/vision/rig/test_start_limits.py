@@ -12,13 +12,7 @@ import numpy as np
 import pytest
 
 from freeswing.cdpr.files.documents import DataError
-from freeswing.vision.rig import (
-    correct_rig,
-    lag_accepted,
-    rig_effects,
-    stamp_jitter,
-    untied_cameras,
-)
+from freeswing.vision.rig import correct_rig, lag_accepted, rig_step, stamp_jitter, untied_cameras
 from freeswing.vision.rig.lag_accepted import Missed, _chosen, deviations_apart
 from freeswing.vision.rig.lag_search import _correlations, _is_plausible
 from tests.vision.scenes import camera
@@ -129,23 +123,23 @@ def test_sightings_that_fit_badly_say_less_of_the_rig(monkeypatch) -> None:
         counts=np.ones(3, int), things=np.arange(3),
     )  # fmt: skip
     residuals = np.sqrt(scores)[:, None] * np.ones(2)
-    monkeypatch.setattr(rig_effects, "blocks", lambda *_: [block])
-    monkeypatch.setattr(rig_effects, "linearised", lambda *_: stub(residuals=residuals))
-    monkeypatch.setattr(rig_effects, "whitened", lambda *_: np.tile(np.eye(2), (3, 1, 1)))
+    monkeypatch.setattr(rig_step, "blocks", lambda *_: [block])
+    monkeypatch.setattr(rig_step, "linearised", lambda *_: stub(residuals=residuals))
+    monkeypatch.setattr(rig_step, "whitened", lambda *_: np.tile(np.eye(2), (3, 1, 1)))
     monkeypatch.setattr(
-        rig_effects, "add_rig_equations", lambda sums, given, *_: seen.append(given) or sums
+        rig_step, "add_rig_equations", lambda sums, given, *_: seen.append(given) or sums
     )
-    monkeypatch.setattr(rig_effects, "base_equations", lambda *_: (np.zeros((6, 6)), np.zeros(6)))
+    monkeypatch.setattr(rig_step, "base_equations", lambda *_: (np.zeros((6, 6)), np.zeros(6)))
     poses = stub(times_s=np.zeros(1), known=np.ones(1, bool), motions=np.ones((1, 12)))
     free = np.zeros((1, 8), dtype=bool)
-    rig_effects.rig_step([stub(camera=VIEW)], stub(), poses, stub(noise=None), free, 3e-4)
+    rig_step.rig_step([stub(camera=VIEW)], stub(), poses, stub(noise=None), free, 3e-4)
     assert np.allclose(seen[0].weights, [1.0, 1.0, 0.25], rtol=0.01)
 
 
 @pytest.mark.parametrize(("later_s", "stretch"), [(0.24, 0), (0.26, 1)])
 def test_stretches_are_a_quarter_of_a_second(later_s, stretch) -> None:
-    assert rig_effects.stretches(3.0 + np.array([0.0, later_s])).tolist() == [0, stretch]
-    assert len(rig_effects.stretches(np.zeros(0))) == 0
+    assert rig_step.stretches(3.0 + np.array([0.0, later_s])).tolist() == [0, stretch]
+    assert len(rig_step.stretches(np.zeros(0))) == 0
 
 
 def test_deviations_between_stretches_hold_what_they_err_by_alike(monkeypatch) -> None:
@@ -162,15 +156,13 @@ def test_deviations_between_stretches_hold_what_they_err_by_alike(monkeypatch) -
             normal, right = np.zeros((8, 8)), np.zeros(8)
             normal[:2, :2] = np.diag([1e2, 1e2])
             right[:2] = 1e2 * one
-            parts.append(rig_effects.RigEquations(normal, right))
-        monkeypatch.setattr(rig_effects, "_equations", lambda *_: (parts, []))
-        monkeypatch.setattr(
-            rig_effects, "base_equations", lambda *_: (np.zeros((6, 6)), np.zeros(6))
-        )
+            parts.append(rig_step.RigEquations(normal, right))
+        monkeypatch.setattr(rig_step, "_equations", lambda *_: (parts, []))
+        monkeypatch.setattr(rig_step, "base_equations", lambda *_: (np.zeros((6, 6)), np.zeros(6)))
         free = np.zeros((1, 8), dtype=bool)
         free[0, :2] = True
         fit = stub(total=(1.0, 1))
-        step = rig_effects.rig_step([stub(camera=VIEW)], stub(), stub(), fit, free, 3e-4)
+        step = rig_step.rig_step([stub(camera=VIEW)], stub(), stub(), fit, free, 3e-4)
         assert np.sqrt(np.diag(step.covariance))[:2] == pytest.approx(step.deviations[0, :2])
         return step.changes[0, :2], step.deviations[0, :2]
 
@@ -184,9 +176,9 @@ def test_deviations_between_stretches_hold_what_they_err_by_alike(monkeypatch) -
 
 @pytest.mark.parametrize(("parts", "told"), [(3, False), (4, True)])
 def test_four_parts_tell_how_far_they_differ(parts, told) -> None:
-    found = rig_effects.leaving_out(np.arange(float(parts))[:, None] * np.ones(3))
+    found = rig_step.leaving_out(np.arange(float(parts))[:, None] * np.ones(3))
     assert (found > 1.0).tolist() == [told] * 3
-    assert rig_effects.leaving_out(np.zeros((0, 2))).tolist() == [0.0, 0.0]
+    assert rig_step.leaving_out(np.zeros((0, 2))).tolist() == [0.0, 0.0]
 
 
 def jitter(monkeypatch, frames: int, late_s: float, noise_px: float, speed_px_s: float) -> float:

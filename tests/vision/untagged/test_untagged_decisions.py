@@ -14,14 +14,13 @@ from freeswing.vision.fuse.calibration_share import frame_causes
 from freeswing.vision.fuse.poses import Poses
 from freeswing.vision.untagged.adjusted_points import PointSums
 from freeswing.vision.untagged.feature_matches import matched
+from freeswing.vision.untagged.named_points import WORST_NAMED_M, rigid
 from freeswing.vision.untagged.pose_by_matches import LEAST_MATCHES, agreed_pose
 from freeswing.vision.untagged.rest_model import (
     CHANGED_GREY,
     CHANGED_SHARE,
-    WORST_NAMED_M,
     moving_part,
     rest_model,
-    rigid,
 )
 from freeswing.vision.untagged.still_pose import still_pose
 from freeswing.vision.untagged.track_untagged import frame_of_platform

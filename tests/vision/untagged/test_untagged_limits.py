@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.measured.target import Marker, Untagged
 from freeswing.cdpr.rotation import transform
+from freeswing.vision.untagged import named_points
 from freeswing.vision.untagged import rest_model as room
 from freeswing.vision.untagged.adjusted_points import PointSums, at_home
 from freeswing.vision.untagged.aligned_patches import Aligned
@@ -126,7 +127,7 @@ def test_a_named_point_a_centimetre_off_is_another_one(off_m, refused) -> None:
     for _ in range(20):
         push *= off_m / left(push)[1]
     with pytest.raises(DataError, match="from where") if refused else nullcontext():
-        room.rigid(STATED, left(push)[0], "clicks.csv", list("ABCD"))
+        named_points.rigid(STATED, left(push)[0], "clicks.csv", list("ABCD"))
 
 
 def modelled(monkeypatch, count: int, off_px: float) -> room.RestModel:
@@ -147,7 +148,7 @@ def modelled(monkeypatch, count: int, off_px: float) -> room.RestModel:
     monkeypatch.setattr(room, "matched", lambda *_: (both, both))
     monkeypatch.setattr(room, "triangulate", lambda *_: points)
     monkeypatch.setattr(room, "patches_at_rest", lambda _c, _r, inside, *_: (inside, None, {}))
-    monkeypatch.setattr(room, "_named_frame", lambda *_: (np.eye(4), np.zeros(6)))
+    monkeypatch.setattr(room, "named_frame", lambda *_: (np.eye(4), np.zeros(6)))
     rests = {camera.name: np.zeros((480, 640), np.uint8) for camera in cameras}
     untagged = Untagged(Path("rest"), Path("clicks.csv"), ())
     return room.rest_model(cameras, rests, {}, untagged)
@@ -167,7 +168,7 @@ def test_a_platform_has_thirty_points_on_which_cameras_agree(
 def test_a_click_is_good_to_half_a_pixel(tmp_path) -> None:
     path = tmp_path / "clicks.csv"
     path.write_text("camera,point,u_px,v_px\ncam0,A,1,2\n")
-    found = room._clicks(Untagged(tmp_path, path, (Marker("A", np.zeros(3)),)), ["cam0"])
+    found = named_points._clicks(Untagged(tmp_path, path, (Marker("A", np.zeros(3)),)), ["cam0"])
     assert found["cam0", "A"][2] == pytest.approx(0.5, rel=0.15)
 
 
