@@ -122,6 +122,6 @@ def _settled(
 
 
 def rigidly_moved(points: Array, goal: Array, weights: Array) -> Array:
-    """Points (k, n_m, 3) turned and shifted onto a goal by weighted least squares."""
+    """Points (k, n_m, 3) turned and shifted onto a goal by weighted least squares (Kabsch 1976)."""
     R, t = fit_rigid(points, goal, weights)
     return points @ R.swapaxes(1, 2) + t[:, None]

@@ -13,7 +13,7 @@ from freeswing.cdpr.files.documents import InputError, Problems, Reader, inside,
 from freeswing.cdpr.files.drive_csv import read_drive_run, read_static
 from freeswing.cdpr.files.robot_file import read_robot
 from freeswing.cdpr.system.confine import results_folder
-from freeswing.ident.drive.identify import DriveSession
+from freeswing.ident.drive.asked_session import DriveSession
 from freeswing.ident.drive.kinematics import StaticPoses
 from freeswing.ident.drive.run_problem import DriveRun, Noise
 from freeswing.ident.drive.unknowns import Asked, Group

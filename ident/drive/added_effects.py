@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from freeswing.cdpr.driven.model import DrivenModel, build_driven
 from freeswing.cdpr.effects import driven_catalogue
+from freeswing.ident.drive.asked_session import DriveSession
 from freeswing.ident.drive.diagnose.candidates import shown
-from freeswing.ident.drive.identify import DriveSession
 from freeswing.ident.drive.unknowns import Asked, Group
 
 Array = NDArray[np.float64]

@@ -10,15 +10,13 @@ from numpy.typing import NDArray
 
 from freeswing.cdpr.effects import driven_catalogue
 from freeswing.cdpr.system.progress import Progress
+from freeswing.ident.drive.asked_session import DriveSession
 from freeswing.ident.drive.diagnose.candidates import weighs
 from freeswing.ident.drive.diagnose.refit import MOST_STEPS, weighted
 from freeswing.ident.drive.diagnose.screen import jump_start
 from freeswing.ident.drive.elastic_search import best_start, followed, known_at_rest, stretches
 from freeswing.ident.drive.identify import (
-    HEAD_S,
-    SECOND_START,
     DriveIdentification,
-    DriveSession,
     apart,
     as_declared,
     clear_of_slack,
@@ -33,6 +31,8 @@ from freeswing.ident.drive.identify import (
 from freeswing.ident.drive.inverse_dynamics import Regression, inverse_dynamics
 from freeswing.ident.drive.joint import Estimate, Premise, Problem, estimate
 from freeswing.ident.drive.kinematics import Kinematics
+from freeswing.ident.drive.predicted_run import HEAD_S
+from freeswing.ident.drive.second_start import away
 from freeswing.ident.drive.solver import MISFIT
 from freeswing.ident.drive.unknowns import Asked
 
@@ -180,7 +180,5 @@ def _untouched(session: DriveSession, name: str) -> bool:
 def _away(given: Premise, first: Estimate) -> Premise:
     """Numbers 5 % off an estimate, up and down in turn; not lengths, which then fit no pose."""
     asked = first.asked
-    signs = np.where(np.arange(len(first.values)) % 2 == 0, SECOND_START, 1.0 / SECOND_START)
-    signs[: asked.n_kinematic] = 1.0
-    away = asked.put(given.model, first.theta, first.values * signs)
-    return replace(given, theta=away, offsets=first.offsets)
+    theta = asked.put(given.model, first.theta, away(first.values, held=asked.n_kinematic))
+    return replace(given, theta=theta, offsets=first.offsets)

@@ -97,3 +97,6 @@ class Asked:
             for name in group.members:
                 changed[model.index(name)] = value
         return changed
+
+
+NOTHING = Asked((), 0)

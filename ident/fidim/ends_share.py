@@ -15,7 +15,8 @@ import numpy as np
 from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.model.regressor import SwingMotion, regressor
 from freeswing.ident.fidim.shares import Share, Stack
-from freeswing.ident.signals.motions import free_motion, mean_lengths
+from freeswing.ident.signals.constant_lengths import mean_lengths
+from freeswing.ident.signals.motions import free_motion
 from freeswing.ident.signals.usable_runs import PreparedRun, motion_of, signals_used
 
 

@@ -127,7 +127,7 @@ HELD = (
     Held("freeswing/session/repeated_runs.py", ("STRETCH", "SHARED"), MARKERS),
     Held("freeswing/results/comparison.py", ("NOTABLE_Z",), MARKERS),
     Held(
-        "ident/drive/checks.py",
+        "ident/drive/records/mistaken_records.py",
         (
             "JUMP", "WRONG_RATE", "MILLI", "UNLIKE_CURRENT", "LEAST_DEGREES", "MOST_DEGREES",
             "COUNTS", "ALIKE", "STRANGER", "LATENCY_S", "START_S", "START_COUNTS", "LEAST_MOTION",
@@ -140,9 +140,9 @@ HELD = (
         ("REFITTED", "LEAST_BIC", "CONFOUNDED", "MOST_EFFECTS", "HALVED", "LEAD"),
         CHOICE,
     ),
-    Held("ident/drive/checks.py", ("CLEAR",), SEARCH),
-    Held("ident/drive/slack.py", ("SHORTEST_S", "LASTING_S", "MARGIN_S"), SEARCH),
-    Held("ident/drive/ramps.py", ("MOVED_STEPS", "LEAST_ROWS"), SEARCH),
+    Held("ident/drive/records/mistaken_records.py", ("CLEAR",), SEARCH),
+    Held("ident/drive/records/slack.py", ("SHORTEST_S", "LASTING_S", "MARGIN_S"), SEARCH),
+    Held("ident/drive/records/ramps.py", ("MOVED_STEPS", "LEAST_ROWS"), SEARCH),
     Held("ident/drive/solver.py", ("MISFIT",), SEARCH),
     Held("ident/drive/diagnose/refit.py", ("LOST",), SEARCH),
     Held("ident/drive/unknowns.py", ("DYNAMIC_REACH", "KINEMATIC_REACH",), CHOICE),
@@ -280,7 +280,13 @@ HELD = (
         ("REFERENCE_S", "FOLLOWS", "GROWN", "_MARGIN_S"),
         "tests/ident/signals/test_limits.py",
     ),
-    Held("ident/signals/motions.py", ("LENGTH_LIMIT_M",), "tests/ident/signals/test_limits.py"),
+    Held(
+        "ident/signals/constant_lengths.py",
+        (
+            "LENGTH_LIMIT_M",
+        ),
+        'tests/ident/signals/test_limits.py',
+    ),
     Held("ident/signals/jumps.py", ("_ABOVE_NOISE", "_UNUSUAL"), SIGNALS),
     Held("ident/signals/derivatives.py", ("_LEAST_OUTPUTS",), SIGNALS),
     Held(
@@ -647,9 +653,10 @@ HELD = (
     Held("excite/bench_plan.py", ("HOOP", "SMALL",), PLAN),
     Held("excite/plan_tables.py", ("_GOOD_COST",), PLAN),
     Held("ident/drive/elastic_search.py", ("FIRST_HEAD_S", "HEAD_STEPS",), SEARCH),
-    Held("ident/drive/identify.py", ("HEAD_S", "ELASTIC_STEPS", "SECOND_START",), SEARCH),
+    Held("ident/drive/second_start.py", ("SECOND_START",), SEARCH),
+    Held("ident/drive/predicted_run.py", ("HEAD_S", "ELASTIC_STEPS"), SEARCH),
     Held("ident/drive/added_effects.py", ("SAME",), SEARCH),
-    Held("ident/drive/plan/deviations.py", ("STATIC_SAMPLES",), SEARCH),
+    Held("ident/drive/plan/plan_poses.py", ("STATIC_SAMPLES",), SEARCH),
     Held("ident/drive/plan/plan_poses.py", ("MOST_TOGETHER",), SEARCH),
     Held("calib/footage/first_frames.py", ("_ENOUGH_MOVING",), FOOTAGE),
     Held(

@@ -64,8 +64,7 @@ def run_drive(options: Namespace, console: Console) -> None:
     """
     from freeswing.cdpr.files.documents import DataError, InputError, write_json
     from freeswing.cdpr.system.confine import results_folder
-    from freeswing.ident.drive.plan.deviations import at_rest
-    from freeswing.ident.drive.plan.plan_poses import plan_poses, single_motors
+    from freeswing.ident.drive.plan.plan_poses import at_rest, plan_poses, single_motors
     from freeswing.ident.drive.plan.plan_record import Limits, plan_record
 
     path = options.robot

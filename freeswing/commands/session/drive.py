@@ -50,7 +50,7 @@ def examined(file: DriveFile) -> None:
         DataError: with every finding.
     """
     from freeswing.cdpr.files.documents import DataError
-    from freeswing.ident.drive.checks import findings
+    from freeswing.ident.drive.records.mistaken_records import findings
 
     found = findings(file.session)
     if found:
@@ -110,7 +110,7 @@ def check(path: Path, results: str | None, console: Console) -> None:
         DataError: when a finding keeps it from a result.
     """
     from freeswing.cdpr.files.documents import DataError, write_json
-    from freeswing.ident.drive.checks import findings
+    from freeswing.ident.drive.records.mistaken_records import findings
     from freeswing.session.drive_session import read_drive_session
 
     file = read_drive_session(path, results)

@@ -9,13 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.cdpr.effects import driven_catalogue
+from freeswing.ident.drive.asked_session import DriveSession
 from freeswing.ident.drive.diagnose.candidates import Candidate
 from freeswing.ident.drive.diagnose.diagnose import DriveDiagnosis, Verdict
 from freeswing.ident.drive.diagnose.refit import Fitted
-from freeswing.ident.drive.identify import DriveIdentification, DriveSession, RunFit
+from freeswing.ident.drive.identify import DriveIdentification
 from freeswing.ident.drive.joint import Estimate
 from freeswing.ident.drive.kinematics import Kinematics
-from freeswing.ident.drive.ramps import Ramp
+from freeswing.ident.drive.predicted_run import RunFit
+from freeswing.ident.drive.records.ramps import Ramp
 from freeswing.ident.drive.run_problem import DriveRun
 from freeswing.ident.drive.trust import is_untold
 from freeswing.results.driven.estimates import DriveResult

@@ -8,13 +8,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from freeswing.cdpr.system.progress import Progress
+from freeswing.ident.drive.asked_session import DriveSession
 from freeswing.ident.drive.diagnose.candidates import Candidate, candidates
 from freeswing.ident.drive.diagnose.refit import Fitted, fitted, refitted, settled, with_candidate
 from freeswing.ident.drive.diagnose.screen import Screened, jump_start, screen
-from freeswing.ident.drive.identify import DriveSession, geometry, possible, premise_of, step_1
+from freeswing.ident.drive.identify import geometry, possible, premise_of, step_1
 from freeswing.ident.drive.inverse_dynamics import inverse_dynamics
 from freeswing.ident.drive.joint import Problem
-from freeswing.ident.drive.slack import before_slack
+from freeswing.ident.drive.records.slack import before_slack
 from freeswing.ident.drive.trust import ABOVE_NOISE
 
 REFITTED = 4  # a round: the screen orders them well, and each takes seconds

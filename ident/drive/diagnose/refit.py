@@ -8,12 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.cdpr.driven.model import DrivenModel
+from freeswing.ident.drive.asked_session import DriveSession
 from freeswing.ident.drive.diagnose.candidates import CENTRE, Candidate
 from freeswing.ident.drive.diagnose.screen import Screened, grown
 from freeswing.ident.drive.elastic_search import best_start, followed, known_at_rest, stretches
-from freeswing.ident.drive.identify import HEAD_S, DriveSession, RunFit, possible, predict
+from freeswing.ident.drive.identify import possible
 from freeswing.ident.drive.inverse_dynamics import inverse_dynamics
 from freeswing.ident.drive.joint import Estimate, Premise, Problem, estimate
+from freeswing.ident.drive.predicted_run import HEAD_S, RunFit, predict
 from freeswing.ident.drive.solver import MISFIT
 from freeswing.ident.drive.unknowns import Asked, Group
 

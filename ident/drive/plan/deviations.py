@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from freeswing.cdpr.driven.behaviour import rest_pose, simulate
 from freeswing.cdpr.driven.model import DrivenModel
-from freeswing.cdpr.driven.motion import DrivenMotion, motor_angles
+from freeswing.cdpr.driven.motion import DrivenMotion
 from freeswing.cdpr.driven.record import Instruments, observed
-from freeswing.cdpr.driven.statics import CENTRE, static_pose
+from freeswing.cdpr.driven.statics import CENTRE
 from freeswing.ident.drive.joint import Premise, Problem
 from freeswing.ident.drive.kinematics import StaticPoses, zero_turns
 from freeswing.ident.drive.run_problem import DriveRun, Noise
@@ -19,8 +19,6 @@ from freeswing.ident.drive.solver import covariance_of
 from freeswing.ident.drive.unknowns import Asked
 
 Array = NDArray[np.float64]
-
-STATIC_SAMPLES = 100  # each pose at rest is the mean of so many
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,19 +76,6 @@ def moved_by(bench: Bench, references: Array) -> DrivenMotion:
     model, still = bench.model, np.zeros(bench.model.n_cables)
     state = np.concatenate([rest_pose(model, still), np.zeros(6)])
     return simulate(model, state, references, bench.rate_hz, currents_A=still)
-
-
-def at_rest(bench: Bench, currents: Array) -> StaticPoses:
-    """Poses at rest under held currents (n_p, n), as exact readings with their deviations.
-
-    Raises:
-        ValueError: when there is no rest under one of them.
-    """
-    model, noise = bench.model, bench.noise
-    poses = np.array([static_pose(model, row).pose for row in currents])
-    angles = motor_angles(model, poses, CENTRE, model.declared)
-    std = noise.pose_std / np.sqrt(STATIC_SAMPLES)
-    return StaticPoses(currents, angles, poses, std, noise.angle_std_rad)
 
 
 def relative_deviations(bench: Bench, motion: DrivenMotion, static: StaticPoses) -> Array:

@@ -7,12 +7,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from freeswing.cdpr.driven.motion import motor_angles
 from freeswing.cdpr.driven.slopes import length_slope, pose_map
 from freeswing.cdpr.driven.statics import CENTRE, static_pose
 from freeswing.cdpr.model.batch import evaluate
 from freeswing.ident.drive.kinematics import StaticPoses, zero_turns
-from freeswing.ident.drive.plan.deviations import Bench, at_rest
+from freeswing.ident.drive.plan.deviations import Bench
 from freeswing.ident.drive.plan.plan_record import Limits, within
+
+STATIC_SAMPLES = 100  # each pose at rest is the mean of so many
 
 Array = NDArray[np.float64]
 
@@ -117,3 +120,16 @@ def _relative(bench: Bench, information: Array) -> Array:
     if np.linalg.matrix_rank(unit) < len(sizes):
         return np.full(len(sizes), np.inf)
     return np.sqrt(np.diag(np.linalg.inv(unit)))
+
+
+def at_rest(bench: Bench, currents: Array) -> StaticPoses:
+    """Poses at rest under held currents (n_p, n), as exact readings with their deviations.
+
+    Raises:
+        ValueError: when there is no rest under one of them.
+    """
+    model, noise = bench.model, bench.noise
+    poses = np.array([static_pose(model, row).pose for row in currents])
+    angles = motor_angles(model, poses, CENTRE, model.declared)
+    std = noise.pose_std / np.sqrt(STATIC_SAMPLES)
+    return StaticPoses(currents, angles, poses, std, noise.angle_std_rad)

@@ -9,7 +9,7 @@ from freeswing.cdpr.driven.behaviour import rest_pose, simulate
 from freeswing.cdpr.driven.record import observed
 from freeswing.cdpr.driven.statics import CENTRE
 from freeswing.cdpr.files.drive_csv import write_drive_run
-from freeswing.ident.drive.checks import findings
+from freeswing.ident.drive.records.mistaken_records import findings
 from freeswing.main import main
 from freeswing.session.drive_session import read_drive_session
 from tests.cdpr.driven_robots import inca
@@ -34,7 +34,8 @@ def spoiled(made, tmp_path, run=None, static=None, toml=None):
             lines += [",".join("" if np.isnan(v) else f"{v:.12g}" for v in row) for row in values]
             (tmp_path / name).write_text("\n".join(lines))
     if toml is not None:
-        (tmp_path / "drive.toml").write_text(TOML.replace(*toml, 1))
+        old, new = toml
+        (tmp_path / "drive.toml").write_text(TOML.replace(old, new, 1))
     return tmp_path
 
 

@@ -1,34 +1,46 @@
 """What checks of driven recordings decide, on both sides of every limit, without any robot."""
 
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
-from freeswing.ident.drive import checks
+from freeswing.ident.drive.records import mistaken_records
+
+
+def stub(**more: object) -> Any:
+    """What a test needs of a session, a run or a model, and no more."""
+    return SimpleNamespace(**more)
+
 
 STEP = 1e-3  # rad between counts, whose noise is STEP / sqrt(12)
 
 
 def session_of(n=1, limit_A=3.0, **more):
-    cables = [SimpleNamespace(name=str(k + 1)) for k in range(n)]
-    model = SimpleNamespace(
-        robot=SimpleNamespace(cables=cables),
-        drive=SimpleNamespace(current_limits_A=np.array([[0.0, limit_A]] * n)),
+    cables = [stub(name=str(k + 1)) for k in range(n)]
+    model = stub(
+        robot=stub(cables=cables),
+        drive=stub(current_limits_A=np.array([[0.0, limit_A]] * n)),
         names=(),
         declared=np.zeros(0),
     )
-    noise = SimpleNamespace(angle_std_rad=STEP / 12**0.5, latency_s=0.01)
-    return SimpleNamespace(model=model, noise=noise, **more)
+    noise = stub(angle_std_rad=STEP / 12**0.5, latency_s=0.01)
+    return stub(model=model, noise=noise, **more)
 
 
 def run_of(**record):
     record = {"seen": np.arange(100), **record}
-    return SimpleNamespace(name="a", rate_hz=1000.0, record=SimpleNamespace(**record))
+    return stub(name="a", rate_hz=1000.0, record=stub(**record))
 
 
 class Seen(tuple):
     """What encoders and poses tell of the angles, and what the poses' own noise makes of it."""
+
+    read: np.ndarray
+    told: np.ndarray
+    speed: np.ndarray
+    noise: np.ndarray
 
     def __new__(cls, read, told, speed):
         seen = super().__new__(cls, (read, told, speed))
@@ -38,35 +50,35 @@ class Seen(tuple):
 
 
 def told(monkeypatch, read, poses, speed=None):
-    monkeypatch.setattr(checks, "_told", lambda *_: Seen(read, poses, speed))
+    monkeypatch.setattr(mistaken_records, "_told", lambda *_: Seen(read, poses, speed))
 
 
 @pytest.mark.parametrize(("gap", "found"), [(1.45, 0), (1.55, 1)])
 def test_a_jump_is_half_a_period(gap, found):
     times = 1e-3 * np.cumsum(np.r_[np.ones(50), gap, np.ones(50)])
-    assert len(checks._times(run_of(times_s=times))) == found
+    assert len(mistaken_records._times(run_of(times_s=times))) == found
 
 
 @pytest.mark.parametrize(("slow", "found"), [(1.009, 0), (1.011, 1)])
 def test_a_rate_is_another_from_one_per_cent(slow, found):
-    assert len(checks._times(run_of(times_s=1e-3 * slow * np.arange(100)))) == found
+    assert len(mistaken_records._times(run_of(times_s=1e-3 * slow * np.arange(100)))) == found
 
 
 @pytest.mark.parametrize(("largest", "found"), [(29.0, 0), (31.0, 1)])
 def test_milliampere_are_thirty_times_the_limit(monkeypatch, largest, found):
     currents = np.linspace(0.0, 3.0 * largest, 100)[:, None]
-    monkeypatch.setattr(checks, "flowing", lambda *_: currents)
+    monkeypatch.setattr(mistaken_records, "flowing", lambda *_: currents)
     run = run_of(currents_A=currents, references_A=currents)
-    assert len(checks._currents(session_of(), run)) == found
+    assert len(mistaken_records._currents(session_of(), run)) == found
 
 
 @pytest.mark.parametrize(("share", "found"), [(0.48, 0), (0.52, 1)])
 def test_a_current_that_does_not_follow_is_off_by_half_its_scatter(monkeypatch, share, found):
     flows = np.tile([0.0, 1.0, 1.0, 0.0], 25)[:, None]
     off = share * np.tile([0.5, 0.5, -0.5, -0.5], 25)[:, None]
-    monkeypatch.setattr(checks, "flowing", lambda *_: flows)
+    monkeypatch.setattr(mistaken_records, "flowing", lambda *_: flows)
     run = run_of(currents_A=flows + off, references_A=flows)
-    assert len(checks._currents(session_of(), run)) == found
+    assert len(mistaken_records._currents(session_of(), run)) == found
 
 
 @pytest.mark.parametrize(
@@ -83,7 +95,7 @@ def test_a_current_that_does_not_follow_is_off_by_half_its_scatter(monkeypatch, 
 def test_units_of_angles_are_slopes(monkeypatch, slope, words):
     poses = np.sin(np.arange(100.0))[:, None]
     told(monkeypatch, slope * poses, poses)
-    found = checks._angles(session_of(), run_of())
+    found = mistaken_records._angles(session_of(), run_of())
     assert bool(found) == bool(words), found
     assert words in "".join(found)
 
@@ -93,13 +105,13 @@ def test_angles_that_hardly_move_tell_no_unit(monkeypatch, steps, found):
     """A motion of so many deviations of the counts' noise, in degrees."""
     poses = np.tile([1.0, -1.0], 50)[:, None] * steps * STEP / 12**0.5
     told(monkeypatch, 57.0 * poses, poses)
-    assert len(checks._angles(session_of(), run_of())) == found
+    assert len(mistaken_records._angles(session_of(), run_of())) == found
 
 
 @pytest.mark.parametrize(("travel", "found"), [(19.0, 1), (21.0, 0)])
 def test_a_run_of_twenty_counts_excites_something(travel, found):
     run = run_of(angles_rad=STEP * np.linspace(0.0, travel, 100)[:, None])
-    assert len(checks._still(session_of(), run)) == found
+    assert len(mistaken_records._still(session_of(), run)) == found
 
 
 def mixed(own, other):
@@ -116,7 +128,7 @@ def mixed(own, other):
 def test_an_angle_follows_its_cable(monkeypatch, own, found):
     poses, first, second = mixed(own, 0.0)
     told(monkeypatch, np.column_stack([first, second]), poses)
-    said = checks._angles(session_of(2), run_of())
+    said = mistaken_records._angles(session_of(2), run_of())
     assert len(said) == found, said
     assert ("turn its sign" in "".join(said)) == (own < -0.9)
 
@@ -125,7 +137,7 @@ def test_an_angle_follows_its_cable(monkeypatch, own, found):
 def test_columns_are_swapped_where_each_follows_the_other(monkeypatch, other, words):
     poses, first, _ = mixed(0.0, other)
     told(monkeypatch, np.column_stack([first, poses[:, 0]]), poses)
-    said = checks._angles(session_of(2), run_of())
+    said = mistaken_records._angles(session_of(2), run_of())
     assert any(words in text for text in said), said
     assert any("swapped" in text for text in said) == (words == "swapped"), said
 
@@ -135,7 +147,7 @@ def test_poses_are_late_from_three_milliseconds(monkeypatch, delay, found):
     times = np.arange(100) / 100.0
     poses, speed = np.sin(6.0 * times)[:, None], 6.0 * np.cos(6.0 * times)[:, None]
     told(monkeypatch, poses + delay * speed, poses, speed)
-    assert len(checks._latency(session_of(), run_of())) == found
+    assert len(mistaken_records._latency(session_of(), run_of())) == found
 
 
 @pytest.mark.parametrize(
@@ -146,15 +158,15 @@ def test_a_start_in_motion_turns_by_three_counts_in_four_milliseconds(counts, pl
     angles[place] = counts * STEP
     still = np.zeros((100, 1))
     run = run_of(angles_rad=angles, references_A=still, currents_A=still)
-    assert len(checks._start(session_of(), run)) == found
+    assert len(mistaken_records._start(session_of(), run)) == found
 
 
 @pytest.mark.parametrize(("square", "found"), [(59.0, 0), (61.0, 1)])
 def test_a_static_row_is_odd_from_sixty(monkeypatch, square, found):
     rows = np.zeros((6, 1))
-    static = SimpleNamespace(poses=rows, currents_A=rows, angles_rad=rows)
-    asked = SimpleNamespace(kinematic=SimpleNamespace(groups=("drum",)))
+    static = stub(poses=rows, currents_A=rows, angles_rad=rows)
+    asked = stub(kinematic=stub(groups=("drum",)))
     squares = np.r_[14.0 * np.ones(5), square]
-    monkeypatch.setattr(checks, "_static_squares", lambda *_: squares)
-    monkeypatch.setattr(checks, "replace", lambda one, **_: one)
-    assert len(checks._static(session_of(static=static, asked=asked))) == found
+    monkeypatch.setattr(mistaken_records, "_static_squares", lambda *_: squares)
+    monkeypatch.setattr(mistaken_records, "replace", lambda one, **_: one)
+    assert len(mistaken_records._static(session_of(static=static, asked=asked))) == found

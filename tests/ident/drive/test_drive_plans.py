@@ -8,8 +8,8 @@ import pytest
 
 from freeswing.cdpr.driven.record import Instruments
 from freeswing.cdpr.files.drive_csv import read_drive_run
-from freeswing.ident.drive.plan.deviations import Bench, at_rest, moved_by, relative_deviations
-from freeswing.ident.drive.plan.plan_poses import plan_poses, single_motors
+from freeswing.ident.drive.plan.deviations import Bench, moved_by, relative_deviations
+from freeswing.ident.drive.plan.plan_poses import at_rest, plan_poses, single_motors
 from freeswing.ident.drive.plan.plan_record import Limits, plan_record, within
 from freeswing.ident.drive.plan.references import drawn
 from freeswing.ident.drive.unknowns import Asked, Group

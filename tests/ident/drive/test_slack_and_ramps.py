@@ -12,9 +12,9 @@ from freeswing.cdpr.driven.record import observed
 from freeswing.cdpr.driven.statics import CENTRE
 from freeswing.cdpr.files.drive_csv import read_drive_run, write_drive_run
 from freeswing.ident.drive.identify import offsets_of
-from freeswing.ident.drive.ramps import ramp_of
+from freeswing.ident.drive.records.ramps import ramp_of
+from freeswing.ident.drive.records.slack import LASTING_S, before_slack, first_slack
 from freeswing.ident.drive.run_problem import DriveRun
-from freeswing.ident.drive.slack import LASTING_S, before_slack, first_slack
 from freeswing.main import main
 from freeswing.session.drive_session import read_drive_session
 from tests.cdpr.driven_robots import inca

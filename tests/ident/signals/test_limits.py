@@ -10,8 +10,8 @@ import pytest
 from freeswing.cdpr.robot import POSE_COORDINATES
 from freeswing.ident.signals import derivatives, usable_runs
 from freeswing.ident.signals import jumps as module
+from freeswing.ident.signals.constant_lengths import mean_lengths
 from freeswing.ident.signals.derivatives import SignalSettings, UnusableRunError
-from freeswing.ident.signals.motions import mean_lengths
 from freeswing.ident.signals.window import free_window
 from tests.ident.swings import paper_model, swing
 

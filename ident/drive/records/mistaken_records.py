@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from freeswing.cdpr.driven.slopes import length_slope, pose_map
 from freeswing.cdpr.measured.quaternion_readings import LEFT_OVER, READINGS
 from freeswing.cdpr.model.batch import evaluate
-from freeswing.ident.drive.identify import DriveSession
+from freeswing.ident.drive.asked_session import DriveSession
 from freeswing.ident.drive.inverse_dynamics import flowing
 from freeswing.ident.drive.kinematics import StaticPoses, most_likely
 from freeswing.ident.drive.run_problem import DriveRun

@@ -1,0 +1,1 @@
+"""What recordings of a driven robot hold: mistakes, slack cables, ramps."""
