@@ -195,11 +195,12 @@ def _fitted(first: OwnTrack, second: OwnTrack, lag: float, T_known: Array) -> Fi
     at = second.times_s + lag
     times = first.times_s
     right = np.searchsorted(times, at)
-    inside = (right > 1) & (right < len(times) - 1)
+    shared = (right > 1) & (right < len(times) - 1)
     four = np.clip(right, 2, len(times) - 2)[:, None] + np.arange(-2, 2)
-    inside &= np.diff(times[four], axis=1).max(axis=1) < 1.5 * first.step_s
-    least = max(_LEAST_OVERLAP, OVERLAP_SHARE * min(len(at), len(times)))
-    if inside.sum() < least or np.ptp(at[inside]) < LEAST_OVERLAP_S:
+    inside = shared & (np.diff(times[four], axis=1).max(axis=1) < 1.5 * first.step_s)
+    # frames beside a gap are compared by nobody, but both recorded them
+    apart = shared.sum() < OVERLAP_SHARE * min(len(at), len(times))
+    if apart or inside.sum() < _LEAST_OVERLAP or np.ptp(at[inside]) < LEAST_OVERLAP_S:
         return None
     four, own = four[inside], _points(second)[inside]
     weights = _cubic(times[four], at[inside])

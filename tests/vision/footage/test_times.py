@@ -139,6 +139,24 @@ def test_a_start_by_hand_is_found(tmp_path, late, capsys) -> None:
 
 
 @pytest.mark.slow
+def test_a_start_by_hand_is_found_beside_repeated_frames(tmp_path) -> None:
+    """Every eighth frame of both is a copy: less than half of the frames have no gap near them."""
+    folder = write_session(tmp_path, without_clocks)
+    for camera, late in (("left", 0), ("right", 14)):
+        frames = frames_of(camera)[late:]
+        for k in range(8, len(frames), 8):
+            frames[k] = frames[k - 1]
+        place = folder / "runs" / "swing-01" / f"{camera}.mp4"
+        write_frames(place, frames, EVEN[: len(frames)])
+    assert track(folder) == 0
+    (effect,) = tracking(folder)["effects"]
+    assert (effect["effect"], effect["camera"]) == ("clock_offset", "right"), effect
+    assert abs(effect["parameters"][0]["value"] - 14 / RATE_HZ - 0.0031) < 1e-3, effect
+    rms = np.sqrt(np.mean(errors_m(folder, START_S) ** 2, axis=0)).max()
+    assert rms < 3e-4, f"{1e3 * rms:.3f} mm"
+
+
+@pytest.mark.slow
 def test_a_clock_goes_back_into_the_cameras_on_request(tmp_path) -> None:
     folder = write_session(
         tmp_path,
