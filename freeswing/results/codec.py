@@ -82,17 +82,43 @@ class Entry:
 
 
 @entry
+class Provenance(Entry):
+    """What a result was made of, see `session.provenance`; what was not kept is None.
+
+    Attributes:
+        made: when; files of this version do not say.
+        seconds: that it took; likewise.
+        versions: of this program, Python and packages, by name.
+        settings: the flags that change the result.
+        inputs: SHA-256 of each input, by its name in the session.
+        outputs: likewise of the files written beside.
+    """
+
+    made: str | None = absent()
+    seconds: float | None = absent()
+    versions: Table | None = absent()
+    settings: Table | None = absent()
+    inputs: Table | None = absent()
+    outputs: Table | None = absent()
+
+    @property
+    def is_kept(self) -> bool:
+        """Whether anything is known."""
+        return bool(self.to_json())
+
+
+@entry
 class Document(Entry):
     """A result file; `kind` and `version` make its first line, `freeswing-<kind>/<version>`.
 
     Attributes:
-        provenance: what it was made of, see `session.provenance`; empty where it was not kept.
+        provenance: what it was made of.
     """
 
     kind: ClassVar[str] = ""
     version: ClassVar[int] = 1
 
-    provenance: Table = empty(default_factory=dict)
+    provenance: Provenance = empty(default_factory=lambda: Provenance.from_json({}))
 
     @classmethod
     def format(cls) -> str:
@@ -115,12 +141,12 @@ class Document(Entry):
         """The whole file: format first, provenance last."""
         # No bare super(): a dataclass with slots is another class than the one written here.
         body = Entry.to_json(self)
-        made = {"provenance": dict(self.provenance)} if self.provenance else {}
-        return {"format": self.format(), **body, **made}
+        made = self.provenance.to_json()
+        return {"format": self.format(), **body, **({"provenance": made} if made else {})}
 
     def made_of(self, provenance: Table) -> Self:
         """The same document with its provenance."""
-        return dataclasses.replace(self, provenance=dict(provenance))
+        return dataclasses.replace(self, provenance=Provenance.from_json(provenance))
 
 
 Read = Callable[[Any, str], Any]

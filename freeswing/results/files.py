@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from freeswing.cdpr.files.documents import InputError
-from freeswing.results.codec import Document
+from freeswing.results.codec import Document, Provenance
 
 D = TypeVar("D", bound=Document)
 
@@ -29,10 +28,9 @@ def read_document(path: Path, kind: type[D]) -> D | None:
         ) from None
 
 
-def read_provenance(path: Path) -> Mapping[str, Any]:
-    """What a result file says it was made of; empty where it is absent or says nothing."""
+def read_provenance(path: Path) -> Provenance:
+    """What a result file says it was made of; nothing where it is absent or says nothing."""
     try:
-        made = json.loads(path.read_text(encoding="utf-8"))["provenance"]
-        return made if isinstance(made, dict) else {}
+        return Provenance.from_json(json.loads(path.read_text(encoding="utf-8"))["provenance"])
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
-        return {}
+        return Provenance.from_json({})

@@ -65,8 +65,7 @@ def stale_results(session: Session) -> tuple[Stale, ...]:
 
 def _told(session: Session, file: str) -> dict[str, Any]:
     """The inputs that a result remembers; empty where it remembers none."""
-    made = read_provenance(session.results / file).get("inputs")
-    return dict(made) if isinstance(made, Mapping) else {}
+    return dict(read_provenance(session.results / file).inputs or {})
 
 
 def _results() -> list[tuple[str, Stage]]:

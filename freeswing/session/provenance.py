@@ -55,13 +55,14 @@ def is_current(
         outputs: the stage's other files; each has to be there as it was written.
     """
     made = read_provenance(result)
+    if made.versions is None or made.versions.get("freeswing") != __version__:
+        return False
     try:
-        same_version = made["versions"]["freeswing"] == __version__
-        if not same_version or made["settings"] != json.loads(json.dumps(dict(settings))):
+        if made.settings != json.loads(json.dumps(dict(settings))):
             return False
-        intact = dict(made.get("outputs", {})) == hashes(session, outputs)
-        return intact and made["inputs"] == hashes(session, inputs)
-    except (OSError, ValueError, KeyError, TypeError):
+        intact = dict(made.outputs or {}) == hashes(session, outputs)
+        return intact and made.inputs == hashes(session, inputs)
+    except (OSError, ValueError, TypeError):
         return False
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from freeswing.report.material import Material
+from freeswing.results import codec
 from freeswing.results.codec import Table
 
 
@@ -19,21 +20,20 @@ class Provenance:
         results = [
             _result(kind, document.provenance)
             for kind, document in material.documents.items()
-            if document.provenance
+            if document.provenance.is_kept
         ]
         return {"results": results} if results else None
 
 
-def _result(kind: str, provenance: Table) -> dict[str, Any]:
-    seconds = provenance.get("seconds")
+def _result(kind: str, told: codec.Provenance) -> dict[str, Any]:
     return {
         "kind": kind,
-        "made": str(provenance.get("made", "")),
-        "seconds": f"{seconds:.1f} s" if isinstance(seconds, int | float) else "",
-        "versions": _pairs(provenance.get("versions")),
-        "settings": _pairs(provenance.get("settings")),
-        "inputs": _pairs(provenance.get("inputs")),
-        "outputs": _pairs(provenance.get("outputs")),
+        "made": told.made or "",
+        "seconds": "" if told.seconds is None else f"{told.seconds:.1f} s",
+        "versions": _pairs(told.versions),
+        "settings": _pairs(told.settings),
+        "inputs": _pairs(told.inputs),
+        "outputs": _pairs(told.outputs),
     }
 
 
