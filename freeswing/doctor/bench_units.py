@@ -140,7 +140,7 @@ def _of_run(run: BenchRun, robot: Robot, radius_m: float) -> Iterator[str]:
         )
     for signal in run.signals:
         yield from _of_positions(signal, length)
-    yield from _of_times(run, length)
+    yield from _of_times(run, length, float(np.linalg.norm(robot.gravity_m_s2)))
 
 
 def _of_mass(what: str, mass_kg: float, robot: Robot) -> Iterator[str]:
@@ -164,11 +164,11 @@ def _of_positions(signal: Signal, length_m: float) -> Iterator[str]:
         )
 
 
-def _of_times(run: BenchRun, length_m: float) -> Iterator[str]:
+def _of_times(run: BenchRun, length_m: float, gravity_m_s2: float) -> Iterator[str]:
     if len(run.times_s) < 3:
         return
     apart = float(np.median(np.diff(run.times_s)))
-    period = 2.0 * np.pi * float(np.sqrt(length_m / 9.81))
+    period = 2.0 * np.pi * float(np.sqrt(length_m / gravity_m_s2))
     if apart > SLOWEST * period:
         yield (
             f"column t_s: samples are {apart:.4g} s apart, and wires of {length_m:.4g} m sway in "

@@ -18,7 +18,7 @@ from freeswing.cdpr.model.free_motion import admissible_rates, coordinate_indice
 from freeswing.cdpr.model.regressor import SwingMotion, regressor
 from freeswing.cdpr.robot import Array
 from freeswing.cdpr.simulation.free_swing import simulate
-from freeswing.ident.fidim.shares import Share, Stack
+from freeswing.ident.fidim.shares import NINE, Share, Stack
 from freeswing.ident.fidim.total_least_squares import least_by_noise
 from freeswing.ident.fidim.weighted_least_squares import NoisyRegressor
 from freeswing.ident.signals.derivatives import SignalSettings, signals_of
@@ -99,16 +99,16 @@ def smoothing_bias(
         parametric bootstrap, here of its noise-free draw; Gourieroux, Monfort, Renault 1993,
         Indirect Inference, sec. 2: the values whose draws give the estimate.
     """
-    inertia = stack.values[:9]
+    inertia = stack.values[NINE]
     without_noise = inertia - (0.0 if noise is None else noise)
     change = _smoothed_away(model, runs, full, settings, stack, inertia)
     before = None
     for _ in range(_ROUNDS):
-        off = without_noise - change[:9] - inertia
-        size = off if before is None else change[:9] - before[1][:9]
+        off = without_noise - change[NINE] - inertia
+        size = off if before is None else change[NINE] - before[1][NINE]
         if np.abs(size / scatter).max() < SETTLED:
             break
-        following = _nearer(without_noise, inertia, change[:9], before, scatter)
+        following = _nearer(without_noise, inertia, change[NINE], before, scatter)
         before = inertia, change
         try:
             change = _smoothed_away(model, runs, full, settings, stack, following)
@@ -133,7 +133,7 @@ def _nearer(
     step = estimate - change - inertia
     if before is None:
         return inertia + step
-    last = estimate - before[1][:9] - before[0]
+    last = estimate - before[1][NINE] - before[0]
     turn = (step - last) / scatter
     share = float((step / scatter) @ turn / max(float(turn @ turn), 1e-300))
     return inertia + step - share * (inertia + step - before[0] - last)

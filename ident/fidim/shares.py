@@ -19,6 +19,10 @@ from freeswing.cdpr.frozen import freeze
 from freeswing.cdpr.robot import INERTIA_NAMES, Array
 from freeswing.ident.fidim.total_least_squares import least_by_noise, values_alone
 
+# Where the nine parameters stand in a solution, and the essential ones solved alone after them.
+NINE = slice(0, len(INERTIA_NAMES))
+ESSENTIAL = slice(len(INERTIA_NAMES), None)
+
 
 @dataclass(frozen=True, slots=True)
 class Share:
@@ -43,16 +47,16 @@ class Share:
     @property
     def covariance(self) -> Array:
         """Of all nine, (9, 9)."""
-        return self.changes[:, :9].T @ self.changes[:, :9]
+        return self.changes[:, NINE].T @ self.changes[:, NINE]
 
     @property
     def reduced(self) -> Array:
         """Of the essential ones solved alone, (e, e)."""
-        return self.changes[:, 9:].T @ self.changes[:, 9:]
+        return self.changes[:, ESSENTIAL].T @ self.changes[:, ESSENTIAL]
 
     def document(self) -> dict[str, Any]:
         """For the estimate's entry: the bias, or the standard deviations, of the nine."""
-        sizes = self.changes[0, :9] if self.is_bias else np.sqrt(np.diag(self.covariance))
+        sizes = self.changes[0, NINE] if self.is_bias else np.sqrt(np.diag(self.covariance))
         return {self.key: sizes.tolist()}
 
 
@@ -111,7 +115,7 @@ class Stack:
 
     def apart(self, inertia: Array) -> Array:
         """An inertia, (9,), less the solution: all nine, and the essential ones, (9 + e,)."""
-        off = inertia - self.values[:9]
+        off = inertia - self.values[NINE]
         return np.concatenate([off, off[self.kept[1:]]])
 
     def _weighed(self, k: int, W: Array) -> Array:
