@@ -26,7 +26,6 @@ NO_FORMULA = {
     "ident/bench/priors/motion_priors.py:loose_coordinates": "widths by coordinate",
     "ident/drive/second_start.py:away": "numbers five per cent off",
     "servo/design/pid.py:slowest_filters": "a number times modes",
-    "vision/fuse/linearised_block.py:lags": "differences of time stamps",
     "vision/fuse/run_views.py:instants_of": "picks time stamps",
 }
 

@@ -508,11 +508,9 @@ HELD = (
         "tests/vision/fuse/test_corner_noise.py",
     ),
     Held(
-        "vision/fuse/motion_from_poses.py",
-        (
-            "MOST_DEVIATIONS", "MOST_GROWTH",
-        ),
-        "tests/vision/fuse/test_corner_noise.py",
+        "vision/fuse/motion/motion_spectrum.py",
+        ("HIGHEST", "AS_LARGE"),
+        "tests/vision/fuse/motion/test_motion_from_poses.py",
     ),
     Held(
         "vision/rig/gross_faults.py",

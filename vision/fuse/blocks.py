@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from freeswing.cdpr.rotation import invert
 from freeswing.vision.fuse.corner_noise import outwards
+from freeswing.vision.fuse.linearised_block import linearised
+from freeswing.vision.fuse.motion.motion_from_poses import Course
 from freeswing.vision.fuse.poses import Poses
 from freeswing.vision.fuse.rolling_shutter import rolling_bias
 from freeswing.vision.fuse.run_views import Block, CameraViews
@@ -28,15 +30,36 @@ def blocks(
 ) -> Iterator[Block]:
     """All sightings of the platform, each at the instant nearest to its frame.
 
-    With `poses` at these instants, the corners are freed of what rolling shutters did to them.
+    With `poses` at these instants, each sighting has the platform's motion from its instant on,
+    what is not known of that among its covariance, and corners freed of what rolling shutters did.
     """
     nearest = [_nearest(v, instants_s) for v in views]
     for first in range(0, len(instants_s), INSTANTS_A_BLOCK):
         last = min(first + INSTANTS_A_BLOCK, len(instants_s))
         block = _block(views, nearest, watch, first, last)
-        if poses is not None and any(v.camera.line_time_s != 0.0 for v in views):
-            block = replace(block, rays=block.rays - rolling_bias(block, views, poses))
+        course = None if poses is None else poses.course
+        if poses is not None and course is not None:
+            block = _carried(block, views, poses, course)
         yield block
+
+
+def _carried(block: Block, views: Sequence[CameraViews], poses: Poses, course: Course) -> Block:
+    """The block with the platform's motion from each instant to its sightings."""
+    instant = np.repeat(np.arange(len(block.starts) - 1), np.diff(block.starts))
+    at = block.first + instant
+    found = course.carried(at, block.sighted_s() - poses.times_s[at])
+    block = replace(block, shifts=found.shifts, motions=found.motions)
+    linear = linearised(block, views, poses)
+    # All that a camera saw at once was carried alike: each counts as one of so many.
+    _, own, alike = np.unique(
+        instant * len(views) + block.camera_of, return_inverse=True, return_counts=True
+    )
+    by_pose = linear.jacobians * np.sqrt(alike[own, None] * found.variances)[:, None]
+    return replace(
+        block,
+        rays=block.rays - rolling_bias(block, views, linear),
+        covariances=block.covariances + by_pose @ np.swapaxes(by_pose, 1, 2),
+    )
 
 
 def _nearest(views: CameraViews, instants_s: Array) -> Ints:
@@ -112,6 +135,8 @@ def _block(
         frames.astype(np.int64),
         index.astype(np.int64),
         guesses,
+        np.zeros((len(things), 6)),
+        np.zeros((len(things), 12)),
     )
 
 

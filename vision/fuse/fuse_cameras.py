@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from freeswing.vision.fuse.blocks import blocks
 from freeswing.vision.fuse.corner_noise import Noise, NoiseSums, alike, floor_px, whitened
-from freeswing.vision.fuse.linearised_block import block_poses, lags, seen_by
-from freeswing.vision.fuse.motion_from_poses import motion_of_poses
+from freeswing.vision.fuse.linearised_block import block_poses, seen_by
 from freeswing.vision.fuse.pose_kernels import (
     ROBUST_LIMIT,
     Linear,
@@ -25,9 +24,10 @@ from freeswing.vision.fuse.pose_kernels import (
     linearise_block,
     solve_block,
 )
-from freeswing.vision.fuse.poses import Poses, unknown_poses
+from freeswing.vision.fuse.poses import Poses, motions_of, unknown_poses, with_course
 from freeswing.vision.fuse.rejected_sightings import agreeing
 from freeswing.vision.fuse.run_views import Block, CameraViews
+from freeswing.vision.fuse.settling import MOST_TO_SETTLE, SETTLED, Settling
 from freeswing.vision.look.watched_target import Watch
 
 Array = NDArray[np.float64]
@@ -81,57 +81,66 @@ def fuse(
         rough: leaves the covariances out (0, 6, 6), more than half of what poses take.
         plain: takes all noise as each corner's own, which what is wrong with a rig cannot pass for.
     """
-    n, n_c = len(instants_s), len(views)
-    noise = Noise.unknown(n_c)
+    noise = Noise.unknown(len(views))
     poses = unknown_poses(instants_s) if start is None else start
-    account = _Account(noise)
-    for turn in range(passes):
-        positions, rotations = poses.positions_m.copy(), poses.rotations.copy()
-        known = np.zeros(n, dtype=bool)
-        kept = 0 if rough or turn + 1 < passes else n
-        covariances = np.full((kept, 6, 6), np.nan)
-        spreads = [np.zeros((0, 6))]
-        account = _Account(noise)
-        parts = NoiseSums(noise) if not plain and turn + 2 == passes else None
-        for block in blocks(views, watch, instants_s, poses):
-            span = slice(block.first, block.first + len(block.starts) - 1)
-            start_position, start_rotation, can = _starts(
-                block, positions[span], rotations[span], poses.motions[span]
-            )
-            begun = block_poses(start_rotation, start_position, can, poses.motions[span])
-            seen = seen_by(block, views, lags(block, instants_s[span]))
-            white = whitened(block, noise, views)
-            found = solve_block(seen, white, begun, free_of(watch), ROBUST_LIMIT)
-            linear = linearise_block(seen, found.poses(begun.motions))
-            good = account.add(block, views, found, linear)
-            if parts is not None:
-                parts.add(block, views, good, linear, found.covariances)
-            if kept:
-                covariances[span] = found.covariances
-            can = found.known
-            spreads.append(np.diagonal(found.covariances[can], axis1=1, axis2=2))
-            positions[span] = np.where(can[:, None], found.positions, np.nan)
-            rotations[span] = np.where(can[:, None, None], found.rotations, np.nan)
-            known[span] = can
-        poses = Poses(
-            instants_s,
-            positions,
-            rotations,
-            covariances,
-            known,
-            motion_of_poses(instants_s, positions, rotations, known, _usual(spreads)),
-        )
+    settling, spare, left = Settling(), MOST_TO_SETTLE, passes
+    while True:
+        parts = NoiseSums(noise) if not plain and left == 2 else None
+        kept = left == 1 and not rough
+        found, usual, account = _solved(views, watch, poses, noise, parts, kept=kept)
         noise = Noise.plain(account.floors())
         if parts is not None:
             noise = replace(noise, turned_px=alike(parts.turned_px()))
-    return poses, account.fit()
+        if left == 1:
+            found = with_course(found, usual, poses.course)
+            return replace(found, motions=motions_of(found)), account.fit()
+        aim, moved = settling.aim(poses, found, usual)
+        poses = with_course(aim, usual, poses.course)
+        if left == 2 and moved > SETTLED and spare:
+            spare -= 1
+        else:
+            left -= 1
 
 
-def _usual(variances: Sequence[Array]) -> Array | None:
-    """The poses' usual deviations, (6,), None where none is known in all six."""
-    found = np.concatenate(variances)
-    found = found[(found > 0.0).all(axis=1)]
-    return np.sqrt(np.median(found, axis=0)) if len(found) else None
+def _solved(
+    views: Sequence[CameraViews],
+    watch: Watch,
+    poses: Poses,
+    noise: Noise,
+    parts: NoiseSums | None,
+    *,
+    kept: bool,
+) -> tuple[Poses, Array, _Account]:
+    """Poses with the motion and the noise as they are, their usual deviations (6,), and sums.
+
+    Usual deviations are zero where none is known, covariances there only if they are `kept`.
+    """
+    n = len(poses.times_s)
+    positions, rotations = poses.positions_m.copy(), poses.rotations.copy()
+    known = np.zeros(n, dtype=bool)
+    covariances = np.full((n if kept else 0, 6, 6), np.nan)
+    variances = [np.zeros((0, 6))]
+    account = _Account(noise)
+    for block in blocks(views, watch, poses.times_s, poses):
+        span = slice(block.first, block.first + len(block.starts) - 1)
+        begun = block_poses(*_starts(block, positions[span], rotations[span]))
+        seen, white = seen_by(block, views), whitened(block, noise, views)
+        found = solve_block(seen, white, begun, free_of(watch), ROBUST_LIMIT)
+        linear = linearise_block(seen, found.poses())
+        good = account.add(block, views, found, linear)
+        if parts is not None:
+            parts.add(block, views, good, linear, found.covariances)
+        if kept:
+            covariances[span] = found.covariances
+        can = found.known
+        variances.append(np.diagonal(found.covariances[can], axis1=1, axis2=2))
+        positions[span] = np.where(can[:, None], found.positions, np.nan)
+        rotations[span] = np.where(can[:, None, None], found.rotations, np.nan)
+        known[span] = can
+    whole = np.concatenate(variances)
+    usual = np.sqrt(np.median(whole, axis=0)) if len(whole) else np.zeros(6)
+    motions = np.zeros((n, 12))
+    return Poses(poses.times_s, positions, rotations, covariances, known, motions), usual, account
 
 
 def free_of(watch: Watch) -> int:
@@ -139,9 +148,7 @@ def free_of(watch: Watch) -> int:
     return 6 if watch.platform_points >= 3 else 3
 
 
-def _starts(
-    block: Block, positions: Array, rotations: Array, motions: Array
-) -> tuple[Array, Array, Mask]:
+def _starts(block: Block, positions: Array, rotations: Array) -> tuple[Array, Array, Mask]:
     """Where each solve starts: the pose of the pass before, else a single camera's, else a
     neighbour's.
     """  # noqa: D205
@@ -157,7 +164,7 @@ def _starts(
             if block.starts[k + 1] > block.starts[k]:
                 near = have[np.argmin(np.abs(have - k))]
                 position[k], rotation[k], can[k] = position[near], rotation[near], True
-    return position, rotation, can
+    return rotation, position, can
 
 
 class _Account:

@@ -1,9 +1,10 @@
 """Gauss-Newton for platform poses from whitened corner rays: the inner loops of tracking.
 
-An observation is one tag (four corners) or marker (one point) in one image, taken `lags` seconds
-from the instant whose pose is sought. With the pose (R, p) at the instant and its motion,
+An observation is one tag (four corners) or marker (one point) in one image, seen at another time
+than the instant whose pose (R, p) is sought. The platform has shifted by (s, c) since; a point seen
+`lags` later than the others of its tag has moved on:
 
-    x_base = p + v dt + a dt^2 / 2 + exp(w dt + al dt^2 / 2) R x_platform
+    x_base = p + s + v dt + a dt^2 / 2 + exp(w dt + al dt^2 / 2) exp(c) R x_platform
 
 Residuals are weighted by W with W'W the inverse covariance of the rays. Increments are dp and a
 small rotation dr in the base frame, R <- exp(dr) R.
@@ -39,8 +40,10 @@ class Seen(NamedTuple):
         camera_of: (n_o,).
         points: platform coordinates, (n_o, 4, 3).
         rays: measured x/z, y/z, (n_o, 8).
-        lags: time of each point after its instant, (n_o, 4).
+        lags: time of each point after the sighting's own, (n_o, 4).
         counts: points in use, (n_o,).
+        shifts: of the platform since the instant, position and rotation, (n_o, 6).
+        motions: v, w, a, al in the base frame at the sighting's time, (n_o, 12).
     """
 
     starts: Ints
@@ -50,30 +53,29 @@ class Seen(NamedTuple):
     rays: Array
     lags: Array
     counts: Ints
+    shifts: Array
+    motions: Array
 
 
-class MovingPoses(NamedTuple):
+class BelievedPoses(NamedTuple):
     """Poses of instants as they are believed to be.
 
     Attributes:
         rotations: R_base_platform, (n_k, 3, 3).
         positions: (n_k, 3).
         known: where there is one, (n_k,).
-        motions: v, w, a, al in the base frame, (n_k, 12).
     """
 
     rotations: Array
     positions: Array
     known: Mask
-    motions: Array
 
 
-class MovingPose(NamedTuple):
-    """One of them: (3, 3), (3,) and (12,)."""
+class BelievedPose(NamedTuple):
+    """One of them: (3, 3) and (3,)."""
 
     rotation: Array
     position: Array
-    motion: Array
 
 
 class Linear(NamedTuple):
@@ -110,9 +112,9 @@ class Solved(NamedTuple):
     covariances: Array
     scores: Array
 
-    def poses(self, motions: Array) -> MovingPoses:
-        """The poses that were found, with the motions they were found with, (n_k, 12)."""
-        return MovingPoses(self.rotations, self.positions, self.known, motions)
+    def poses(self) -> BelievedPoses:
+        """The poses that were found."""
+        return BelievedPoses(self.rotations, self.positions, self.known)
 
 
 class SolvedPose(NamedTuple):
@@ -173,15 +175,16 @@ def carried_on(
 
 
 @kernel
-def _observe(seen: Seen, o: int, pose: MovingPose, into: Linear, at: int | np.int64) -> bool:
+def _observe(seen: Seen, o: int, pose: BelievedPose, into: Linear, at: int | np.int64) -> bool:
     """Row `at` of `into` from sighting o at a pose; False when a point is behind the camera."""
     residual, jacobian = into.residuals[at], into.jacobians[at]
     rates, places = into.rates[at], into.places[at]
-    rotation, position, motion = pose
+    shift, motion = seen.shifts[o], seen.motions[o]
     points, rays, lags = seen.points[o], seen.rays[o], seen.lags[o]
     camera = seen.cameras[seen.camera_of[o]]
     turn = np.empty((3, 3))
     step = np.empty(3)
+    rotation = small_rotation(shift[3:], turn) @ pose.rotation
     for k in range(seen.counts[o]):
         dt = lags[k]
         for i in range(3):
@@ -196,7 +199,8 @@ def _observe(seen: Seen, o: int, pose: MovingPose, into: Linear, at: int | np.in
             motion[5] + motion[11] * dt,
         )
         for i in range(3):
-            base[i] = position[i] + motion[i] * dt + 0.5 * motion[6 + i] * dt * dt + arm[i]
+            way = motion[i] * dt + 0.5 * motion[6 + i] * dt * dt
+            base[i] = pose.position[i] + shift[i] + way + arm[i]
             velocity[i] = motion[i] + motion[6 + i] * dt
         velocity[0] += spin1 * arm[2] - spin2 * arm[1]
         velocity[1] += spin2 * arm[0] - spin0 * arm[2]
@@ -252,7 +256,7 @@ def _unlinearised(count: int | np.int64) -> Linear:
 
 @kernel(forceinline=True)
 def _equations(
-    seen: Seen, whitening: Array, k: int, pose: MovingPose, bound: float, free: int, spare: _Spare
+    seen: Seen, whitening: Array, k: int, pose: BelievedPose, bound: float, free: int, spare: _Spare
 ) -> tuple[Array, Array, Array]:
     """Normal matrix (free, free), right side (free,) and scores of an instant's sightings.
 
@@ -296,7 +300,7 @@ def solve_instant(
     seen: Seen,
     whitening: Array,
     k: int,
-    start: MovingPose,
+    start: BelievedPose,
     free: int,
     limit: float,
     passes: int | np.int64,
@@ -313,7 +317,7 @@ def solve_instant(
     spare = _Spare(_unlinearised(np.int64(1)), np.empty(8), np.empty((8, 6)))
     for iteration in range(passes):
         bound = limit * 100.0 if iteration == 0 else limit
-        pose = MovingPose(rotation, position, start.motion)
+        pose = BelievedPose(rotation, position)
         normal, right, scores = _equations(seen, whitening, k, pose, bound, free, spare)
         condition = float(np.linalg.eigvalsh(_balanced(normal))[0])
         if not condition > 1e-9:
@@ -339,7 +343,7 @@ def solve_instant(
 
 @kernel
 def solve_block(
-    seen: Seen, whitening: Array, start: MovingPoses, free: int, limit: float
+    seen: Seen, whitening: Array, start: BelievedPoses, free: int, limit: float
 ) -> Solved:
     """`solve_instant` for each instant of a block that has a start and points enough."""
     n = len(seen.starts) - 1
@@ -357,7 +361,7 @@ def solve_block(
             points += seen.counts[o]
         if not start.known[k] or points < (3 if free == 6 else 2):
             continue
-        pose = MovingPose(start.rotations[k], start.positions[k], start.motions[k])
+        pose = BelievedPose(start.rotations[k], start.positions[k])
         one = solve_instant(seen, whitening, k, pose, free, limit, np.int64(MOST_PASSES))
         # Not by slices, which bring the text of an error about shapes into what is compiled.
         for o in range(first, last):
@@ -375,13 +379,13 @@ def solve_block(
 
 
 @kernel
-def linearise_block(seen: Seen, poses: MovingPoses) -> Linear:
+def linearise_block(seen: Seen, poses: BelievedPoses) -> Linear:
     """Every sighting of a block about its pose; zeros where there is none."""
     found = _unlinearised(len(seen.counts))
     for k in range(len(seen.starts) - 1):
         if not poses.known[k]:
             continue
-        pose = MovingPose(poses.rotations[k], poses.positions[k], poses.motions[k])
+        pose = BelievedPose(poses.rotations[k], poses.positions[k])
         for o in range(seen.starts[k], seen.starts[k + 1]):
             if not _observe(seen, o, pose, found, o):
                 found.residuals[o] = 0.0

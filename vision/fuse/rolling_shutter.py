@@ -14,8 +14,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from freeswing.vision.fuse.linearised_block import linearised
-from freeswing.vision.fuse.poses import Poses
+from freeswing.vision.fuse.pose_kernels import Linear
 from freeswing.vision.fuse.run_views import Block, CameraViews
 
 Array = NDArray[np.float64]
@@ -25,9 +24,8 @@ _CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 """TL TR BR BL: to the right, downwards."""
 
 
-def rolling_bias(block: Block, views: Sequence[CameraViews], poses: Poses) -> Array:
-    """What it adds to the rays of a block's sightings, by poses and their motion, (n_o, 8)."""
-    linear = linearised(block, views, poses)
+def rolling_bias(block: Block, views: Sequence[CameraViews], linear: Linear) -> Array:
+    """What it adds to the rays of a block's sightings about their poses, (n_o, 8)."""
     rolling = np.array([view.camera.line_time_s != 0.0 for view in views])
     mine = (block.counts == 4) & rolling[block.camera_of] & np.any(linear.rates != 0.0, axis=1)
     bias = np.zeros_like(block.rays)

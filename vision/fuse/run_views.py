@@ -36,6 +36,8 @@ class Block:
         frames: frame number, (n_o,).
         index: place among all sightings of its camera, (n_o,).
         guesses: T_base_platform by the camera that sees most, NaN where none, (n_k, 4, 4).
+        shifts: of the platform from its instant to the sighting, (n_o, 6).
+        motions: velocity, angular velocity and their rates at the sighting, (n_o, 12).
     """
 
     first: int
@@ -51,6 +53,13 @@ class Block:
     frames: Ints
     index: Ints
     guesses: Array
+    shifts: Array
+    motions: Array
+
+    def sighted_s(self) -> Array:
+        """Base time of each sighting: the mean of its points', (n_o,)."""
+        there = np.arange(4) < self.counts[:, None]
+        return np.where(there, self.times_s, 0.0).sum(axis=1) / self.counts
 
 
 @dataclass(slots=True)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from freeswing.calib.camera.lens_kernels import lens_pixels
 from freeswing.cdpr.compiled.kernels import kernel
-from freeswing.vision.fuse.pose_kernels import MovingPose, Seen, solve_instant
+from freeswing.vision.fuse.pose_kernels import BelievedPose, Seen, solve_instant
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -123,8 +123,10 @@ def refined_pose(
         rays,
         np.zeros((n, 4)),
         np.full(n, 4, dtype=np.int64),
+        np.zeros((n, 6)),
+        np.zeros((n, 12)),
     )
-    pose = MovingPose(rotation, position, np.zeros(12))
+    pose = BelievedPose(rotation, position)
     first, free = np.int64(0), np.int64(6)  # plain ones would be types of their own
     found = solve_instant(seen, whitening, first, pose, free, limit, passes)
     known = found.condition != 0.0 and bool(np.isfinite(found.position).all())

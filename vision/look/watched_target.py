@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +29,8 @@ class Watch:
         marker_positions_m: platform frame, (k, 3).
         marker_diameters_m: (k,), 0 when unknown.
         named: whether sightings of markers say which they are, as matched features do.
+        base_std_m: stated deviations of the base tags' coordinates, NaN where none is; (m,), or
+            none at all (0,).
     """
 
     tags: tuple[TagKey, ...]
@@ -39,6 +41,7 @@ class Watch:
     marker_positions_m: Array
     marker_diameters_m: Array
     named: bool = False
+    base_std_m: Array = field(default_factory=lambda: np.zeros(0))
 
     @staticmethod
     def of(target: Target, base_tags: Iterable[SurveyedTag] = ()) -> Watch:
@@ -64,6 +67,7 @@ class Watch:
             target.marker_names,
             target.marker_positions_m,
             np.array([marker.diameter_m or 0.0 for marker in target.markers]),
+            base_std_m=np.array([np.nan if t.std_m is None else t.std_m for t in standing]),
         )
 
     @property

@@ -100,12 +100,7 @@ def correct_rig(
         )
     clocks, lines, last, jitter = _estimate(current, watch, instants, moved, survey_std_m, poses)
     clocks = clocks + lags
-    remarks += tuple(
-        f"{view.camera.name}: its stamps jitter by {1e3 * own:.2f} ms (standard deviation), which "
-        "the deviations of poses, clocks and line times count"
-        for view, own in zip(views, jitter, strict=True)
-        if own
-    )
+    remarks += _motion_sentences(views, poses, jitter)
     if not (moved or clocks.any() or lines.any()):
         views, poses, after, doubt, said = _settled(views, watch, poses, before, survey_std_m)
         poses = widened_poses(poses, jitter)
@@ -120,6 +115,27 @@ def correct_rig(
     findings = _findings(calibrated, settled, moved, clocks, lines, last)
     poses = widened_poses(poses, jitter)
     return Corrected(settled, poses, before, after, findings, (*remarks, *said), doubt)
+
+
+def _motion_sentences(
+    views: Sequence[CameraViews], poses: Poses, jitter_s: Array
+) -> tuple[str, ...]:
+    """Why what is seen at different times does not fit together, in words."""
+    spectrum = None if poses.course is None or len(views) < 2 else poses.course.spectrum
+    hz = None if spectrum is None else spectrum.too_fast_hz
+    if spectrum is not None and hz is not None:
+        rate = 1.0 / spectrum.step_s
+        return (
+            f"the platform swings at {hz:.1f} Hz, or at {rate - hz:.1f} Hz: {rate:.1f} frames a "
+            "second do not tell which. What cameras see between each other's frames counts less; "
+            "record faster, or let cameras take their frames at the same time",
+        )
+    return tuple(
+        f"{view.camera.name}: its stamps jitter by {1e3 * own:.2f} ms (standard deviation), which "
+        "the deviations of poses, clocks and line times count"
+        for view, own in zip(views, jitter_s, strict=True)
+        if own
+    )
 
 
 def _settled(

@@ -116,7 +116,7 @@ def _by_base_tags(views: Sequence[CameraViews], watch: Watch) -> list[Evidence]:
     """Cameras that see base tags, where these put them."""
     found = []
     for index, view in enumerate(views):
-        rays, _, corners = base_tag_rays(view, watch)
+        rays, _, corners, _ = base_tag_rays(view, watch)
         if len(corners) < 2:
             continue
         pose = start_pose(corners, rays)

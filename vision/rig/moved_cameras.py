@@ -20,8 +20,12 @@ Array = NDArray[np.float64]
 MOVED_PX = 0.4
 
 
-def base_tag_rays(views: CameraViews, watch: Watch) -> tuple[Array, Array, Array]:
-    """Mean base-tag corners over a run: rays (n, 8), frames (n,) and base corners (n, 4, 3).
+def base_tag_rays(views: CameraViews, watch: Watch) -> tuple[Array, Array, Array, Array]:
+    """Mean base-tag corners over a run.
+
+    Returns:
+        Rays (n, 8), frames (n,), base corners (n, 4, 3), and stated deviations of these, NaN where
+        none is, (n,).
 
     Source:
         Press et al. 2007, Numerical Recipes, sec. 14.1: means.
@@ -34,31 +38,33 @@ def base_tag_rays(views: CameraViews, watch: Watch) -> tuple[Array, Array, Array
             sums[int(thing)] = sums.get(int(thing), np.zeros(8)) + rays
             counts[int(thing)] = counts.get(int(thing), 0) + 1
     things = sorted(sums)
-    corners = watch.base_corners_m[[t - watch.first_base for t in things]].reshape(-1, 4, 3)
+    which = np.array([t - watch.first_base for t in things], dtype=np.int64)
+    corners = watch.base_corners_m[which].reshape(-1, 4, 3)
+    stated = watch.base_std_m if len(watch.base_std_m) else np.full(len(watch.base_tags), np.nan)
     measured = np.array([sums[t] / counts[t] for t in things]).reshape(-1, 8)
-    return measured, np.array([counts[t] for t in things]), corners
+    return measured, np.array([counts[t] for t in things]), corners, stated[which]
 
 
-def base_tag_misses(views: CameraViews, watch: Watch) -> tuple[Array, Array, Array]:
+def base_tag_misses(views: CameraViews, watch: Watch) -> tuple[Array, Array, Array, Array]:
     """Mean base-tag corners against their calibrated places.
 
     Returns:
-        Residual rays (n, 8), their number of frames (n,) and base corners (n, 4, 3).
+        Residual rays (n, 8), the others as `base_tag_rays`.
 
     Source:
         Hartley, Zisserman 2004, Multiple View Geometry in Computer Vision, sec. 6.1.
     """
-    measured, counts, corners = base_tag_rays(views, watch)
+    measured, counts, corners, stated_m = base_tag_rays(views, watch)
     seen = views.camera.to_camera(corners)
     predicted = (seen[..., :2] / seen[..., 2:]).reshape(-1, 8)
-    return measured - predicted, counts, corners
+    return measured - predicted, counts, corners, stated_m
 
 
 def moved_cameras(views: Sequence[CameraViews], watch: Watch) -> dict[int, float]:
     """Cameras whose base tags lie more than `MOVED_PX` off, with the median miss in pixels."""
     moved = {}
     for index, view in enumerate(views):
-        misses, counts, _ = base_tag_misses(view, watch)
+        misses, counts, *_ = base_tag_misses(view, watch)
         if not len(counts):
             continue
         sizes = np.linalg.norm(misses.reshape(-1, 2), axis=1) * view.camera.focal_px.mean()
@@ -88,15 +94,18 @@ def repose_by_base_tags(view: CameraViews, watch: Watch, survey_std_m: float) ->
 def base_equations(view: CameraViews, watch: Watch, survey_std_m: float) -> tuple[Array, Array]:
     """Normal matrix (6, 6) and right side (6,) of a camera's pose change by its base tags.
 
+    A tag counts as its stated deviation has it, `survey_std_m` serves where none is stated.
+
     Source:
         Hartley, Zisserman 2004, Multiple View Geometry in Computer Vision, appendix 6:
         normal equations of a camera's pose.
     """
-    misses, _, corners = base_tag_misses(view, watch)
+    misses, _, corners, stated_m = base_tag_misses(view, watch)
+    own_m = np.where(np.isnan(stated_m), survey_std_m, stated_m)
     focal = view.camera.focal_px.mean()
     normal, right = np.zeros((6, 6)), np.zeros(6)
     offset = view.camera.T_camera_base[:3, 3]
-    for miss, corner in zip(misses, corners, strict=True):
+    for miss, corner, tag_m in zip(misses, corners, own_m, strict=True):
         seen = view.camera.to_camera(corner)
         sizes = np.linalg.norm(miss.reshape(4, 2), axis=1) * focal
         if np.median(sizes) > 200.0:
@@ -106,7 +115,7 @@ def base_equations(view: CameraViews, watch: Watch, survey_std_m: float) -> tupl
             g = np.array([[1.0, 0.0, -x], [0.0, 1.0, -y]]) / place[2]
             arm = place - offset
             jacobian = np.hstack([g, np.cross(arm, g)])
-            std = np.hypot(survey_std_m / place[2], 0.02 / focal)
+            std = np.hypot(tag_m / place[2], 0.02 / focal)
             normal += jacobian.T @ jacobian / std**2
             right += jacobian.T @ miss[2 * k : 2 * k + 2] / std**2
     return normal, right

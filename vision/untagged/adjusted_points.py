@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from freeswing.calib.camera.camera import Camera
 from freeswing.cdpr.rotation import exp_rotation
 from freeswing.vision.fuse.blocks import blocks
-from freeswing.vision.fuse.linearised_block import lags
 from freeswing.vision.fuse.poses import Poses
 from freeswing.vision.fuse.run_views import CameraViews
 from freeswing.vision.look.watched_target import Watch
@@ -122,13 +121,10 @@ def _seen(
         span = slice(block.first, block.first + len(block.starts) - 1)
         own = np.repeat(np.arange(span.start, span.stop), np.diff(block.starts))
         use = few[own]
-        dt = lags(block, poses.times_s[span])[use, 0]
-        own, motion = own[use], poses.motions[own[use]]
-        place = poses.positions_m[own] + motion[:, :3] * dt[:, None]
-        place += 0.5 * motion[:, 6:9] * dt[:, None] ** 2
-        step = motion[:, 3:6] * dt[:, None] + 0.5 * motion[:, 9:] * dt[:, None] ** 2
+        own, shifts = own[use], block.shifts[use]
         T = np.tile(np.eye(4), (len(own), 1, 1))
-        T[:, :3, :3], T[:, :3, 3] = exp_rotation(step) @ poses.rotations[own], place
+        T[:, :3, :3] = exp_rotation(shifts[:, 3:]) @ poses.rotations[own]
+        T[:, :3, 3] = poses.positions_m[own] + shifts[:, :3]
         camera_of = block.camera_of[use]
         yield (
             camera_of,

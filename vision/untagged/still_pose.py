@@ -12,7 +12,7 @@ from freeswing.cdpr.rotation import transform
 from freeswing.vision.fuse.pose_kernels import (
     MOST_PASSES,
     ROBUST_LIMIT,
-    MovingPose,
+    BelievedPose,
     Seen,
     solve_instant,
 )
@@ -60,8 +60,10 @@ def still_pose(
         rays,
         np.zeros((count, 4)),
         np.ones(count, dtype=np.int64),
+        np.zeros((count, 6)),
+        np.zeros((count, 12)),
     )
-    begun = MovingPose(start[:3, :3].copy(), start[:3, 3].copy(), np.zeros(12))
+    begun = BelievedPose(start[:3, :3].copy(), start[:3, 3].copy())
     solved = solve_instant(
         seen, whitening(covariance), 0, begun, 6, ROBUST_LIMIT, np.int64(MOST_PASSES)
     )

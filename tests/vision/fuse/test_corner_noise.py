@@ -1,4 +1,4 @@
-"""What corners err by, told from residuals: made noise of known parts, and poses of made noise."""
+"""What corners err by, told from residuals: made noise of known parts."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from freeswing.cdpr.rotation import exp_rotation
 from freeswing.vision.fuse.corner_noise import (
     Noise,
     NoiseSums,
@@ -18,7 +17,6 @@ from freeswing.vision.fuse.corner_noise import (
     turns_of,
     whitened,
 )
-from freeswing.vision.fuse.motion_from_poses import is_noise, motion_of_poses
 
 FOCAL, INSTANTS, TAGS = 500.0, 150, 5
 
@@ -115,47 +113,3 @@ def test_sizes_are_never_negative() -> None:
     shares = np.array([[2.0, 1.0, 0.0], [1.0, 2.0, 0.0], [0.0, 0.0, 0.0]])
     np.testing.assert_allclose(least_sizes(shares, np.array([5.0, 4.0, 0.0])), [2.0, 1.0, 0.0])
     np.testing.assert_allclose(least_sizes(shares, np.array([4.0, -1.0, 0.0])), [2.0, 0.0, 0.0])
-
-
-def swing(times_s: np.ndarray, rate_hz: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Positions, rotations and velocity along x of a swing."""
-    phase = 2.0 * np.pi * rate_hz * times_s
-    positions = np.stack([0.1 * np.sin(phase), 0.05 * np.cos(phase), 0.0 * phase], axis=1)
-    turns = exp_rotation(np.stack([0.0 * phase, 0.0 * phase, 0.2 * np.sin(phase)], axis=1))
-    return positions, turns, 0.1 * 2.0 * np.pi * rate_hz * np.cos(phase)
-
-
-def velocity_errors(rate_hz: float, noise_m: float, claimed_m: float | None) -> np.ndarray:
-    rng, times = np.random.default_rng(6), np.arange(120) / 30.0
-    positions, rotations, true = swing(times, rate_hz)
-    positions = positions + noise_m * rng.normal(size=positions.shape)
-    rotations = exp_rotation(noise_m * rng.normal(size=(120, 3))) @ rotations
-    told = None if claimed_m is None else np.full(6, claimed_m)
-    motions = motion_of_poses(times, positions, rotations, np.ones(120, bool), told)
-    return (motions[:, 0] - true)[8:-8]
-
-
-def test_slow_swings_have_motions_of_many_poses() -> None:
-    """Five poses leave a velocity 0.95 noises a step, thirteen a fifth of that."""
-    short = velocity_errors(0.7, 1e-4, None).std()
-    assert short == pytest.approx(0.95 * 1e-4 * 30.0, rel=0.2)
-    assert velocity_errors(0.7, 1e-4, 1e-4).std() < 0.3 * short
-    assert velocity_errors(0.7, 1e-4, 0.6e-4).std() < 0.3 * short, "claims may be too small"
-
-
-@pytest.mark.parametrize(
-    ("left", "seven", "noise"),
-    [(5.4, np.inf, True), (6.6, np.inf, False), (1.2, 1.0, True), (1.4, 1.0, False)],
-)
-def test_what_more_than_noise_leaves_ends_a_stretch(left, seven, noise) -> None:
-    """Of claimed variances and of what seven poses leave; rotations alone decide too."""
-    one = np.array([0.5, left])
-    assert is_noise(one, np.ones(2), np.full(2, seven)) == noise
-
-
-def test_fast_modes_are_not_smoothed_away() -> None:
-    """At six poses a turn longer stretches bend away, and the shortest stays."""
-    exact = np.abs(velocity_errors(5.0, 1e-6, None)).max()
-    assert np.abs(velocity_errors(5.0, 1e-6, 1e-6)).max() == pytest.approx(exact, rel=1e-9)
-    noisy = velocity_errors(2.5, 1e-4, 1e-4)
-    assert np.sqrt(np.mean(noisy**2)) <= 1.05 * velocity_errors(2.5, 1e-4, None).std()

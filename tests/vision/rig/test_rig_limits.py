@@ -15,6 +15,7 @@ from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.rotation import exp_rotation, invert
 from freeswing.vision.fuse.corner_noise import Noise
 from freeswing.vision.fuse.fuse_cameras import Fit
+from freeswing.vision.look.watched_target import Watch
 from freeswing.vision.rig.gross_faults import (
     Evidence,
     _size_of_tags,
@@ -25,11 +26,11 @@ from freeswing.vision.rig.gross_faults import (
 from freeswing.vision.rig.kept_clocks import with_kept_clocks
 from freeswing.vision.rig.lag_accepted import Missed, _chosen, _needed, deviations_apart
 from freeswing.vision.rig.lag_search import OwnTrack, _candidates, _correlations, _fitted
-from freeswing.vision.rig.moved_cameras import was_moved
+from freeswing.vision.rig.moved_cameras import repose_by_base_tags, was_moved
 from freeswing.vision.rig.real_effects import LEAST_CLOCK_S, LEAST_LINE_S, is_real
 from freeswing.vision.rig.rig_step import Finding
 from freeswing.vision.rig.untied_cameras import is_sure, was_knocked
-from tests.vision.scenes import camera
+from tests.vision.scenes import camera, standing_tags
 
 
 def stub(**attributes: Any) -> Any:
@@ -70,6 +71,31 @@ def test_a_change_of_pose_that_stands_out(deviations, sure) -> None:
 
 
 VIEW = camera()
+
+
+def place_by_tags(stated_m: list[float]) -> np.ndarray:
+    """How far base tags move a camera of which one tag was surveyed 5 mm off, with deviations."""
+    tags = np.array([tag.corners_platform_m for tag in standing_tags()])
+    seen = VIEW.to_camera(tags)
+    rays = (seen[..., :2] / seen[..., 2:]).reshape(-1, 8)
+    surveyed = tags.copy()
+    surveyed[2] += [0.005, 0.0, 0.0]
+    watch = Watch((), np.zeros((0, 4, 3)), (("tag36h11", 0),) * 4, surveyed, (),
+                  np.zeros((0, 3)), np.zeros(0), base_std_m=np.array(stated_m))  # fmt: skip
+    piece = stub(things=np.arange(4), rays=rays)
+
+    def view(own: Camera) -> Any:
+        return stub(camera=own, pieces=lambda: [(0, piece)], believed=view)
+
+    return repose_by_base_tags(view(VIEW), watch, 3e-4).position_base_m - VIEW.position_base_m
+
+
+def test_a_base_tag_counts_as_its_stated_deviation_has_it() -> None:
+    alike = np.linalg.norm(place_by_tags([]))
+    assert np.linalg.norm(place_by_tags([np.nan] * 4)) == pytest.approx(alike)
+    told = np.linalg.norm(place_by_tags([np.nan, np.nan, 0.02, np.nan]))
+    assert told < 0.05 * alike, f"{1e3 * told:.3f} mm, unstated {1e3 * alike:.3f} mm"
+    assert np.linalg.norm(place_by_tags([3e-4] * 4)) == pytest.approx(alike), "as where unstated"
 
 
 def turned(angle_rad: float, shift_m: float) -> Camera:

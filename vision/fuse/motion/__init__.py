@@ -1,0 +1,1 @@
+"""How the platform moves between the instants whose poses are looked for."""
