@@ -11,7 +11,7 @@ from freeswing.cdpr.robot import Robot
 from freeswing.doctor.bench_units import refuse_wrong_units
 from freeswing.doctor.exchanged_by_lean import refuse_exchanged_by_lean
 from freeswing.doctor.finding import Finding
-from freeswing.doctor.mistaken_quaternions import refuse_mistaken_quaternions
+from freeswing.doctor.orientations_against_lengths import refuse_mistaken_quaternions
 from freeswing.doctor.run_samples import run_findings
 from freeswing.ident.bench.identify_bench import check_runs
 from freeswing.ident.bench.runs import Bench

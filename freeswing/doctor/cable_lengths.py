@@ -13,7 +13,7 @@ from freeswing.cdpr.model.equations import build_model
 from freeswing.cdpr.robot import Robot
 from freeswing.cdpr.rotation import transform
 from freeswing.doctor.finding import Finding
-from freeswing.doctor.mistaken_quaternions import mistaken_quaternions
+from freeswing.doctor.orientations_against_lengths import mistaken_quaternions
 from freeswing.ident.runs import SwingRun
 from freeswing.session.exchanged_lengths import (
     LENGTH_DIFFERENCE_M,

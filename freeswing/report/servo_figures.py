@@ -52,7 +52,7 @@ def controller_gains(found: Controller) -> str:
 def templates(found: Controller, plant: Plant, weights: Weights) -> str:
     """Fig. 13: the four transfers of the loop under their templates gamma / (W_o W_i)."""
     loop = close(bare(plant.system).plant, found.system).at(RATES_RAD_S)
-    gamma = found.facts.get("norm", 1.0)
+    gamma = found.norm
     rows = (("e", slice(0, 6), "w1"), ("u", slice(6, 12), "w2"))
     columns = (("r", slice(0, 6), None), ("d", slice(6, 12), "w3"))
 

@@ -10,7 +10,7 @@ from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.robot import Array
 from freeswing.cdpr.system.progress import Progress
 from freeswing.ident.estimate import Estimate
-from freeswing.ident.fidim.fidim import WELL_IDENTIFIED_PERCENT, near_zero
+from freeswing.ident.fidim.essential_parameters import WELL_IDENTIFIED_PERCENT, near_zero
 from freeswing.ident.judge.free_swing_law import unexplained_motion
 from freeswing.ident.judge.physical_consistency import consistency, is_possible, nearest_possible
 from freeswing.ident.likelihood.between_runs import widened

@@ -48,6 +48,21 @@ class Controller:
     carried: bool = False
     predictor: Predictor | None = None
 
+    @property
+    def gamma(self) -> float | None:
+        """The bound that its synthesis reached at best; None where it has none."""
+        return self.facts.get("gamma")
+
+    @property
+    def norm(self) -> float:
+        """Of the weighted loop; 1 where no weights were met."""
+        return self.facts.get("norm", 1.0)
+
+    @property
+    def weights_faster(self) -> float:
+        """By how much the rates of its weights were multiplied."""
+        return self.facts.get("share", 1.0)
+
 
 def finished(
     method: str,

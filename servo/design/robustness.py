@@ -72,7 +72,7 @@ class Examiner:
 
     def __init__(self, found: Controller, order: Order) -> None:
         self._found = found
-        self._weights = order.goals.weights.faster(found.facts.get("share", 1.0))
+        self._weights = order.goals.weights.faster(found.weights_faster)
         self._response = found.system.at(RATES_RAD_S)
         self._late = np.exp(-1j * RATES_RAD_S * found.delay_s)[:, None, None]
 

@@ -28,7 +28,7 @@ def to_document(found: Controller) -> dict[str, Any]:
     document: dict[str, Any] = {
         "format": FORMAT,
         "method": found.method,
-        "gamma": found.facts.get("gamma"),
+        "gamma": found.gamma,
         "order": k.order,
         "sample_rate_hz": round(1.0 / (k.period_s or np.nan)),
         "A": k.A.tolist(),

@@ -106,7 +106,8 @@ HELD = (
     Held("cdpr/markers/slow_residuals.py", ("CHANCE",), SPOTS),
     Held("cdpr/markers/layouts_aligned.py", ("CLEAR", "DIFFERENT_M"), SPOTS),
     Held("cdpr/markers/undecided_marker.py", ("MOST_OPEN_M",), SPOTS),
-    Held("ident/fidim/fidim.py", ("WELL_IDENTIFIED_PERCENT", "NEAR_ZERO", "GOOD_COST"), FIDIM),
+    Held("ident/fidim/essential_parameters.py", ("WELL_IDENTIFIED_PERCENT", "NEAR_ZERO"), FIDIM),
+    Held("ident/fidim/fidim.py", ("GOOD_COST",), FIDIM),
     Held("ident/fidim/total_least_squares.py", ("LEAST_GAP", "SMALLEST_RATIO"), FIDIM),
     Held("ident/judge/physical_consistency.py", ("_SIGNIFICANT", "LEAST_EXTENT_M"), FIDIM),
     Held("ident/fidim/slack_runs.py", ("REACH",), FIDIM),
@@ -758,12 +759,12 @@ HELD = (
     Held(
         "cdpr/measured/quaternion_readings.py",
         ("LEFT_OVER",),
-        "tests/freeswing/doctor/test_mistaken_quaternions.py::test_what_is_left_by_the_right_reading",
+        "tests/freeswing/doctor/test_orientations_against_lengths.py::test_what_is_left_by_the_right_reading",
     ),
     Held(
-        "freeswing/doctor/mistaken_quaternions.py",
+        "freeswing/doctor/orientations_against_lengths.py",
         ("LENGTHS_OFF_M",),
-        "tests/freeswing/doctor/test_mistaken_quaternions.py::test_what_is_left_by_the_right_reading",
+        "tests/freeswing/doctor/test_orientations_against_lengths.py::test_what_is_left_by_the_right_reading",
     ),
     Held(
         "vision/rig/lag_accepted.py",

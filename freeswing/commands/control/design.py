@@ -137,7 +137,7 @@ def _say(console: Console, found: Controller, order: Order) -> None:
             f"order {found.sampled.order}"
         )
         if "share" in found.facts:
-            console.say(f"the rates of its weights times {found.facts['share']:.3g}")
+            console.say(f"the rates of its weights times {found.weights_faster:.3g}")
     else:
         speeds = ", ".join(f"{value:.2f}" for value in found.facts.values())
         console.say(f"{found.method}: speeds {speeds} rad/s; order {found.sampled.order}")
@@ -185,7 +185,7 @@ def _figures(folder: Path, model: DrivenModel, order: Order, found: Controller) 
     from freeswing.cdpr.files.documents import replace_file
     from freeswing.report.servo_figures import controller_gains, templates
 
-    goals = order.goals.weights.faster(found.facts.get("share", 1.0))
+    goals = order.goals.weights.faster(found.weights_faster)
     for name, svg in (
         ("controller-gains.svg", controller_gains(found)),
         ("controller-templates.svg", templates(found, order.plant(model), goals)),

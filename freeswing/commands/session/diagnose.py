@@ -52,7 +52,7 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
     from freeswing.cdpr.effects import catalogue
     from freeswing.cdpr.files.documents import InputError
     from freeswing.cdpr.system.threads import threads
-    from freeswing.doctor.mistaken_quaternions import refuse_mistaken_quaternions
+    from freeswing.doctor.orientations_against_lengths import refuse_mistaken_quaternions
     from freeswing.ident.diagnose.diagnose import diagnose
     from freeswing.results.diagnosis import Diagnosis
     from freeswing.results.motion_from_results import ladder_motions

@@ -70,7 +70,7 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
 
     from freeswing.cdpr.files.documents import InputError
     from freeswing.cdpr.system.threads import threads
-    from freeswing.doctor.mistaken_quaternions import refuse_mistaken_quaternions
+    from freeswing.doctor.orientations_against_lengths import refuse_mistaken_quaternions
     from freeswing.ident.identify import IdentifySettings, identify
     from freeswing.ident.likelihood.cable_ends import GeometryPriors
     from freeswing.ident.swing_places import swing_places

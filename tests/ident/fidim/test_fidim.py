@@ -7,7 +7,8 @@ import pytest
 
 from freeswing.cdpr.model.regressor import regressor
 from freeswing.cdpr.robot import INERTIA_NAMES
-from freeswing.ident.fidim.fidim import essential_parameters, fidim, near_zero
+from freeswing.ident.fidim.essential_parameters import essential_parameters, near_zero
+from freeswing.ident.fidim.fidim import fidim
 from freeswing.ident.fidim.payload_mass import LoadedCentre, mass_from_payloads
 from freeswing.ident.fidim.total_least_squares import total_least_squares
 from freeswing.ident.judge.free_against_full import compare

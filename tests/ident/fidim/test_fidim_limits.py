@@ -9,7 +9,7 @@ import pytest
 
 from freeswing.ident.fidim import fidim as module
 from freeswing.ident.fidim import slack_runs, weighted_least_squares
-from freeswing.ident.fidim.fidim import near_zero
+from freeswing.ident.fidim.essential_parameters import near_zero
 from freeswing.ident.fidim.total_least_squares import TotalLeastSquares
 from freeswing.ident.judge.free_against_full import between_runs
 from freeswing.ident.judge.physical_consistency import Consistency, least_moment, nearest_possible

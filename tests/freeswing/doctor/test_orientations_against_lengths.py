@@ -13,7 +13,7 @@ from freeswing.cdpr.files.robot_file import read_robot
 from freeswing.cdpr.files.trajectory_files import read_trajectory
 from freeswing.cdpr.measured.quaternion_readings import READINGS
 from freeswing.cdpr.measured.trajectory import Trajectory
-from freeswing.doctor.mistaken_quaternions import mistaken_quaternions
+from freeswing.doctor.orientations_against_lengths import mistaken_quaternions
 from freeswing.ident.runs import SwingRun
 from freeswing.main import main
 from tests.places import SAMPLES
@@ -85,8 +85,10 @@ def test_what_is_right_and_what_is_merely_wrong_is_not_named() -> None:
 def test_what_is_left_by_the_right_reading(monkeypatch, off_m, left_m, named) -> None:
     """Lengths off by 2 cm, of which the right reading leaves a fifth at most."""
     off = iter([off_m, left_m, off_m, off_m])
-    monkeypatch.setattr("freeswing.doctor.mistaken_quaternions._lengths_off", lambda *_: next(off))
-    monkeypatch.setattr("freeswing.doctor.mistaken_quaternions.build_model", lambda _: None)
+    monkeypatch.setattr(
+        "freeswing.doctor.orientations_against_lengths._lengths_off", lambda *_: next(off)
+    )
+    monkeypatch.setattr("freeswing.doctor.orientations_against_lengths.build_model", lambda _: None)
     still = Trajectory.from_poses(np.arange(9.0), np.zeros((9, 3)), np.tile(np.eye(3), (9, 1, 1)))
     assert bool(mistaken_quaternions(SwingRun("a", "identify", still), ROBOT)[0]) == named
 
