@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from freeswing.cdpr.effects import effect_named
+from freeswing.cdpr.measured.leaving_out import leaving_out_std
 from freeswing.cdpr.robot import INERTIA_NAMES, Array
 from freeswing.ident.diagnose.answer.deviations import directions
 from freeswing.ident.diagnose.answer.next_swing import NextSwing
@@ -61,11 +62,14 @@ def accepted_entries(
         together = covariance[np.ix_(columns, columns)]
         where = np.r_[final.model.place_of(name)]
         parameters = [final.model.parameters[k] for k in where]
+        own = np.array([one.per_run for one in parameters])
+        stds = np.sqrt(np.diag(together))
+        stds[own] = std_of_rms(np.array([run.values[where[own]] for run in final.motions]))
         told = block.mask | np.isin(where, settled)
         rows = [
-            {"name": parameter.name, "value": float(value), "std": float(np.sqrt(variance))}
-            for parameter, value, variance, estimated in zip(
-                parameters, block.value, np.diag(together), told, strict=True
+            {"name": parameter.name, "value": float(value), "std": float(std)}
+            for parameter, value, std, estimated in zip(
+                parameters, block.value, stds, told, strict=True
             )
             if parameter.per_run or estimated
         ]
@@ -74,6 +78,20 @@ def accepted_entries(
         entry = {"effect": name, "parameters": rows, "confounded_with": group}
         entries.append(entry | ({"directions": seen} if seen else {}))
     return entries
+
+
+def std_of_rms(values: Array) -> Array:
+    """Deviations of the root mean squares over runs of values that each has for itself, (o,).
+
+    Args:
+        values: of the runs, two of them or more, (r, o).
+
+    Source:
+        Efron, Tibshirani 1993, An Introduction to the Bootstrap, ch. 11: the jackknife.
+    """
+    squares = values**2
+    others = np.maximum(squares.sum(axis=0) - squares, 0.0) / (len(values) - 1)
+    return leaving_out_std(np.sqrt(others))
 
 
 def parameter_entries(found: LikelihoodFit, covariance: Array) -> list[dict[str, Any]]:
