@@ -29,6 +29,7 @@ _UNITS = {
     "1_m": (1.0, "1/m"),
     "1_s": (1.0, "1/s"),
     "m2": (1e3, "10⁻³ m²"),
+    "s2": (1e6, "10⁻⁶ s²"),
     "N_kg": (1.0, "N/kg"),
     "m": (1e3, "mm"),
     "kg": (1.0, "kg"),
@@ -38,6 +39,7 @@ _UNITS = {
     "N": (1.0, "N"),
     "fraction": (100.0, "%"),
 }
+_EACH_CABLE = (("bias", "m"), ("mass_over_stiffness", "s2"))
 HALF_WIDTH_95 = 1.959964
 
 
@@ -70,8 +72,9 @@ def unit_of(name: str, effect: str = "") -> tuple[str, float, str]:
         name: of the parameter.
         effect: that it is of, if of one: of springs N_m means N/m, of friction N m.
     """
-    if name.startswith("bias_") and name.endswith("_m"):  # bias_1_m is cable 1's, in metres
-        return name.removesuffix("_m"), *_UNITS["m"]
+    for stem, suffix in _EACH_CABLE:  # bias_1_m is cable 1's, in metres
+        if name.startswith(f"{stem}_") and name.endswith(f"_{suffix}"):
+            return name.removesuffix(f"_{suffix}"), *_UNITS[suffix]
     if name.endswith("_N_m") and "spring" in f"{effect} {name}":
         return name.removesuffix("_N_m"), 1.0, "N/m"
     for suffix, (scale, unit) in _UNITS.items():

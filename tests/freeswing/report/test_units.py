@@ -50,3 +50,9 @@ def test_axes_are_shown_of_moments_that_are_told(share: float, told: bool) -> No
 def test_a_wires_length_is_told_in_metres() -> None:
     """Cable 1's bias is no number per metre."""
     assert unit_of("bias_1_m") == ("bias_1", 1e3, "mm")
+
+
+def test_a_hooks_compliance_is_told_in_square_seconds() -> None:
+    """Cable 1's is no number per square second."""
+    told = unit_of("mass_over_stiffness_1_s2")
+    assert told == ("mass_over_stiffness_1", 1e6, "10⁻⁶ s²")
