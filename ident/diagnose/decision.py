@@ -10,11 +10,12 @@ import numpy as np
 from freeswing.cdpr.effects import effect_named
 from freeswing.cdpr.robot import Array
 from freeswing.ident.diagnose.leave_one_out import Score
+from freeswing.ident.diagnose.lengths.stated_lengths import lengths_off
 from freeswing.ident.diagnose.lengths.wrong_places import WrongPlace
 from freeswing.ident.diagnose.model_probabilities import LeftOut, Rival, model_probabilities
 from freeswing.ident.diagnose.refit import Refit, plausible
 from freeswing.ident.diagnose.screen import known_rows
-from freeswing.ident.diagnose.spectrum import independent_numbers, lengths_off
+from freeswing.ident.diagnose.spectrum import independent_numbers
 from freeswing.ident.diagnose.variants import effect_of, inside, variants
 from freeswing.ident.likelihood.joint_problem import INERTIA_UNIT
 

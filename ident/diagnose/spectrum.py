@@ -7,11 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy import complex128
 from numpy.typing import NDArray
-from scipy.special import gammaincc
 
 from freeswing.cdpr.robot import Array
 from freeswing.ident.likelihood.fit_swings import LikelihoodFit
-from freeswing.ident.likelihood.run_residuals import lengths_residual, residuals
+from freeswing.ident.likelihood.run_residuals import residuals
 from freeswing.ident.signals import band
 
 # Runs of 20 s hold three periods of it: what is slower is a drift and has no frequency.
@@ -24,9 +23,6 @@ HANN_WIDTH = 2.0
 # No calibration or survey can be trusted below this: nothing is sought in such a residual.
 SMALLEST_RESIDUAL_M = 2e-5
 SMALLEST_RESIDUAL_RAD = 1e-4
-# Stated lengths that are farther off than one session in a thousand by chance want explaining,
-# although they are a few numbers among the thousands of the samples.
-LENGTHS_BY_CHANCE = 0.001
 
 
 def residual_powers(fit: LikelihoodFit, noise_scales: Array) -> Array:
@@ -141,15 +137,3 @@ def too_small(fit: LikelihoodFit) -> bool:
     """Whether the residuals are below what any calibration can be trusted to."""
     limits = np.array([SMALLEST_RESIDUAL_M, SMALLEST_RESIDUAL_RAD])
     return bool((np.nan_to_num(fit.noise) < limits).all())
-
-
-def lengths_off(fit: LikelihoodFit) -> bool:
-    """Whether the fit misses the stated cable lengths by more than their deviations and chance.
-
-    Source:
-        Pearson 1900, On the criterion that a given system of deviations is such that it can be
-        reasonably supposed to have arisen from random sampling.
-    """
-    pairs = zip(fit.motions, fit.samples, strict=True)
-    off = np.concatenate([np.zeros(0), *(lengths_residual(m, run) for m, run in pairs)])
-    return bool(len(off) and gammaincc(0.5 * len(off), 0.5 * off @ off) < LENGTHS_BY_CHANCE)

@@ -316,10 +316,10 @@ HELD = (
         "ident/diagnose/spectrum.py",
         (
             "LOWEST_HZ", "LINES", "HANN_WIDTH", "SMALLEST_RESIDUAL_M", "SMALLEST_RESIDUAL_RAD",
-            "LENGTHS_BY_CHANCE",
         ),
         RESIDUALS,
     ),
+    Held("ident/diagnose/lengths/stated_lengths.py", ("LENGTHS_BY_CHANCE",), PLACES),
     Held(
         "ident/diagnose/model_probabilities.py",
         ("CHANCE_OF_EFFECT",),

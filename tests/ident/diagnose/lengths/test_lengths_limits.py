@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from freeswing.cdpr.robot import POSE_COORDINATES
-from freeswing.ident.diagnose.lengths import equilibria, length_rows
+from freeswing.ident.diagnose.lengths import equilibria, length_rows, stated_lengths
 from freeswing.ident.diagnose.lengths.joint_lengths import Blocks, Normal
 from freeswing.ident.diagnose.lengths.place_probabilities import groups, mixed, set_probabilities
 from freeswing.ident.likelihood.samples_and_noise import prepare
@@ -76,3 +76,15 @@ def test_slow_errors_of_poses_and_pulleys() -> None:
 def test_what_stands_beside_the_geometry_may_be_anywhere_in_a_platform() -> None:
     """Five centimetres, and a base a fiftieth of a radian off its level."""
     np.testing.assert_allclose(equilibria.sizes_beside(), [0.05] * 3 + [0.2] * 3, rtol=0.1)
+
+
+@pytest.mark.parametrize(("squares", "off"), [(46.3, False), (47.3, True)])
+def test_stated_lengths_that_chance_puts_so_far_off_want_no_explaining(monkeypatch, squares, off):
+    """Of 21 lengths a chi-square of 46.8 is one of a thousand; three runs state none."""
+    each = np.full(3, np.sqrt(squares / 21.0))
+    monkeypatch.setattr(
+        stated_lengths, "lengths_residual", lambda _, told: each if told else each[:0]
+    )
+    fit = SimpleNamespace(motions=[None] * 10, samples=[True] * 7 + [False] * 3)
+    assert stated_lengths.lengths_off(fit) == off
+    assert not stated_lengths.lengths_off(SimpleNamespace(motions=[None] * 3, samples=[False] * 3))
