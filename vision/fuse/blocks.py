@@ -49,6 +49,8 @@ def _carried(block: Block, views: Sequence[CameraViews], poses: Poses, course: C
     at = block.first + instant
     found = course.carried(at, block.sighted_s() - poses.times_s[at])
     block = replace(block, shifts=found.shifts, motions=found.motions)
+    if not found.variances.any() and not any(v.camera.line_time_s for v in views):
+        return block  # all was seen at the instants, each image at once
     linear = linearised(block, views, poses)
     # All that a camera saw at once was carried alike: each counts as one of so many.
     _, own, alike = np.unique(
