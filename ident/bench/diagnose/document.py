@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from freeswing.cdpr.effects import catalogue
+from freeswing.cdpr.robot import INERTIA_NAMES
 from freeswing.ident.bench.diagnose.causes import SAME, Cause
 from freeswing.ident.bench.diagnose.channels_only import ByChannels, channels_document
 from freeswing.ident.bench.diagnose.diagnose import BenchDiagnosis, CannotTell
@@ -238,7 +239,7 @@ def _accepted(found: BenchDiagnosis, cause: Cause) -> dict[str, Any]:
 
 
 def _parameters(solved: Solved) -> list[dict[str, Any]]:
-    rows = platform_rows(solved)[:9]
+    rows = platform_rows(solved)[: len(INERTIA_NAMES)]
     return [{key: row[key] for key in ("name", "value", "std")} for row in rows]
 
 

@@ -82,9 +82,8 @@ def _unscaled_sentence(name: str, percent: float) -> str:
     return (
         f"{name}: on two wires tracks of unknown scale leave open what roll would show (moments "
         f"and products beside Izz, how deep the centres of mass hang): its Izz is known to "
-        f"{percent:.2g} %, and no fit of such runs could know it to better than some 5 %. Measure "
-        "yaw itself (chi_rad, by a sensor or a tag) with all level, or hang it on three wires: "
-        "either gives 1 % or better"
+        f"{percent:.2g} %. Measure yaw itself (chi_rad, by a sensor or a tag) with all level, or "
+        "hang it on three wires: either gives 1 % or better"
     )
 
 
