@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -27,7 +27,8 @@ from freeswing.ident.diagnose.answer.entries import (
 from freeswing.ident.diagnose.answer.final_verdicts import final_verdicts, rivals_of
 from freeswing.ident.diagnose.answer.next_swing import NextSwing, next_swing
 from freeswing.ident.diagnose.answer.settled_geometry import cut, settled_places, with_settled
-from freeswing.ident.diagnose.answer.taken_back import taken_back
+from freeswing.ident.diagnose.answer.taken_back import TakenBack, taken_back
+from freeswing.ident.diagnose.answer.unmet_validation import share_removed, unmet, with_unmet
 from freeswing.ident.diagnose.decision import (
     LARGEST_EXCESS_LEFT,
     LEAST_SHARE_EXPLAINED,
@@ -234,13 +235,16 @@ def _told(
             spread = honest_covariance(final, last)
             fewer = taken_back(accepted, last, final, spread, scales)
             if fewer is None:
-                break
+                rungs = ladder()
+                fewer = _unless_validated(accepted, rungs, rest)
+                if fewer is None:
+                    break
             last, accepted, note = fewer
             notes.append(note)
             rest = unexplained(last.fit, fitted, full, scales)
         begun = search.rounds[0].before if accepted else last
         first = _with_own_noise(begun.fit) if accepted else final
-        rungs = ladder()
+    rest = with_unmet(rest, rungs[-1].held_out)
     spreads = honest_covariance(first, begun), with_settled(spread, last) if held else spread
     return _Told(last, accepted, rest, rungs, first, final, spreads)
 
@@ -276,17 +280,41 @@ def _believed(
     share = _share_explained(search, last)
     rest = unexplained(last.fit, fitted, full, search.noise_scales)
     accepted = [one for one in search.rounds if one.decision.winner is not None]
-    settled = [one for one in accepted if one.by_lengths]
     follows_badly = _follows_badly(last, rest)
-    if len(accepted) == len(settled) or not follows_badly or share >= LEAST_SHARE_EXPLAINED:
+    if _all_settled(accepted) or not follows_badly or share >= LEAST_SHARE_EXPLAINED:
         return last, accepted, rest
-    doubtful = [effect_of(one.decision.key) for one in accepted if not one.by_lengths]
-    notes.append(
-        f"{', '.join(doubtful)} would remove only {100 * share:.0f} % of the excess: the "
-        "nearest candidates, not the cause; not accepted"
-    )
-    last = accepted[len(settled)].before
+    last, settled, note = _without_forces(accepted, share, "excess")
+    notes.append(note)
     return last, settled, unexplained(last.fit, fitted, full, search.noise_scales)
+
+
+def _unless_validated(
+    accepted: list[Round], rungs: Sequence[Rung], rest: Unexplained
+) -> TakenBack | None:
+    """The answer without its forces where validation runs say that they are not the cause."""
+    if _all_settled(accepted):
+        return None
+    met = [rung.held_out for rung in rungs]
+    settled = sum(one.by_lengths for one in accepted)
+    share = share_removed(met[settled], met[-1])
+    if unmet(met[-1], rest.over_noise) is None or share >= LEAST_SHARE_EXPLAINED:
+        return None
+    return _without_forces(accepted, share, "validation runs' error")
+
+
+def _all_settled(accepted: list[Round]) -> bool:
+    return all(one.by_lengths for one in accepted)
+
+
+def _without_forces(accepted: list[Round], share: float, of_what: str) -> TakenBack:
+    """What lengths have settled alone: the fit before any force, and why no force counts."""
+    forces = [one for one in accepted if not one.by_lengths]
+    note = (
+        f"{', '.join(effect_of(one.decision.key) for one in forces)} would remove only "
+        f"{100 * share:.0f} % of the {of_what}: the nearest candidates, not the cause; not accepted"
+    )
+    settled = [one for one in accepted if one.by_lengths]
+    return TakenBack(accepted[len(settled)].before, settled, note)
 
 
 def _follows_badly(last: Refit, rest: Unexplained) -> bool:

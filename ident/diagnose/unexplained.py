@@ -28,11 +28,13 @@ class Unexplained:
         present: whether a structured residual remains.
         signature: what it looks like, a sentence or two.
         evidence: the numbers behind it.
+        over_noise: root mean square of what the fit leaves, in units of the samples' own noise.
     """
 
     present: bool
     signature: str
     evidence: dict[str, object] = field(default_factory=dict)
+    over_noise: float = 1.0
 
 
 def unexplained(
@@ -50,12 +52,13 @@ def unexplained(
         residuals(motion, run, noise_scales)
         for motion, run in zip(fit.motions, fit.samples, strict=True)
     ]
-    power = np.mean([np.mean(one**2) for one in white])
+    power = float(np.mean([np.mean(one**2) for one in white]))
+    over_noise = float(np.sqrt(power))
     frequencies, spectrum = mean_log_spectrum(fit, noise_scales)
     low = float(np.mean(spectrum[frequencies < 5.0]))
-    evidence: dict[str, object] = {"residual_over_noise": float(np.sqrt(power)), "colour": low}
+    evidence: dict[str, object] = {"residual_over_noise": over_noise, "colour": low}
     if power < 1.0 + LEAST_EXCESS or low < LEAST_COLOUR or too_small(fit):
-        return Unexplained(False, "", evidence)
+        return Unexplained(False, "", evidence, over_noise)
     names = fit.samples[0].coordinates
     by_coordinate = np.sqrt(np.mean([np.mean(one**2, axis=0) for one in white], axis=0))
     worst = int(np.argmax(by_coordinate))
@@ -89,7 +92,7 @@ def unexplained(
     )
     if hint:
         signature += f"; hint, not a finding: the missing force looks like {' + '.join(hint)}"
-    return Unexplained(True, signature, evidence)
+    return Unexplained(True, signature, evidence, over_noise)
 
 
 def _follows(fit: LikelihoodFit, white: list[Array], coordinate: int) -> dict[str, float]:

@@ -362,6 +362,11 @@ HELD = (
         ("LEAST_EXCESS", "LEAST_COLOUR", "LEAST_HINT_GAIN"),
         DECISION,
     ),
+    Held(
+        "ident/diagnose/answer/unmet_validation.py",
+        ("MOST_OVER_NOISE",),
+        "tests/ident/diagnose/answer/test_unmet_validation.py",
+    ),
     Held("ident/diagnose/outstanding_runs.py", ("OUTSTANDING",), DECISION),
     Held("ident/diagnose/refit.py", ("REWEIGHED",), DECISION),
     Held(

@@ -1,0 +1,77 @@
+"""Validation runs that an answer does not meet although it meets the runs it was fitted to."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from freeswing.ident.diagnose import diagnose
+from freeswing.ident.diagnose.answer.unmet_validation import share_removed, unmet, with_unmet
+from freeswing.ident.diagnose.heldout import HeldOut, HeldOutRun
+from freeswing.ident.diagnose.unexplained import Unexplained
+from freeswing.ident.judge.prediction import Prediction
+
+NOISE_M = 1e-4
+
+
+def held(**over_noise: float) -> HeldOut:
+    """Validation runs predicted so many times worse than their noise."""
+    return HeldOut(tuple(one_run(name, times) for name, times in over_noise.items()))
+
+
+def one_run(name: str, times: float) -> HeldOutRun:
+    predicted = np.full((4, 3), times * NOISE_M)
+    coordinates = ("x", "y", "z")
+    motion = Prediction(name, np.arange(4.0), coordinates, np.zeros((4, 3)), predicted, np.zeros(0))
+    return HeldOutRun(name, 1.0, motion, NOISE_M)
+
+
+@pytest.mark.parametrize(("times", "met"), [(1.9, True), (2.1, False)])
+def test_twice_the_noise_is_no_chance(times, met) -> None:
+    assert (unmet(held(one=times), 1.0) is None) == met
+
+
+@pytest.mark.parametrize(("times", "met"), [(5.7, True), (6.3, False)])
+def test_what_fitted_runs_lack_too_is_not_said_again(times, met) -> None:
+    assert (unmet(held(one=times), 3.0) is None) == met
+
+
+def test_the_worst_run_is_named_and_how_far_it_is_off() -> None:
+    runs = held(calm=1.0, near=8.0, far=2.0)
+    told = with_unmet(Unexplained(False, "", {"colour": 1.1}), runs)
+    assert told.present
+    assert "validation run near is predicted 8.0 times worse than its noise" in told.signature
+    assert told.evidence["colour"] == 1.1
+    assert told.evidence["held_out_over_noise"] == pytest.approx(np.sqrt(69 / 3))
+
+
+def test_a_run_that_could_not_be_predicted_says_nothing() -> None:
+    assert unmet(HeldOut((HeldOutRun("lost", 1.0, None, NOISE_M),)), 1.0) is None
+
+
+def test_the_share_is_of_the_power_beyond_the_noise() -> None:
+    assert share_removed(held(one=3.0), held(one=2.0)) == pytest.approx(1 - 3 / 8)
+    assert share_removed(held(one=1.0), held(one=1.0)) == 0.0
+
+
+@pytest.mark.parametrize(("left", "believed"), [(4.9, True), (5.1, False), (1.9, True)])
+def test_forces_that_leave_validation_runs_unmet_are_not_the_cause(left, believed) -> None:
+    """A quarter of the power beyond the noise of runs ten times their noise is sqrt(25.75)."""
+    by_lengths: Any = SimpleNamespace(by_lengths=True, before="declared")
+    force: Any = SimpleNamespace(
+        by_lengths=False, before="geometry", decision=SimpleNamespace(key="cable_mass")
+    )
+    ladder = [held(one=20.0), held(one=10.0), held(one=left)]
+    rungs = [diagnose.Rung((), one) for one in ladder]
+    fewer = diagnose._unless_validated([by_lengths, force], rungs, Unexplained(False, ""))
+    assert (fewer is None) == believed
+    if fewer is not None:
+        assert (fewer.last, fewer.accepted) == ("geometry", [by_lengths])
+        assert "cable_mass would remove only 75 % of the validation" in fewer.note
+
+
+def test_geometry_that_lengths_settled_stays() -> None:
+    settled: Any = SimpleNamespace(by_lengths=True, before="declared")
+    rungs = [diagnose.Rung((), held(one=20.0)), diagnose.Rung((), held(one=20.0))]
+    assert diagnose._unless_validated([settled], rungs, Unexplained(False, "")) is None
