@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -26,9 +26,17 @@ from freeswing.ident.diagnose.answer.entries import (
 )
 from freeswing.ident.diagnose.answer.final_verdicts import final_verdicts, rivals_of
 from freeswing.ident.diagnose.answer.next_swing import NextSwing, next_swing
+from freeswing.ident.diagnose.answer.not_the_cause import (
+    all_settled,
+    gravity_instead,
+    removing_little,
+    suspected,
+    unless_validated,
+    without_forces,
+)
 from freeswing.ident.diagnose.answer.settled_geometry import cut, settled_places, with_settled
-from freeswing.ident.diagnose.answer.taken_back import TakenBack, taken_back
-from freeswing.ident.diagnose.answer.unmet_validation import share_removed, unmet, with_unmet
+from freeswing.ident.diagnose.answer.taken_back import taken_back
+from freeswing.ident.diagnose.answer.unmet_validation import with_unmet
 from freeswing.ident.diagnose.decision import (
     LARGEST_EXCESS_LEFT,
     LEAST_SHARE_EXPLAINED,
@@ -226,6 +234,7 @@ def _told(
     """The rounds that count, with the fits that are told of them; `notes` say what does not."""
     full, scales = free is None, search.noise_scales
     last, accepted, rest = _believed(search, last, fitted, full, notes)
+    check = ""
     with search.pool_of() as pool:
         while True:
             last, held = _kept_from_dynamics(last, rest, scales, notes)
@@ -234,9 +243,11 @@ def _told(
             final = _with_own_noise(last.fit)
             spread = honest_covariance(final, last)
             fewer = taken_back(accepted, last, final, spread, scales)
+            if fewer is None and (instead := gravity_instead(accepted, last, scales)):
+                fewer, check = instead
             if fewer is None:
                 rungs = ladder()
-                fewer = _unless_validated(accepted, rungs, rest)
+                fewer = unless_validated(accepted, [rung.held_out for rung in rungs], rest)
                 if fewer is None:
                     break
             last, accepted, note = fewer
@@ -244,7 +255,7 @@ def _told(
             rest = unexplained(last.fit, fitted, full, scales)
         begun = search.rounds[0].before if accepted else last
         first = _with_own_noise(begun.fit) if accepted else final
-    rest = with_unmet(rest, rungs[-1].held_out)
+    rest = with_unmet(suspected(rest, check) if check else rest, rungs[-1].held_out)
     spreads = honest_covariance(first, begun), with_settled(spread, last) if held else spread
     return _Told(last, accepted, rest, rungs, first, final, spreads)
 
@@ -281,40 +292,11 @@ def _believed(
     rest = unexplained(last.fit, fitted, full, search.noise_scales)
     accepted = [one for one in search.rounds if one.decision.winner is not None]
     follows_badly = _follows_badly(last, rest)
-    if _all_settled(accepted) or not follows_badly or share >= LEAST_SHARE_EXPLAINED:
+    if all_settled(accepted) or not follows_badly or share >= LEAST_SHARE_EXPLAINED:
         return last, accepted, rest
-    last, settled, note = _without_forces(accepted, share, "excess")
+    last, settled, note = without_forces(accepted, removing_little(share, "excess"))
     notes.append(note)
     return last, settled, unexplained(last.fit, fitted, full, search.noise_scales)
-
-
-def _unless_validated(
-    accepted: list[Round], rungs: Sequence[Rung], rest: Unexplained
-) -> TakenBack | None:
-    """The answer without its forces where validation runs say that they are not the cause."""
-    if _all_settled(accepted):
-        return None
-    met = [rung.held_out for rung in rungs]
-    settled = sum(one.by_lengths for one in accepted)
-    share = share_removed(met[settled], met[-1])
-    if unmet(met[-1], rest.over_noise) is None or share >= LEAST_SHARE_EXPLAINED:
-        return None
-    return _without_forces(accepted, share, "validation runs' error")
-
-
-def _all_settled(accepted: list[Round]) -> bool:
-    return all(one.by_lengths for one in accepted)
-
-
-def _without_forces(accepted: list[Round], share: float, of_what: str) -> TakenBack:
-    """What lengths have settled alone: the fit before any force, and why no force counts."""
-    forces = [one for one in accepted if not one.by_lengths]
-    note = (
-        f"{', '.join(effect_of(one.decision.key) for one in forces)} would remove only "
-        f"{100 * share:.0f} % of the {of_what}: the nearest candidates, not the cause; not accepted"
-    )
-    settled = [one for one in accepted if one.by_lengths]
-    return TakenBack(accepted[len(settled)].before, settled, note)
 
 
 def _follows_badly(last: Refit, rest: Unexplained) -> bool:

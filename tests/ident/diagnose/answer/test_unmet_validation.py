@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from freeswing.ident.diagnose import diagnose
+from freeswing.ident.diagnose.answer.not_the_cause import unless_validated
 from freeswing.ident.diagnose.answer.unmet_validation import share_removed, unmet, with_unmet
 from freeswing.ident.diagnose.heldout import HeldOut, HeldOutRun
 from freeswing.ident.diagnose.unexplained import Unexplained
@@ -63,8 +63,7 @@ def test_forces_that_leave_validation_runs_unmet_are_not_the_cause(left, believe
         by_lengths=False, before="geometry", decision=SimpleNamespace(key="cable_mass")
     )
     ladder = [held(one=20.0), held(one=10.0), held(one=left)]
-    rungs = [diagnose.Rung((), one) for one in ladder]
-    fewer = diagnose._unless_validated([by_lengths, force], rungs, Unexplained(False, ""))
+    fewer = unless_validated([by_lengths, force], ladder, Unexplained(False, ""))
     assert (fewer is None) == believed
     if fewer is not None:
         assert (fewer.last, fewer.accepted) == ("geometry", [by_lengths])
@@ -73,5 +72,4 @@ def test_forces_that_leave_validation_runs_unmet_are_not_the_cause(left, believe
 
 def test_geometry_that_lengths_settled_stays() -> None:
     settled: Any = SimpleNamespace(by_lengths=True, before="declared")
-    rungs = [diagnose.Rung((), held(one=20.0)), diagnose.Rung((), held(one=20.0))]
-    assert diagnose._unless_validated([settled], rungs, Unexplained(False, "")) is None
+    assert unless_validated([settled], [held(one=20.0)] * 2, Unexplained(False, "")) is None
