@@ -4,7 +4,8 @@
 
 makes sessions by another simulator (tests/oracle/recorded/benches.py: two empty runs, one with a
 known mass, two with the object, 6 s each), diagnoses each by the command, and prints what it says
-of the one thing that the files do not say. A case whose result stands in OUT is not run again.
+of the one thing that the files do not say. `--weights 3` has three runs with the known mass, on
+both sides and in the middle. A case whose result stands in OUT is not run again.
 """
 
 from __future__ import annotations
@@ -20,14 +21,16 @@ from typing import Any
 from benchmarks.harness import Row, publish
 from freeswing.main import main as freeswing
 from tests.oracle.recorded.benches import (
+    BOTH_SIDES_M,
     DECLARED_KG,
     PLATFORM_COM_M,
+    WEIGHT_M,
     Hidden,
     make_bench,
 )
 
 SEED = 3
-COUNTS = (2, 1, 2)
+EMPTY, LOADED = 2, 2  # runs
 SPAN_S = 6.0
 
 
@@ -90,9 +93,11 @@ CASES = {
 }
 
 
-def one_case(folder: Path, case: Case, seen: str, wires: int) -> dict[str, Any]:
+def one_case(folder: Path, case: Case, seen: str, wires: int, weights: int) -> dict[str, Any]:
     """What `diagnose` says of one session, and how far bodies are off after it."""
-    truth = make_bench(folder, SEED, wires, seen, SPAN_S, COUNTS, case.hidden)
+    places = (WEIGHT_M,) if weights == 1 else BOTH_SIDES_M
+    counts = (EMPTY, weights, LOADED)
+    truth = make_bench(folder, SEED, wires, seen, SPAN_S, counts, case.hidden, places)
     start = time.process_time()
     status = freeswing(["diagnose", str(folder), "--workers", "1", "--quiet"])
     seconds = time.process_time() - start
@@ -157,6 +162,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("out", type=Path)
     parser.add_argument("--seen", action="append", choices=("poses", "plane", "chi", "track"))
     parser.add_argument("--wires", type=int, choices=(2, 3), default=3)
+    parser.add_argument("--weights", type=int, default=1, help="runs with the known mass")
     parser.add_argument("--case", action="append", choices=tuple(CASES))
     parser.add_argument("--json", type=Path)
     options = parser.parse_args(arguments)
@@ -167,9 +173,10 @@ def main(arguments: list[str] | None = None) -> int:
     for seen in options.seen or ("poses",):
         for name in options.case or CASES:
             case, key = CASES[name], f"{options.wires} wires, {seen}, {name}"
+            key += "" if options.weights == 1 else f", {options.weights} weights"
             if key not in kept:
                 folder = options.out / key.replace(", ", "-").replace(" ", "-")
-                kept[key] = one_case(folder, case, seen, options.wires)
+                kept[key] = one_case(folder, case, seen, options.wires, options.weights)
                 path.write_text(json.dumps(kept, indent=1) + "\n")
             rows += _rows(key, case, kept[key])
             print(key, json.dumps(kept[key]), flush=True)

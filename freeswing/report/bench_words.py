@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from freeswing.report.panels.answer import verdict
 from freeswing.report.words import millimetres, number, parameter_row, plain
 from freeswing.results.diagnosis import Diagnosis, HeldOut
@@ -16,7 +18,9 @@ def bench_lines(document: Identification) -> list[str]:
     lines = ["all runs of the bench in one fit, ± 95 %"]
     for one in document.objects or ():
         lines.append(one.name)
-        lines += [f"  {object_row(row)}" for row in one.parameters]
+        lines += [f"  {object_row(row)}" for row in one.parameters if row.value is not None]
+        missing = untold(one.parameters)
+        lines += [f"  not told by these runs: {', '.join(missing)}"] if missing else []
     for budget in document.budgets or ():
         lines.append(f"  deviation of {budget.name}'s Izz_P, by source (kg m2, one deviation):")
         lines += [f"    {budget_row(share)}" for share in _counting(budget.shares)]
@@ -34,6 +38,11 @@ def _counting(shares: tuple[BudgetShare, ...]) -> list[BudgetShare]:
     """The sources that count: down to a twentieth of the largest."""
     most = max((share.std_kg_m2 for share in shares), default=0.0)
     return [share for share in shares if share.std_kg_m2 >= 0.05 * most]
+
+
+def untold(rows: Sequence[BodyParameter]) -> list[str]:
+    """Names of a body's parameters that the runs do not tell."""
+    return [row.name for row in rows if row.value is None]
 
 
 def budget_row(share: BudgetShare) -> str:

@@ -228,5 +228,6 @@ def _gain_notes(found: Solved, bench: Bench) -> list[str]:
             notes.append(f"{rests}period depends on amplitude, which these runs do not tell")
         else:
             value, std = gain["value"], gain["std"]
-            notes.append(f"{rests}period depends on amplitude alone: {value:.4g} +- {std:.2g}")
+            half = float(f"{std:.2g}")  # 2400, not 2.4e+03
+            notes.append(f"{rests}period depends on amplitude alone: {value:.4g} +- {half:g}")
     return notes

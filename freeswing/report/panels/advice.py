@@ -6,6 +6,7 @@ from typing import Any
 
 from freeswing import __version__
 from freeswing.report.material import Material
+from freeswing.report.panels.answer import best_parameters, known_mass_kg
 from freeswing.report.panels.ladder import told_once
 from freeswing.report.words import HALF_WIDTH_95, plain, unit_of
 
@@ -38,9 +39,19 @@ def steps(material: Material) -> list[tuple[str, str]]:
         found.append(("Nothing has to be done: the model explains the runs kept apart.", ""))
     if material.estimates:
         found.append(
-            ("Take the result to another program.", f"freeswing export {place} --urdf --mass-kg M")
+            (
+                "Take the result to another program.",
+                f"freeswing export {place} --urdf{_mass(material)}",
+            )
         )
     return found
+
+
+def _mass(material: Material) -> str:
+    """The option that states the mass: as far as it is known."""
+    parameters, _ = best_parameters(material)
+    mass_kg = known_mass_kg(material, parameters)
+    return f" --mass-kg {mass_kg:.5g}" if mass_kg else " --mass-kg M"
 
 
 def _missing(material: Material, place: str) -> list[tuple[str, str]]:
@@ -49,7 +60,8 @@ def _missing(material: Material, place: str) -> list[tuple[str, str]]:
         found.append(("Nothing is identified yet.", f"freeswing run {place}"))
     elif material.diagnosis is None:
         told = material.why_absent("diagnosis")
-        found.append((told or "Missing effects have not been looked for.", ""))
+        command = "" if told else f"freeswing diagnose {place}"
+        found.append((told or "Missing effects have not been looked for.", command))
     findings = material.check.findings if material.check else ()
     for one in findings:
         if one.level != "note":

@@ -17,7 +17,7 @@ from freeswing.report.body import (
 from freeswing.report.material import Material
 from freeswing.report.panels.ladder import told_once
 from freeswing.report.space import in_space
-from freeswing.report.words import ESTIMATES, parameter_row, plain
+from freeswing.report.words import ESTIMATES, parameter_row, plain, unit_of
 from freeswing.results.common import Parameter
 from freeswing.results.diagnosis import Diagnosis
 
@@ -46,12 +46,23 @@ class Answer:
             "source": source,
             "verdict": verdict(material.diagnosis),
             "mass": mass_sentence(material, mass_kg),
-            "parameters": _shown([parameter_row(entry) for entry in parameters]),
+            "parameters": _shown([parameter_row(one) for one in told(parameters)]),
+            "untold": untold(parameters),
             "tensor": [] if body is None else tensor_rows(body, mass_kg),
             "principal": principal_rows(body, mass_kg) if body and is_told(body) else [],
             "drawing": "" if body is None else hanging(body, material.robot, swings, entries),
             "space": in_space(material.robot, swings, motions),
         }
+
+
+def told(parameters: Sequence[Parameter]) -> list[Parameter]:
+    """Those that have a value."""
+    return [one for one in parameters if one.value is not None]
+
+
+def untold(parameters: Sequence[Parameter]) -> str:
+    """Names of those that have none."""
+    return ", ".join(plain(unit_of(one.name)[0]) for one in parameters if one.value is None)
 
 
 def _shown(rows: list[dict[str, str]]) -> list[dict[str, str]]:

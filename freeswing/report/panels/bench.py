@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from freeswing.report.bench_words import HALF_WIDTH_95, changed_objects, classic_why
+from freeswing.report.bench_words import HALF_WIDTH_95, changed_objects, classic_why, untold
 from freeswing.report.material import Material
 from freeswing.report.words import number
 from freeswing.results.identification import BodyParameter, ChannelGain, ClassicRow
@@ -25,14 +25,19 @@ class BenchPanel:
         return {
             "changed": [{"body": name, "without, with": text} for name, text in changed],
             "objects": [
-                {"name": one.name, "rows": [_row(row) for row in one.parameters]}
+                {
+                    "name": one.name,
+                    "rows": [_row(row) for row in one.parameters if row.value is not None],
+                    "untold": ", ".join(untold(one.parameters)),
+                }
                 for one in found.objects
             ],
             "channels": [
                 {
                     "name": one.name,
                     "noise": number(one.noise),
-                    "rows": [_gain(g) for g in one.gains],
+                    "rows": [_gain(g) for g in one.gains if "*" not in g.name],
+                    "bends": [_gain(g) for g in one.gains if "*" in g.name],
                 }
                 for one in found.channels or ()
             ],
@@ -51,19 +56,18 @@ class BenchPanel:
 
 
 def _row(row: BodyParameter) -> dict[str, str]:
-    known = row.value is not None
-    word = "as given: the runs tell no more" if known else "not told by these runs"
     return {
         "parameter": row.name,
         "value": number(row.value, 5),
         "± 95 %": "–" if row.std is None else number(HALF_WIDTH_95 * row.std, 2),
-        "remark": "" if row.identifiable else word,
+        "remark": "" if row.identifiable else "as given: the runs tell no more",
     }
 
 
 def _gain(row: ChannelGain) -> dict[str, str]:
-    half = "–" if row.std is None else number(HALF_WIDTH_95 * row.std, 2)
-    return {"entry": row.name, "gain": number(row.value, 5), "± 95 %": half}
+    half = number(HALF_WIDTH_95 * row.std, 2) if row.std else "–"
+    held = "held: as given, or it names the scale" if row.std == 0.0 else ""
+    return {"entry": row.name, "gain": number(row.value, 5), "± 95 %": half, "remark": held}
 
 
 def _classic(row: ClassicRow) -> dict[str, str]:

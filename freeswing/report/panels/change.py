@@ -40,9 +40,12 @@ class Change:
         diagnosis = material.diagnosis
         return {
             "summary": _summary(diagnosis.before, diagnosis.after) if diagnosis else "",
-            "rows": [_row(before, after) for before, after in runs],
+            "rows": _rows(runs),
             "chart": _chart(runs),
-            "notes": [*([BELOW_FLOOR] if _is_below(runs) else []), SIGMA],
+            "notes": [
+                *([BELOW_FLOOR] if _is_below(runs) else []),
+                *([SIGMA] if any(one.sigma_perp is not None for one, _ in runs) else []),
+            ],
             "motions": [(one.run, motion_figures(one)) for one in motions[:MOST_RUNS]],
             "shown": min(len(motions), MOST_RUNS),
             "total": len(motions),
@@ -84,13 +87,22 @@ def _is_below(runs: list[Pair]) -> bool:
     return any(error is not None and floor is not None and error < floor for error, floor in known)
 
 
-def _row(before: HeldOutRun | ValidatedRun, after: HeldOutRun | None) -> dict[str, str]:
+def _rows(runs: list[Pair]) -> list[dict[str, str]]:
+    """A row a run; the scatter of accelerations where one has it."""
+    scattered = any(before.sigma_perp is not None for before, _ in runs)
+    return [_row(before, after, scattered) for before, after in runs]
+
+
+def _row(
+    before: HeldOutRun | ValidatedRun, after: HeldOutRun | None, scattered: bool
+) -> dict[str, str]:
     row = {"run": before.run, "error before": _error(before)}
     if after is not None:
         row["error after"] = _error(after)
-    row["noise floor"] = millimetres(before.noise_floor_m)
-    row["σ⊥ before (m/s²)"] = number(before.sigma_perp)
-    if after is not None:
+    row["noise floor"] = _floor(before)
+    if scattered:
+        row["σ⊥ before (m/s²)"] = number(before.sigma_perp)
+    if after is not None and scattered:
         row["σ⊥ after (m/s²)"] = number(after.sigma_perp)
     return row
 
@@ -106,7 +118,14 @@ def _fitted_row(run: RunMotion) -> dict[str, str]:
 
 def _error(run: HeldOutRun | ValidatedRun) -> str:
     other = getattr(run, "prediction_rmse", None)
-    return number(other) if other is not None else millimetres(run.prediction_rmse_m)
+    if other is None:
+        return millimetres(run.prediction_rmse_m)
+    return f"{number(other)} of {getattr(run, 'column', '')}"
+
+
+def _floor(run: HeldOutRun | ValidatedRun) -> str:
+    other = getattr(run, "noise_floor", None)
+    return number(other) if other is not None else millimetres(run.noise_floor_m)
 
 
 def _chart(runs: list[Pair]) -> object:

@@ -7,6 +7,7 @@ from typing import Any
 from freeswing.report.grouped_notes import grouped
 from freeswing.report.material import Material
 from freeswing.report.words import ESTIMATES
+from freeswing.results.identification import Estimate
 
 
 class Dropped:
@@ -36,11 +37,16 @@ def _row(what: str, where: str, why: str) -> dict[str, str]:
 
 
 def _notes(material: Material) -> list[str]:
-    """What the estimates, the diagnosis and the check say beside their numbers."""
-    session = () if material.identification is None else material.identification.notes
+    """What the estimates, the diagnosis and the check say beside their numbers.
+
+    Without those of the best estimate: the panel "How sure" has them.
+    """
+    best = next(iter(material.estimates.values()), Estimate())
+    every = () if material.identification is None else material.identification.notes
+    session = [note for note in every if note not in best.notes]
     of_estimates = [
         f"{ESTIMATES[name]}: {note}"
-        for name, estimate in material.estimates.items()
+        for name, estimate in list(material.estimates.items())[1:]
         for note in estimate.notes
     ]
     diagnosed = () if material.diagnosis is None else material.diagnosis.notes

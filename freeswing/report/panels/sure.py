@@ -18,6 +18,14 @@ from freeswing.report.words import ESTIMATES, HALF_WIDTH_95, number, plain, unit
 from freeswing.results.common import Parameter
 from freeswing.results.identification import ESTIMATE_ORDER, Estimate
 
+OF_BENCHES = (
+    "Counted are the samples' noise as it was found, the start and drag of every run, the wires' "
+    "lengths, masses and centres of mass as far as the session leaves them open, channels' gains, "
+    "and scatter between runs where there is any.",
+    "Taken as exact: where wires are hung up and clamped (entries and attachments of robot.toml), "
+    "places and masses of the payloads, gravity's size and direction, and the time stamps.",
+)
+
 
 class HowSure:
     """How far the numbers can be trusted."""
@@ -41,11 +49,11 @@ class HowSure:
         return {
             "chart": _chart(estimates, after),
             "tables": tables,
-            "summary": [_summary(name, entry) for name, entry in estimates.items()],
+            "summary": _summaries(estimates),
             "exact": exact(material),
             "correlation": _correlation(next(iter(estimates.values()))),
             "notes": [
-                f"{ESTIMATES[name]}: {note}"
+                note if len(estimates) == 1 else f"{ESTIMATES[name]}: {note}"
                 for name in list(estimates)[:1]
                 for note in estimates[name].notes
             ],
@@ -56,6 +64,8 @@ def exact(material: Material) -> list[str]:
     """What the intervals take as exactly known, and what they count."""
     identification = material.identification
     best = material.estimates[identification.best or ""] if identification else Estimate()
+    if identification is not None and identification.objects:
+        return list(OF_BENCHES)
     told = best.further
     taken = []
     if "geometry" not in told and not any("std" in str(one) for one in told):
@@ -78,6 +88,14 @@ def _difference(row: Any) -> dict[str, str]:
         "full less free (%)": number(row.difference_percent, 3),
         "over both standard deviations": number(row.z, 2),
     }
+
+
+def _summaries(estimates: dict[str, Estimate]) -> list[dict[str, str]]:
+    """A row an estimate; none where there is but one, without costs of FIDIM."""
+    alone = [one for one in estimates.values() if one.sigma_W is None and one.cost_C is None]
+    if len(estimates) == len(alone) == 1:
+        return []
+    return [_summary(name, entry) for name, entry in estimates.items()]
 
 
 def _summary(name: str, estimate: Estimate) -> dict[str, str]:
@@ -113,7 +131,7 @@ def _by_name(
     order = {name: k for k, name in enumerate(ESTIMATE_ORDER)}
     found: dict[str, list[tuple[int, Parameter]]] = {}
     for name, estimate in estimates.items():
-        for entry in estimate.parameters:
+        for entry in (one for one in estimate.parameters if one.value is not None):
             found.setdefault(entry.name, []).append((order[name], entry))
     for entry in after:
         found.setdefault(entry.name, []).append((-1, entry))

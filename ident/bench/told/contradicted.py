@@ -57,7 +57,8 @@ def payload_reasons(solved: Solved) -> tuple[Reason, ...]:
     percent, half = 100.0 * share, 50.0 * share
     top, bottom, length = radii(solved.swings[0])
     gravity = float(np.linalg.norm(solved.swings[0].model.robot.gravity_m_s2))
-    spring = (mass.fitted_kg - mass.declared_kg) * gravity * top * bottom / length
+    spring = 1e3 * (mass.fitted_kg - mass.declared_kg) * gravity * top * bottom / length
+    hold = float(f"{spring:.2g}")  # 270, not 2.7e+02
     sway = _sway_excludes(solved, share)
     found = [
         Reason("platform_mass", f"the platform's mass ({percent:+.1f} %)"),
@@ -72,7 +73,7 @@ def payload_reasons(solved: Solved) -> tuple[Reason, ...]:
             f"the payloads' distances from the middle ({-half:+.1f} %{_distances(solved, half)})",
         ),
         Reason("payload_mass", f"the payloads' masses ({-percent:+.1f} %)"),
-        Reason("torsion_spring", f"wires or a clamp that hold yaw by {1e3 * spring:+.2g} mN m/rad"),
+        Reason("torsion_spring", f"wires or a clamp that hold yaw by {hold:+g} mN m/rad"),
     ]
     if mass.is_small:
         way = 1e3 * share * length

@@ -1,11 +1,13 @@
-"""A bench of two wires with an object in several orientations: its whole tensor, as a user would.
+"""A bench with an object in several orientations: its whole tensor, as a user would have recorded.
 
 Two wires leave roll free beside yaw: each orientation shows two moments of the object and the
-product between them. What the files do not say: drag.
+product between them. Three leave yaw alone: each orientation shows the moment about the vertical,
+so that six tell the tensor. What the files do not say: drag.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -31,6 +33,14 @@ from tests.oracle.recorded.benches import (
 # Three ways to lay an object: as it is, on its side, on its front; each as a quaternion w x y z.
 HALF = float(np.sqrt(0.5))
 LAID = ((1.0, 0.0, 0.0, 0.0), (HALF, HALF, 0.0, 0.0), (HALF, 0.0, HALF, 0.0))
+# Three more on a wedge: the vertical halfway between two of its axes, each pair in turn.
+COS, SIN = float(np.cos(np.pi / 8.0)), float(np.sin(np.pi / 8.0))
+WEDGED = (
+    (COS, SIN, 0.0, 0.0),
+    (COS, 0.0, SIN, 0.0),
+    (HALF * COS, HALF * COS, -HALF * SIN, HALF * SIN),
+)
+WAYS = {2: LAID, 3: (*LAID, *WEDGED)}  # that tell a whole tensor, by the number of wires
 UNDER_M = np.array([0.01, -0.005, -0.06])  # its origin below the wires' ends: roll is then stable
 MOMENTS_KG_M2 = np.array([0.0062, 0.0071, 0.0093])
 AXES = (0.35, -0.2, 0.5)  # rad, about x, y, z: its principal axes are nobody's
@@ -64,9 +74,24 @@ def _object_tensor() -> Array:
 
 
 def make_turned_bench(
-    folder: Path, seed: int, duration_s: float = 10.0, each: int = 2
+    folder: Path,
+    seed: int,
+    duration_s: float = 10.0,
+    each: int = 2,
+    wires: int = 2,
+    ways: Sequence[tuple[float, float, float, float]] | None = None,
 ) -> TurnedTruth:
-    """Write the session: `each` runs of the empty platform, then of each orientation."""
+    """Write the session: `each` runs of the empty platform, then of each orientation.
+
+    Args:
+        folder: made when not there.
+        seed: of noise and releases.
+        duration_s: of each run.
+        each: so many runs of a kind.
+        wires: 2 or 3.
+        ways: to lay the object, quaternions w x y z; None: those that tell its whole tensor.
+    """
+    ways = WAYS[wires] if ways is None else ways
     rng = np.random.default_rng(seed)
     (folder / "runs").mkdir(parents=True, exist_ok=True)
     told = LOAD_COM_M + rng.normal(0.0, 0.001, 3)
@@ -74,12 +99,12 @@ def make_turned_bench(
     lines += [f"frame_rate_hz = {RATE_HZ}", "", "[[loads]]", 'name = "object"']
     lines += [f"mass_kg = {LOAD_KG}", "mass_std_kg = 0.0005"]
     lines += [f"com_m = {told.tolist()}", "com_std_m = 0.001"]
-    for k, laid in enumerate([None] * each + [one for one in LAID for _ in range(each)]):
+    for k, laid in enumerate([None] * each + [one for one in ways for _ in range(each)]):
         name = f"run-{k + 1:02d}"
-        motion = _swing(_world(laid), rng, duration_s, RATE_HZ)
+        motion = _swing(_world(wires, laid), rng, duration_s, RATE_HZ)
         _record(folder / "runs" / f"{name}.csv", motion, rng, "poses")
         lines += ["", "[[runs]]", f'name = "{name}"', 'role = "identify"']
-        lines += [f"cable_lengths_m = {[WIRE_M] * 2}", "cable_lengths_std_m = 0.001"]
+        lines += [f"cable_lengths_m = {[WIRE_M] * wires}", "cable_lengths_std_m = 0.001"]
         lines += [f'trajectory = "runs/{name}.csv"']
         if laid is not None:
             place = f"t_platform_load_m = {UNDER_M.tolist()}"
@@ -87,14 +112,14 @@ def make_turned_bench(
                 f'loads = [{{ name = "object", q_platform_load = {list(laid)}, {place} }}]'
             )
     (folder / "session.toml").write_text("\n".join([*lines, ""]))
-    _write_robot(folder / "robot.toml", 2, _ends(2))
+    _write_robot(folder / "robot.toml", wires, _ends(wires))
     return TurnedTruth(_object_tensor(), LOAD_COM_M)
 
 
-def _world(laid: tuple[float, float, float, float] | None) -> World:
+def _world(wires: int, laid: tuple[float, float, float, float] | None) -> World:
     from freeswing.cdpr.robot import Cable, Robot
 
-    ends = _ends(2)
+    ends = _ends(wires)
     up = np.array([0.0, 0.0, WIRE_M])
     cables = tuple(Cable(str(k), end + up, 0.0, end) for k, end in enumerate(ends))
     robot = Robot("bench", cables, np.array([0.0, 0.0, -GRAVITY]))
@@ -107,7 +132,7 @@ def _world(laid: tuple[float, float, float, float] | None) -> World:
     first = np.sum([body[0] * body[1] for body in bodies], axis=0)
     second = np.sum([one[2] + one[0] * _spread(one[1]) for one in bodies], axis=0)
     entries = (second / mass)[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
-    world = plain_world(robot, Body(mass, first / mass, entries), np.full(2, WIRE_M))
+    world = plain_world(robot, Body(mass, first / mass, entries), np.full(wires, WIRE_M))
     return world._replace(drag_angular=DRAG_N_M_S)
 
 

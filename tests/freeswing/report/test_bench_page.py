@@ -1,0 +1,103 @@
+"""The report and the console of a bench: each number and each note once, what is untold by name."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from freeswing.report.bench_words import bench_lines
+from freeswing.report.material import Material
+from freeswing.report.page import render_page
+from freeswing.report.panels.advice import steps
+from freeswing.results.identification import Identification
+
+NOTE = "the platform: no run shows its centre of mass"
+
+
+def _parameter(name: str, value: float | None, std: float | None) -> dict[str, Any]:
+    told = {"name": name, "value": value, "std": std}
+    return {**told, "std_percent": None, "essential": value is not None, "identifiable": True}
+
+
+def _material() -> Material:
+    """A dot of unknown scale told Izz alone, and one run was kept apart."""
+    document = {
+        "format": "freeswing-identification/1",
+        "estimates": {
+            "ml_free": {
+                "parameters": [
+                    _parameter("com_x_m", None, None),
+                    _parameter("Izz_m2", 0.28, 0.002),
+                    _parameter("mass_kg", 0.875, 0.02),
+                ],
+                "samples": 2391,
+                "notes": [NOTE],
+            }
+        },
+        "comparison": {},
+        "validation": [
+            {
+                "run": "r0.40",
+                "sigma_perp": None,
+                "prediction_rmse_m": None,
+                "prediction_rmse": 0.531,
+                "column": "dot_px",
+                "noise_floor": 0.47,
+            }
+        ],
+        "notes": [NOTE],
+        "objects": [
+            {
+                "name": "platform",
+                "parameters": [
+                    {"name": "com_x_m", "value": None, "std": None, "identifiable": False},
+                    {"name": "Izz_kg_m2", "value": 0.245, "std": 0.007, "identifiable": True},
+                ],
+            }
+        ],
+        "channels": [
+            {
+                "name": "dot",
+                "noise": 1.3,
+                "gains": [
+                    {"name": "chi", "value": 5935.0, "std": 2400.0},
+                    {"name": "x", "value": 2220.0, "std": 0.0},
+                    {"name": "chi*chi", "value": -11608.0, "std": 9400.0},
+                ],
+            }
+        ],
+        "classic": [
+            {"run": "r0.25", "period_s": 1.0, "Izz_kg_m2": 0.24, "fitted_Izz_kg_m2": 0.25}
+            | {"off_percent": -3.8, "reasons": []}
+        ],
+    }
+    return Material("kth", folder="kth", identification=Identification.from_json(document))
+
+
+def test_what_runs_do_not_tell_is_named_once() -> None:
+    page = render_page(_material())
+    assert "Not told by these runs: com x." in page
+    assert "Not told by these runs: com_x_m." in page
+    assert "not essential" not in page
+    assert page.count(NOTE) == 1
+    lines = bench_lines(_material().identification or Identification())
+    assert lines.count("  not told by these runs: com_x_m") == 1
+    assert not any(line.startswith("  com_x_m") for line in lines)
+
+
+def test_a_held_gain_has_no_interval_and_bends_are_folded_away() -> None:
+    page = render_page(_material())
+    assert "held: as given, or it names the scale" in page
+    assert page.index("Squares and cubes") < page.index("chi*chi")
+
+
+def test_errors_of_channels_have_their_column() -> None:
+    page = render_page(_material())
+    assert "0.531 of dot_px" in page
+    assert "0.470" in page
+    assert "σ⊥" not in page
+
+
+def test_the_next_steps_are_commands_that_run() -> None:
+    commands = [command for _, command in steps(_material())]
+    assert "freeswing diagnose kth" in commands
+    assert "freeswing export kth --urdf --mass-kg 0.875" in commands
