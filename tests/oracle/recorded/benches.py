@@ -32,6 +32,7 @@ BOTH_SIDES_M = (WEIGHT_M, WEIGHT_M * [-1.0, 1.0, 1.0], WEIGHT_M * [0.0, 1.0, 1.0
 _BESIDE_KG_M = DECLARED_KG * HEAVIER * PLATFORM_COM_M + LOAD_KG * LOAD_COM_M
 LEVEL_M = np.array([0.0, -_BESIDE_KG_M[1] / LOAD_KG, 0.0])  # there two wires hang it level
 RATE_HZ = 50.0
+UNWANTED_M_S = 0.02  # sway of a twist by hand: a centimetre
 STIFF_EA_N = 1e5  # stretches a wire by 0.05 mm
 
 
@@ -238,12 +239,13 @@ def _swing(
     rate_hz: float,
     rolled_rad_s: float = 0.0,
     wider: float = 1.0,
+    swayed_m_s: float = UNWANTED_M_S,
 ) -> Motion:
     rest = settle(world, np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
     twist = np.zeros(6)
     # A twist by hand: about 8 degrees of yaw, and a centimetre of sway that nobody wanted.
     twist[5] = wider * rng.choice([-1.0, 1.0]) * rng.uniform(0.5, 0.7)
-    twist[:2] = rng.normal(0.0, 0.02, 2)
+    twist[:2] = rng.normal(0.0, swayed_m_s, 2)
     if rolled_rad_s > 0.0:
         twist[3] = rng.choice([-1.0, 1.0]) * rolled_rad_s
     start = rest.position_m, rest.quaternion, span_s, _allowed(rest, twist)

@@ -23,6 +23,7 @@ from tests.oracle.recorded.benches import (
     PLATFORM_COM_M,
     PLATFORM_KG_M2,
     RATE_HZ,
+    UNWANTED_M_S,
     WIRE_M,
     _ends,
     _record,
@@ -80,6 +81,8 @@ def make_turned_bench(
     each: int = 2,
     wires: int = 2,
     ways: Sequence[tuple[float, float, float, float]] | None = None,
+    wider: float = 1.0,
+    swayed_m_s: float = UNWANTED_M_S,
 ) -> TurnedTruth:
     """Write the session: `each` runs of the empty platform, then of each orientation.
 
@@ -90,6 +93,8 @@ def make_turned_bench(
         each: so many runs of a kind.
         wires: 2 or 3.
         ways: to lay the object, quaternions w x y z; None: those that tell its whole tensor.
+        wider: twists by hand over the usual ones.
+        swayed_m_s: of the sway at the start, one deviation of x and y.
     """
     ways = WAYS[wires] if ways is None else ways
     rng = np.random.default_rng(seed)
@@ -101,7 +106,7 @@ def make_turned_bench(
     lines += [f"com_m = {told.tolist()}", "com_std_m = 0.001"]
     for k, laid in enumerate([None] * each + [one for one in ways for _ in range(each)]):
         name = f"run-{k + 1:02d}"
-        motion = _swing(_world(wires, laid), rng, duration_s, RATE_HZ)
+        motion = _swing(_world(wires, laid), rng, duration_s, RATE_HZ, 0.0, wider, swayed_m_s)
         _record(folder / "runs" / f"{name}.csv", motion, rng, "poses")
         lines += ["", "[[runs]]", f'name = "{name}"', 'role = "identify"']
         lines += [f"cable_lengths_m = {[WIRE_M] * wires}", "cable_lengths_std_m = 0.001"]
