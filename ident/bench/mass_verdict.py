@@ -17,6 +17,7 @@ from freeswing.ident.likelihood.unknowns import Gaussian, Unknowns
 
 CONTRADICTED = 3.0  # standard deviations between what runs say and what is stated
 GIVES_WAY = 0.01  # of the mass: stretch, or hooks that yield, by a hundredth of the wires' length
+STRAINED = 2.0  # the same: by chance one session in twenty, so that what hangs on it counts
 CHECKING = 0.05  # of the mass: payload runs that tell it as well check it, and what they say counts
 
 
@@ -43,6 +44,12 @@ class MassVerdict:
         Both make wires seem longer the more hangs on them; by a hundredth an eye sees it.
         """
         return abs(self.fitted_kg / self.declared_kg - 1.0) <= GIVES_WAY
+
+    @property
+    def strained(self) -> bool:
+        """Whether runs speak against the declared mass, which serves, without excluding it."""
+        off = abs(self.fitted_kg - self.declared_kg)
+        return not self.contradicted and off > STRAINED * self.fitted_std_kg
 
 
 def weighed_mass(
@@ -102,8 +109,9 @@ def mass_left_free(unknowns: Unknowns, mass: MassVerdict) -> Unknowns:
 def doubt(freed: Solution, mass: MassVerdict | None) -> Array:
     """By how much all shared unknowns would differ, were it the other one of the two masses, (p,).
 
-    Zero where that is no doubt: runs that tell next to nothing of the mass, or that contradict the
-    declared one by more than wires and hooks that give way under a load could make of it.
+    Zero where that is no doubt: runs that tell next to nothing of the mass and do not speak against
+    the declared one either, or that contradict it by more than wires and hooks that give way under
+    a load could make of it.
 
     Args:
         freed: the fit with the mass free.
@@ -117,7 +125,7 @@ def doubt(freed: Solution, mass: MassVerdict | None) -> Array:
     if mass is None:
         return nothing
     checked = mass.fitted_std_kg <= CHECKING * mass.declared_kg
-    if not (mass.is_small if mass.contradicted else checked):
+    if not (mass.is_small if mass.contradicted else checked or mass.strained):
         return nothing
     place = int(freed.unknowns.columns("platform")[0])
     shift = mass.declared_kg - mass.fitted_kg

@@ -96,7 +96,8 @@ def surely_contradicted(solved: Solved) -> bool:
 
 def contradictions(solved: Solved) -> list[str]:
     """What runs contradict of the stated mass and wire lengths, a sentence each."""
-    return [one for one in (group_sentence(solved), wires_sentence(solved)) if one]
+    told = (group_sentence(solved), strained_sentence(solved), wires_sentence(solved))
+    return [one for one in told if one]
 
 
 def group_sentence(solved: Solved) -> str:
@@ -121,6 +122,27 @@ def group_sentence(solved: Solved) -> str:
         f"used. What is off is one of these, and they cannot tell which: {may_be}. "
         f"{_excluded(reasons)}{'. '.join(advice)}. The platform's inertia in kg m2 is the same for "
         "the first two, and goes with the payloads' masses and squared distances"
+    )
+
+
+def strained_sentence(solved: Solved) -> str:
+    """By how much Izz would differ by the mass that payload runs speak for, where they do."""
+    mass = solved.mass
+    if mass is None or not mass.strained:
+        return ""
+    off = abs(mass.fitted_kg - mass.declared_kg) / mass.fitted_std_kg
+    found = []
+    for block, change in solved.doubts.items():
+        body, _, load = block.partition(".")
+        if body in ("platform", "load"):
+            share = -100.0 * change[IZZ] / float(solved.solution.value(block)[IZZ])
+            found.append(f"that of {load or 'the platform'} by {share:+.2g} %")
+    return (
+        f"the payload runs speak against mass_kg = {mass.declared_kg:.4g} kg without excluding it: "
+        f"they give {mass.fitted_kg:.4g} +- {mass.fitted_std_kg:.2g} kg, {off:.1f} deviations off. "
+        f"The declared mass is used; by theirs Izz would change, {', '.join(found)}, all of which "
+        "its deviation counts. Weigh the platform with all that hangs on it, or record more runs "
+        "with the known mass"
     )
 
 

@@ -26,6 +26,7 @@ from freeswing.ident.bench.told.classic_formula import (
     sine_period,
     unchecked_lengths,
 )
+from freeswing.ident.bench.told.contradicted import strained_sentence
 from freeswing.ident.bench.told.report_objects import _in_true_scale, told_object
 from freeswing.ident.likelihood.unknowns import Gaussian, Unknown, Unknowns
 from tests.ident.bench.test_swing_slopes import trifilar
@@ -93,6 +94,22 @@ def test_payload_runs_that_check_a_declared_mass(share, counts) -> None:
     counted = mass_verdict.doubt(freed, verdict)
     assert counted[6] == pytest.approx(0.2 if counts else 0.0)
     assert counted[0] == 0.0
+
+
+@pytest.mark.parametrize(("off", "counts"), [(1.95, False), (2.05, True)])
+def test_a_declared_mass_that_runs_speak_against_counts_however_little_they_tell(off, counts):
+    """Runs that know it to a tenth, so many deviations off: the declared one serves."""
+    covariance = 1e-4 * np.eye(10)
+    covariance[6, 0] = covariance[0, 6] = 2e-4
+    freed = SimpleNamespace(covariance=covariance, unknowns=body(0.1).unknowns)
+    verdict = mass_verdict.MassVerdict(5.0, 5.0 + 0.5 * off, 0.5, contradicted=False)
+    counted = mass_verdict.doubt(freed, verdict)
+    assert counted[6] == pytest.approx(-off if counts else 0.0)
+    solution = SimpleNamespace(value=lambda name: np.full(10, 5.0))
+    solved = SimpleNamespace(mass=verdict, doubts={"platform": counted}, solution=solution)
+    sentence = strained_sentence(solved)
+    assert bool(sentence) == counts
+    assert f"the platform by {20.0 * off:+.2g} %" in sentence or not counts, sentence
 
 
 @pytest.mark.parametrize(("fitted_kg", "counts"), [(5.048, True), (5.052, False), (4.952, True)])
