@@ -6,6 +6,8 @@ about shapes, and makes what holds it several times as long to compile.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -49,3 +51,51 @@ def eliminate(matrix: Array, right: Array) -> Array:
                 right[k, j] -= matrix[k, i] * right[i, j]
             right[k, j] /= matrix[k, k]
     return right
+
+
+@kernel
+def inverse_factor(matrix: Array) -> Array:
+    """Lower triangular W with W'W the inverse of a positive definite matrix (n, n).
+
+    Only the matrix's lower triangle is read. Raises LinAlgError where it is not positive definite.
+
+    Source:
+        Golub, Van Loan 2013, Matrix Computations, sec. 4.2: the Cholesky factor, and sec. 3.1:
+        forward substitution.
+    """
+    n = len(matrix)
+    factor, inverse = matrix.T.copy(), np.zeros((n, n))  # upper triangular, row by row
+    for k in range(n):
+        if not factor[k, k] > 0.0:
+            raise _Singular("Matrix is not positive definite.")
+        scale = 1.0 / math.sqrt(factor[k, k])
+        for j in range(k, n):
+            factor[k, j] *= scale
+        for i in range(k + 1, n):
+            share = factor[k, i]
+            for j in range(i, n):
+                factor[i, j] -= share * factor[k, j]
+    for i in range(n):
+        scale = 1.0 / factor[i, i]
+        for k in range(i):
+            share = -scale * factor[k, i]
+            for j in range(k + 1):
+                inverse[i, j] += share * inverse[k, j]
+        inverse[i, i] = scale
+    return inverse
+
+
+@kernel
+def inverse_factors(matrices: Array) -> Array:
+    """`inverse_factor` of each of some positive definite matrices, (k, n, n).
+
+    Source:
+        Golub, Van Loan 2013, Matrix Computations, sec. 4.2: the Cholesky factor.
+    """
+    found = np.empty_like(matrices)
+    for k in range(len(matrices)):
+        one = inverse_factor(matrices[k])
+        for i in range(len(one)):
+            for j in range(len(one)):
+                found[k, i, j] = one[i, j]
+    return found

@@ -28,19 +28,43 @@ INSTANTS_A_BLOCK = 400
 def blocks(
     views: Sequence[CameraViews], watch: Watch, instants_s: Array, poses: Poses | None = None
 ) -> Iterator[Block]:
-    """All sightings of the platform, each at the instant nearest to its frame.
+    """All sightings of the platform, each at the instant nearest to its frame; see `RunBlocks`."""
+    return RunBlocks(views, watch, instants_s).at(poses)
 
-    With `poses` at these instants, each sighting has the platform's motion from its instant on,
-    what is not known of that among its covariance, and corners freed of what rolling shutters did.
-    """
-    nearest = [_nearest(v, instants_s) for v in views]
-    for first in range(0, len(instants_s), INSTANTS_A_BLOCK):
-        last = min(first + INSTANTS_A_BLOCK, len(instants_s))
-        block = _block(views, nearest, watch, first, last)
-        course = None if poses is None else poses.course
-        if poses is not None and course is not None:
-            block = _carried(block, views, poses, course)
-        yield block
+
+class RunBlocks:
+    """A run's sightings for any number of passes; where all are one block it is made once."""
+
+    def __init__(self, views: Sequence[CameraViews], watch: Watch, instants_s: Array) -> None:
+        self.views, self.watch, self.instants_s = views, watch, instants_s
+        self._only: Block | None = None
+
+    def at(self, poses: Poses | None) -> Iterator[Block]:
+        """All sightings of the platform, each at the instant nearest to its frame.
+
+        With poses at these instants, each sighting has the platform's motion from its instant on,
+        what is not known of that among its covariance, and corners freed of what rolling shutters
+        did.
+        """
+        for block in self._plain():
+            if poses is None or poses.course is None:
+                yield block
+            else:
+                yield _carried(block, self.views, poses, poses.course)
+
+    def _plain(self) -> Iterator[Block]:
+        """The blocks as they were seen."""
+        if self._only is not None:
+            yield self._only
+            return
+        nearest = [_nearest(v, self.instants_s) for v in self.views]
+        count = len(self.instants_s)
+        for first in range(0, count, INSTANTS_A_BLOCK):
+            last = min(first + INSTANTS_A_BLOCK, count)
+            block = _block(self.views, nearest, self.watch, first, last)
+            if count <= INSTANTS_A_BLOCK:
+                self._only = block
+            yield block
 
 
 def _carried(block: Block, views: Sequence[CameraViews], poses: Poses, course: Course) -> Block:

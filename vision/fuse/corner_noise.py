@@ -67,6 +67,35 @@ class Noise:
         return Noise(np.minimum(self.floor_px, floor_px), self.turned_px)
 
 
+class _Corners(NamedTuple):
+    """Of some sightings: camera, points, rays, pixels' covariances, and focal length, (n, ...)."""
+
+    camera_of: NDArray[np.int64]
+    counts: NDArray[np.int64]
+    rays: Array
+    covariances: Array
+    focal_px: Array
+
+    def only(self, chosen: NDArray[np.int64]) -> _Corners:
+        return _Corners(
+            self.camera_of[chosen],
+            self.counts[chosen],
+            self.rays[chosen],
+            self.covariances[chosen],
+            self.focal_px[chosen],
+        )
+
+
+class _Chosen(NamedTuple):
+    """Sightings of a block about its poses: instants (n,), residuals (n, 8), slopes (n, 8, 6)."""
+
+    corners: _Corners
+    instants: NDArray[np.int64]
+    residuals: Array
+    jacobians: Array
+    poses: Array
+
+
 class _Seen(NamedTuple):
     """Of a camera's sightings: scores, points (n,), squares (n, 3), shares (n, 3, n_c, 3)."""
 
@@ -75,6 +104,9 @@ class _Seen(NamedTuple):
     squares: Array
     shares: Array
 
+    def only(self, mine: Mask) -> _Seen:
+        return _Seen(self.scores[mine], self.counts[mine], self.squares[mine], self.shares[mine])
+
 
 def whitened(block: Block, noise: Noise, views: Sequence[CameraViews]) -> Array:
     """Whitening of each sighting by its covariance (rays), (n_o, 8, 8).
@@ -82,26 +114,42 @@ def whitened(block: Block, noise: Noise, views: Sequence[CameraViews]) -> Array:
     Source:
         Golub, Van Loan 2013, Matrix Computations, sec. 4.2: the Cholesky factor.
     """
-    if not len(block.things):
-        return np.zeros((0, 8, 8))
-    sizes = np.stack([np.ones_like(noise.floor_px), noise.floor_px**2, ALIKE * noise.turned_px**2])
-    whole = np.einsum("pn,pnij->nij", sizes[:, block.camera_of], _parts(block, views))
-    missing = np.arange(8) >= 2 * block.counts[:, None]
-    whole[missing[:, :, None] & np.eye(8, dtype=bool)] = 1.0
+    return _whitened(_corners(block, views), noise)
+
+
+def _corners(block: Block, views: Sequence[CameraViews]) -> _Corners:
+    focal = np.array([view.camera.focal_px.mean() for view in views])[block.camera_of]
+    return _Corners(block.camera_of, block.counts, block.rays, block.covariances, focal)
+
+
+def _whitened(corners: _Corners, noise: Noise) -> Array:
+    there = np.arange(8) < 2 * corners.counts[:, None]
+    both = there[:, :, None] & there[:, None, :]
+    whole = np.where(both, corners.covariances, 0.0)
+    floors = (noise.floor_px[corners.camera_of] / corners.focal_px) ** 2
+    whole[:, np.arange(8), np.arange(8)] += np.where(there, floors[:, None], 1.0)
+    if noise.turned_px.any():
+        sizes = ALIKE * noise.turned_px[corners.camera_of] ** 2
+        whole += sizes[:, None, None] * _turned(corners)
     return whitening(whole)
 
 
-def _parts(block: Block, views: Sequence[CameraViews]) -> Array:
+def _turned(corners: _Corners) -> Array:
+    """Covariances of tags that are turned by one pixel, (n, 8, 8)."""
+    size = (corners.counts == 4) / corners.focal_px
+    turns = turns_of(corners.rays) * size[:, None, None]
+    return turns @ np.swapaxes(turns, 1, 2)
+
+
+def _parts(corners: _Corners) -> Array:
     """Covariances of the parts of unit size, zero beyond a sighting's numbers, (3, n_o, 8, 8)."""
-    focal = np.array([view.camera.focal_px.mean() for view in views])[block.camera_of]
-    there = (np.arange(8) < 2 * block.counts[:, None]).astype(float)
+    there = (np.arange(8) < 2 * corners.counts[:, None]).astype(float)
     both = there[:, :, None] * there[:, None, :]
-    turns = turns_of(block.rays) * ((block.counts == 4) / focal)[:, None, None]
     return np.stack(
         [
-            block.covariances * both,
-            np.eye(8) * both / focal[:, None, None] ** 2,
-            turns @ np.swapaxes(turns, 1, 2),
+            corners.covariances * both,
+            np.eye(8) * both / corners.focal_px[:, None, None] ** 2,
+            _turned(corners),
         ]
     )
 
@@ -149,7 +197,7 @@ class NoiseSums:
 
     def __init__(self, noise: Noise) -> None:
         self.noise = noise
-        self.seen: list[list[_Seen]] = [[] for _ in noise.floor_px]
+        self._chosen: list[_Chosen] = []
 
     def add(
         self,
@@ -168,47 +216,49 @@ class NoiseSums:
             linear: these about the poses.
             covariances: of the poses, (n_k, 6, 6).
         """
-        count = len(block.starts) - 1
-        instant = np.repeat(np.arange(count), np.diff(block.starts))
+        instant = np.repeat(np.arange(len(block.starts) - 1), np.diff(block.starts))
         step = max(1, int(good.sum()) // _SIGHTINGS_A_BLOCK)
         chosen = np.flatnonzero(good & (instant % step == 0))
-        if not len(chosen):
-            return
-        instant, camera_of = instant[chosen], block.camera_of[chosen]
-        white = whitened(block, self.noise, views)[chosen]
+        if len(chosen):
+            corners = _corners(block, views).only(chosen)
+            there = np.arange(8) < 2 * corners.counts[:, None]
+            residuals = np.where(there, linear.residuals[chosen], 0.0)
+            jacobians = np.where(there[:, :, None], linear.jacobians[chosen], 0.0)
+            poses = np.where(np.isfinite(covariances), covariances, 0.0)
+            self._chosen.append(_Chosen(corners, instant[chosen], residuals, jacobians, poses))
+
+    def _seen(self, chosen: _Chosen) -> _Seen:
+        """What a block's sightings say."""
+        corners, instant, miss, jacobians, poses = chosen
+        cameras, count = len(self.noise.floor_px), len(poses)
+        white = _whitened(corners, self.noise)
         precise = np.swapaxes(white, 1, 2) @ white
-        parts = _parts(block, views)[:, chosen]
-        there = np.arange(8) < 2 * block.counts[chosen, None]
-        miss = np.where(there, linear.residuals[chosen], 0.0)
+        parts = _parts(corners)
         pulled = np.einsum("nij,nj->ni", precise, miss)
-        by_pose = precise @ np.where(there[:, :, None], linear.jacobians[chosen], 0.0)
+        by_pose = precise @ jacobians
         own = np.swapaxes(by_pose, 1, 2) @ parts @ by_pose
-        whole = np.zeros((len(views), count, PARTS, 6, 6))
-        np.add.at(whole, (camera_of, instant), np.swapaxes(own, 0, 1))
-        poses = np.where(np.isfinite(covariances), covariances, 0.0)
+        whole = np.zeros((cameras, count, PARTS, 6, 6))
+        np.add.at(whole, (corners.camera_of, instant), np.swapaxes(own, 0, 1))
         absorbed = (poses[:, None] @ whole @ poses[:, None])[:, instant]
         weighed = precise @ parts
         moved = weighed @ by_pose @ poses[instant]
         shares = np.einsum("pnab,cnqba->npcq", own, absorbed)
         alone = np.einsum("pnij,qnji->npq", weighed, weighed)
         alone -= 2.0 * np.einsum("pnia,qnij,nja->npq", moved, parts, by_pose)
-        shares[np.arange(len(chosen)), :, camera_of] += alone
+        shares[np.arange(len(instant)), :, corners.camera_of] += alone
         squares = np.einsum("ni,pnij,nj->np", pulled, parts, pulled)
-        scores = np.einsum("ni,ni->n", miss, pulled)
-        counts = block.counts[chosen]
-        for index, known in enumerate(self.seen):
-            mine = camera_of == index
-            if mine.any():
-                known.append(_Seen(scores[mine], counts[mine], squares[mine], shares[mine]))
+        return _Seen(np.einsum("ni,ni->n", miss, pulled), corners.counts, squares, shares)
 
     def turned_px(self) -> Array:
         """What turns tags in each camera, zero where that is not sure, (n_c,)."""
-        cameras = len(self.seen)
+        seen = [(one.corners.camera_of, self._seen(one)) for one in self._chosen]
+        cameras = len(self.noise.floor_px)
         shares = np.zeros((cameras, PARTS, cameras, PARTS))
         squares, usual = np.zeros((cameras, PARTS)), np.zeros(cameras)
-        for index, blocks in enumerate(self.seen):
-            if blocks:
-                shares[index], squares[index], usual[index] = _kept_sums(blocks)
+        for index in range(cameras):
+            mine = [one.only(camera_of == index) for camera_of, one in seen]
+            if any(len(one.scores) for one in mine):
+                shares[index], squares[index], usual[index] = _kept_sums(mine)
         squares -= shares[:, :, :, 0].sum(axis=2)  # the pixels' own, as the fits know it
         size = (PARTS - 1) * cameras
         matrix = shares[:, 1:, :, 1:].reshape(size, size)

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from freeswing.vision.fuse.blocks import blocks
+from freeswing.vision.fuse.blocks import RunBlocks
 from freeswing.vision.fuse.corner_noise import Noise, NoiseSums, alike, floor_px, whitened
 from freeswing.vision.fuse.linearised_block import block_poses, seen_by
 from freeswing.vision.fuse.pose_kernels import (
@@ -77,34 +77,33 @@ def fuse(
         instants_s: base times sought, (n,).
         start: poses of an earlier call at the same instants.
         passes: solves; each improves the motion and the noise for the next. The last takes the
-            noise in its parts.
+            noise in its parts: weighed by them, residuals would hide what turns tags, and turns
+            would neither find it nor settle.
         rough: leaves the covariances out (0, 6, 6), more than half of what poses take.
         plain: takes all noise as each corner's own, which what is wrong with a rig cannot pass for.
     """
-    noise = Noise.unknown(len(views))
+    run, noise = RunBlocks(views, watch, instants_s), Noise.unknown(len(views))
     poses = unknown_poses(instants_s) if start is None else start
     settling, spare, left = Settling(), MOST_TO_SETTLE, passes
     while True:
         parts = NoiseSums(noise) if not plain and left == 2 else None
-        kept = left == 1 and not rough
-        found, usual, account = _solved(views, watch, poses, noise, parts, kept=kept)
-        noise = Noise.plain(account.floors())
-        if parts is not None:
-            noise = replace(noise, turned_px=alike(parts.turned_px()))
+        found, usual, account = _solved(run, poses, noise, parts, kept=left == 1 and not rough)
         if left == 1:
             found = with_course(found, usual, poses.course)
             return replace(found, motions=motions_of(found)), account.fit()
         aim, moved = settling.aim(poses, found, usual)
         poses = with_course(aim, usual, poses.course)
+        noise = Noise.plain(account.floors())
         if left == 2 and moved > SETTLED and spare:
             spare -= 1
-        else:
-            left -= 1
+            continue
+        left -= 1
+        if parts is not None:
+            noise = replace(noise, turned_px=alike(parts.turned_px()))
 
 
 def _solved(
-    views: Sequence[CameraViews],
-    watch: Watch,
+    run: RunBlocks,
     poses: Poses,
     noise: Noise,
     parts: NoiseSums | None,
@@ -115,17 +114,17 @@ def _solved(
 
     Usual deviations are zero where none is known, covariances there only if they are `kept`.
     """
-    n = len(poses.times_s)
+    n, views, free = len(poses.times_s), run.views, free_of(run.watch)
     positions, rotations = poses.positions_m.copy(), poses.rotations.copy()
     known = np.zeros(n, dtype=bool)
     covariances = np.full((n if kept else 0, 6, 6), np.nan)
     variances = [np.zeros((0, 6))]
     account = _Account(noise)
-    for block in blocks(views, watch, poses.times_s, poses):
+    for block in run.at(poses):
         span = slice(block.first, block.first + len(block.starts) - 1)
         begun = block_poses(*_starts(block, positions[span], rotations[span]))
         seen, white = seen_by(block, views), whitened(block, noise, views)
-        found = solve_block(seen, white, begun, free_of(watch), ROBUST_LIMIT)
+        found = solve_block(seen, white, begun, free, ROBUST_LIMIT)
         linear = linearise_block(seen, found.poses())
         good = account.add(block, views, found, linear)
         if parts is not None:

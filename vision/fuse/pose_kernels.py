@@ -143,35 +143,24 @@ class _Spare(NamedTuple):
     j: Array
 
 
-@kernel
-def carried_on(
-    times_s: Array, rotations: Array, positions: Array, time_s: float
-) -> tuple[Array, Array]:
-    """Rotation (3, 3) and position (3,) at a time, by the polynomial through poses (n, ...).
+@kernel(forceinline=True)
+def _times(m: Array, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """The first three rows and columns of a matrix times a vector."""
+    return (
+        m[0, 0] * x + m[0, 1] * y + m[0, 2] * z,
+        m[1, 0] * x + m[1, 1] * y + m[1, 2] * z,
+        m[2, 0] * x + m[2, 1] * y + m[2, 2] * z,
+    )
 
-    Source:
-        Press et al. 2007, Numerical Recipes, sec. 3.2: Lagrange's polynomial, in rotation
-        vectors.
-    """
-    n = len(times_s)
-    ahead, turn = np.zeros(6), np.empty((3, 3))
-    for k in range(n - 1):
-        weight = 1.0
-        for j in range(n):
-            if j != k:
-                weight *= (time_s - times_s[j]) / (times_s[k] - times_s[j])
-        turn = rotations[k] @ rotations[n - 1].T
-        x, y, z = turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]
-        sine = 0.5 * math.sqrt(x * x + y * y + z * z)
-        cosine = 0.5 * (turn[0, 0] + turn[1, 1] + turn[2, 2] - 1.0)
-        factor = 0.5 if sine < 1e-9 else 0.5 * math.atan2(sine, cosine) / sine
-        for a in range(3):
-            ahead[a] += weight * (positions[k, a] - positions[n - 1, a])
-        ahead[3] += weight * factor * x
-        ahead[4] += weight * factor * y
-        ahead[5] += weight * factor * z
-    small_rotation(ahead[3:], turn)
-    return turn @ rotations[n - 1], positions[n - 1] + ahead[:3]
+
+@kernel(forceinline=True)
+def _product(one: Array, other: Array) -> Array:
+    """Of two (3, 3): BLAS takes longer to be called."""
+    product = np.empty((3, 3))
+    for k in range(3):
+        x, y, z = _times(one, other[0, k], other[1, k], other[2, k])
+        product[0, k], product[1, k], product[2, k] = x, y, z
+    return product
 
 
 @kernel
@@ -182,54 +171,47 @@ def _observe(seen: Seen, o: int, pose: BelievedPose, into: Linear, at: int | np.
     shift, motion = seen.shifts[o], seen.motions[o]
     points, rays, lags = seen.points[o], seen.rays[o], seen.lags[o]
     camera = seen.cameras[seen.camera_of[o]]
-    turn = np.empty((3, 3))
-    step = np.empty(3)
-    rotation = small_rotation(shift[3:], turn) @ pose.rotation
+    turn, step = np.empty((3, 3)), np.empty(3)
+    small_rotation(shift[3:], turn)
+    rotation = _product(turn, pose.rotation)
     for k in range(seen.counts[o]):
         dt = lags[k]
-        for i in range(3):
-            step[i] = motion[3 + i] * dt + 0.5 * motion[9 + i] * dt * dt
-        small_rotation(step, turn)
-        arm = turn @ (rotation @ points[k])
-        velocity = np.empty(3)
-        base = np.empty(3)
+        half = 0.5 * dt * dt
+        a0, a1, a2 = _times(rotation, points[k, 0], points[k, 1], points[k, 2])
+        if dt != 0.0:
+            for i in range(3):
+                step[i] = motion[3 + i] * dt + motion[9 + i] * half
+            small_rotation(step, turn)
+            a0, a1, a2 = _times(turn, a0, a1, a2)
         spin0, spin1, spin2 = (
             motion[3] + motion[9] * dt,
             motion[4] + motion[10] * dt,
             motion[5] + motion[11] * dt,
         )
-        for i in range(3):
-            way = motion[i] * dt + 0.5 * motion[6 + i] * dt * dt
-            base[i] = pose.position[i] + shift[i] + way + arm[i]
-            velocity[i] = motion[i] + motion[6 + i] * dt
-        velocity[0] += spin1 * arm[2] - spin2 * arm[1]
-        velocity[1] += spin2 * arm[0] - spin0 * arm[2]
-        velocity[2] += spin0 * arm[1] - spin1 * arm[0]
-        for i in range(3):
-            places[k, i] = (
-                camera[i, 0] * base[0]
-                + camera[i, 1] * base[1]
-                + camera[i, 2] * base[2]
-                + camera[i, 3]
-            )
-        z = places[k, 2]
+        v0 = motion[0] + motion[6] * dt + spin1 * a2 - spin2 * a1
+        v1 = motion[1] + motion[7] * dt + spin2 * a0 - spin0 * a2
+        v2 = motion[2] + motion[8] * dt + spin0 * a1 - spin1 * a0
+        b0 = pose.position[0] + shift[0] + motion[0] * dt + motion[6] * half + a0
+        b1 = pose.position[1] + shift[1] + motion[1] * dt + motion[7] * half + a1
+        b2 = pose.position[2] + shift[2] + motion[2] * dt + motion[8] * half + a2
+        c0, c1, c2 = _times(camera, b0, b1, b2)
+        z = c2 + camera[2, 3]
+        places[k, 0], places[k, 1], places[k, 2] = c0 + camera[0, 3], c1 + camera[1, 3], z
         if not z > 1e-3:
             return False
-        x, y = places[k, 0] / z, places[k, 1] / z
-        residual[2 * k] = rays[2 * k] - x
-        residual[2 * k + 1] = rays[2 * k + 1] - y
         for row in range(2):
-            value = x if row == 0 else y
+            value = places[k, row] / z
+            residual[2 * k + row] = rays[2 * k + row] - value
             g0 = (camera[row, 0] - value * camera[2, 0]) / z
             g1 = (camera[row, 1] - value * camera[2, 1]) / z
             g2 = (camera[row, 2] - value * camera[2, 2]) / z
             line = jacobian[2 * k + row]
             line[0], line[1], line[2] = g0, g1, g2
             # d base / d dr = -skew(arm): g' (dr x arm) = dr . (arm x g)
-            line[3] = arm[1] * g2 - arm[2] * g1
-            line[4] = arm[2] * g0 - arm[0] * g2
-            line[5] = arm[0] * g1 - arm[1] * g0
-            rates[2 * k + row] = g0 * velocity[0] + g1 * velocity[1] + g2 * velocity[2]
+            line[3] = a1 * g2 - a2 * g1
+            line[4] = a2 * g0 - a0 * g2
+            line[5] = a0 * g1 - a1 * g0
+            rates[2 * k + row] = g0 * v0 + g1 * v1 + g2 * v2
     return True
 
 

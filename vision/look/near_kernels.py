@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 
 from freeswing.calib.camera.lens_kernels import lens_pixels
 from freeswing.cdpr.compiled.kernels import kernel
+from freeswing.cdpr.elimination import inverse_factors
 from freeswing.vision.fuse.pose_kernels import BelievedPose, Seen, solve_instant
+from freeswing.vision.fuse.small_rotation import small_rotation
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -107,9 +109,7 @@ def refined_pose(
         Loan 2013, Matrix Computations, sec. 4.2: whitening by the Cholesky factor.
     """
     n = len(points)
-    whitening = np.empty((n, 8, 8))
-    for i in range(n):
-        whitening[i] = np.linalg.inv(np.linalg.cholesky(covariances[i]))
+    whitening = inverse_factors(covariances)
     starts = np.zeros(2, dtype=np.int64)
     starts[1] = n
     home = np.zeros((1, 4, 4))
@@ -131,3 +131,34 @@ def refined_pose(
     found = solve_instant(seen, whitening, first, pose, free, limit, passes)
     known = found.condition != 0.0 and bool(np.isfinite(found.position).all())
     return known, found.rotation, found.position
+
+
+@kernel
+def carried_on(
+    times_s: Array, rotations: Array, positions: Array, time_s: float
+) -> tuple[Array, Array]:
+    """Rotation (3, 3) and position (3,) at a time, by the polynomial through poses (n, ...).
+
+    Source:
+        Press et al. 2007, Numerical Recipes, sec. 3.2: Lagrange's polynomial, in rotation
+        vectors.
+    """
+    n = len(times_s)
+    ahead, turn = np.zeros(6), np.empty((3, 3))
+    for k in range(n - 1):
+        weight = 1.0
+        for j in range(n):
+            if j != k:
+                weight *= (time_s - times_s[j]) / (times_s[k] - times_s[j])
+        turn = rotations[k] @ rotations[n - 1].T
+        x, y, z = turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]
+        sine = 0.5 * math.sqrt(x * x + y * y + z * z)
+        cosine = 0.5 * (turn[0, 0] + turn[1, 1] + turn[2, 2] - 1.0)
+        factor = 0.5 if sine < 1e-9 else 0.5 * math.atan2(sine, cosine) / sine
+        for a in range(3):
+            ahead[a] += weight * (positions[k, a] - positions[n - 1, a])
+        ahead[3] += weight * factor * x
+        ahead[4] += weight * factor * y
+        ahead[5] += weight * factor * z
+    small_rotation(ahead[3:], turn)
+    return turn @ rotations[n - 1], positions[n - 1] + ahead[:3]

@@ -8,9 +8,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from freeswing.cdpr.elimination import inverse_factors
 from freeswing.cdpr.rotation import exp_rotation
-from freeswing.vision.fuse.pose_kernels import ROBUST_LIMIT, carried_on
-from freeswing.vision.look.near_kernels import refined_pose
+from freeswing.vision.fuse.pose_kernels import ROBUST_LIMIT
+from freeswing.vision.look.near_kernels import carried_on, refined_pose
 
 Array = NDArray[np.float64]
 Pose = tuple[Array, Array]
@@ -50,7 +51,7 @@ def whitening(covariances: Array) -> Array:
     Source:
         Golub, Van Loan 2013, Matrix Computations, sec. 4.2: the Cholesky factor.
     """
-    return np.asarray(np.linalg.inv(np.linalg.cholesky(covariances)), dtype=np.float64)
+    return inverse_factors(np.ascontiguousarray(covariances, dtype=np.float64))
 
 
 def refine_pose(start: Pose, points: Array, rays: Array, covariances: Array) -> Pose | None:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from freeswing.cdpr.rotation import exp_rotation, log_rotation
 from freeswing.vision.fuse.motion.motion_spectrum import Spectrum
+from freeswing.vision.fuse.motion.spectrum_kernels import Patterns, inverse_covariances, motion_rows
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -25,6 +26,7 @@ STRETCH = 48  # poses of which a motion between two is made
 _TOGETHER = 12  # instants in the middle of one stretch
 _STRETCHES_READ = 6  # for the spectrum, spread over a run
 _ROUNDS = 8
+_SAME_TIME_S = 1e-11  # a platform's way in it is a millionth of what its poses err by
 
 
 class Carried(NamedTuple):
@@ -72,51 +74,29 @@ class Course:
             np.stack([instants.astype(float), lags_s]), axis=1, return_inverse=True
         )
         which, lags_s = pairs[0].astype(np.int64), pairs[1]  # in order of instants
-        n = len(which)
-        found = Carried(np.zeros((n, 6)), np.zeros((n, 12)), np.zeros((n, 6)))
-        groups, starts = np.unique(which // _TOGETHER, return_index=True)
+        groups, group_of = np.unique(which // _TOGETHER, return_inverse=True)
         stretch = self._stretches(groups)
-        inverses = self.spectrum.inverse(stretch.times_s, stretch.known)
-        weights = inverses @ stretch.steps
-        turns = np.zeros((2, n, 3))
-        for g, mine in enumerate(map(slice, starts, [*starts[1:], n])):
-            at = self.times_s[which[mine]] - stretch.about_s[g]
-            own = stretch.times_s[g], inverses[g], weights[g]
-            turns[:, mine] = self._fill(found, mine, at, lags_s[mine], *own)
-        before, after = turns
-        back = np.swapaxes(exp_rotation(before), -1, -2)
-        found.shifts[:, 3:] = log_rotation(exp_rotation(after) @ back)
-        for rates in (slice(3, 6), slice(9, 12)):
-            found.motions[:, rates] = spin(after, found.motions[:, rates])
-        where = where.ravel()
-        return Carried(*(part[where] for part in found))
-
-    def _fill(
-        self,
-        found: Carried,
-        mine: slice,
-        at_s: Array,
-        lags_s: Array,
-        times_s: Array,
-        inverse: Array,
-        weights: Array,
-    ) -> Array:
-        """Fills rows in, turns as rotation vectors; these before and after, (2, m, 3)."""
-        here = self.spectrum.covariance(at_s, times_s)
-        there, slope, bend = self.spectrum.slopes(at_s + lags_s, times_s)
-        before, after, rate, growth = (
-            (one @ weights) * self.deviations for one in (here, there, slope, bend)
+        patterns, waves = stretch.patterns(), self.spectrum.waves()
+        rows = motion_rows(
+            patterns,
+            inverse_covariances(patterns, waves),
+            np.ascontiguousarray(stretch.steps),
+            waves,
+            group_of,
+            self.times_s[which] - stretch.about_s[group_of],
+            lags_s,
         )
-        found.shifts[mine, :3] = after[:, :3] - before[:, :3]
-        found.motions[mine, :6], found.motions[mine, 6:] = rate, growth
-        apart = there - here
-        own = self.spectrum.covariance(lags_s, np.zeros(1))[:, 0]
-        whole = self.spectrum.covariance(np.zeros(1), np.zeros(1))[0, 0]
-        variance = 2.0 * (whole - own) - ((apart @ inverse) * apart).sum(axis=1)
+        before, after, rates, bends = (one * self.deviations for one in rows[:4])
+        shifts = after - before
+        back = np.swapaxes(exp_rotation(before[:, 3:]), -1, -2)
+        shifts[:, 3:] = log_rotation(exp_rotation(after[:, 3:]) @ back)
+        turned = [spin(after[:, 3:], one[:, 3:]) for one in (rates, bends)]
+        motions = np.concatenate([rates[:, :3], turned[0], bends[:, :3], turned[1]], axis=1)
         share = np.minimum(np.abs(lags_s) / self.spectrum.step_s, 1.0)
-        variance += self.spectrum.excess * 4.0 * np.sin(0.5 * np.pi * share) ** 2
-        found.variances[mine] = np.maximum(variance, 0.0)[:, None] * self.deviations**2
-        return np.stack([before[:, 3:], after[:, 3:]])
+        more = self.spectrum.excess * 4.0 * np.sin(0.5 * np.pi * share) ** 2
+        variances = np.maximum(rows.open + more, 0.0)[:, None] * self.deviations**2
+        where = where.ravel()
+        return Carried(shifts[where], motions[where], variances[where])
 
     def _stretches(self, groups: Ints) -> _Stretches:
         return _stretches(
@@ -131,6 +111,12 @@ class _Stretches(NamedTuple):
     about_s: Array
     steps: Array
     known: Mask
+
+    def patterns(self) -> Patterns:
+        """Those of even stamps without gaps have one in common."""
+        rows = np.concatenate([np.round(self.times_s / _SAME_TIME_S), 1.0 * self.known], axis=1)
+        _, first, of = np.unique(rows, axis=0, return_index=True, return_inverse=True)
+        return Patterns(self.times_s[first], self.known[first], of.ravel())
 
 
 def _stretches(
@@ -184,7 +170,8 @@ def course_of(
         size = float((steps**2).sum() / (stretch.known.sum() * max(sought.sum(), 1)))
         before = Spectrum.unknown(float(np.median(np.diff(times_s))), size)
     plain = Spectrum(before.step_s, before.power, 1.0)
-    spectrum = plain.improved(stretch.times_s, steps, stretch.known, _ROUNDS).with_noise()
+    steps = np.ascontiguousarray(steps)
+    spectrum = plain.improved(stretch.patterns(), steps, _ROUNDS).with_noise()
     return Course(times_s, positions_m, rotations, known, deviations, spectrum)
 
 

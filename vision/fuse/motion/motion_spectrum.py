@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.cdpr.frozen import freeze
+from freeswing.vision.fuse.motion.spectrum_kernels import Patterns, Waves, told_by_stretches
 
 Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 BANDS = 24
 """As many as 48 poses tell apart."""
@@ -68,82 +68,39 @@ class Spectrum:
             return None
         return float(_middles()[np.argmax(high)] / self.step_s)
 
-    def waves(self) -> tuple[Array, Array]:
-        """Frequencies in rad/s and their shares of the power, (m,) each."""
+    def waves(self) -> Waves:
+        """What the kernels take: the bands, then images of those that may be too fast."""
         bands = _middles()
         high = bands > HIGHEST
         power = np.where(high, 0.5, 1.0) * self.power
         hz = np.concatenate([bands, 1.0 - bands[high]]) / self.step_s
-        return 2.0 * np.pi * hz, np.concatenate([power, power[high]])
+        return Waves(
+            2.0 * np.pi * hz,
+            np.concatenate([power, power[high]]),
+            2.0 * np.pi * WIDTH * 0.5 / BANDS / self.step_s,
+            _CONSTANT * float(self.power.sum()),
+            self.noise,
+        )
 
-    @property
-    def width(self) -> float:
-        """Of each band, rad/s."""
-        return 2.0 * np.pi * WIDTH * 0.5 / BANDS / self.step_s
-
-    def covariance(self, one_s: Array, other_s: Array) -> Array:
-        """Of the motion at times (..., a) and (..., b), (..., a, b)."""
-        return self.slopes(one_s, other_s, 0)[0]
-
-    def slopes(self, one_s: Array, other_s: Array, count: int = 2) -> list[Array]:
-        """The covariance and its derivatives by the first times, (..., a, b) each."""
-        waves, power = self.waves()
-        here, there = one_s[..., None] * waves, other_s[..., None] * waves
-        cosines, sines = np.cos(there).swapaxes(-1, -2), np.sin(there).swapaxes(-1, -2)
-        c, s = np.cos(here) * power, np.sin(here) * power
-        apart = one_s[..., :, None] - other_s[..., None, :]
-        w2 = self.width**2
-        envelope = np.exp(-0.5 * w2 * apart**2)
-        plain = c @ cosines + s @ sines
-        found = [envelope * plain + _CONSTANT * float(self.power.sum())]
-        if count:
-            first = (c * waves) @ sines - (s * waves) @ cosines
-            second = -((c * waves**2) @ cosines + (s * waves**2) @ sines)
-            fall = -w2 * apart
-            found.append(envelope * (first + fall * plain))
-            found.append(envelope * (second + 2.0 * fall * first + (fall**2 - w2) * plain))
-        return found
-
-    def inverse(self, times_s: Array, known: Mask) -> Array:
-        """Of the covariance of poses with their noise, zero where not known, (..., n, n)."""
-        both = known[..., :, None] & known[..., None, :]
-        whole = np.where(both, self.covariance(times_s, times_s), 0.0)
-        whole += np.eye(times_s.shape[-1]) * np.where(known, self.noise, 1.0)[..., None]
-        return np.where(both, np.linalg.inv(whole), 0.0)
-
-    def improved(self, times_s: Array, steps: Array, known: Mask, rounds: int) -> Spectrum:
+    def improved(self, patterns: Patterns, steps: Array, rounds: int) -> Spectrum:
         """Nearer to what some stretches of poses are made of, each band as where most of it is.
 
         Args:
-            times_s: of the poses of each stretch, (g, n).
+            patterns: times of the poses of each stretch.
             steps: from a pose near the middle, in units of their deviations, (g, n, k).
-            known: (g, n).
             rounds: of improvement.
 
         Source:
             Foerstner, Wrobel 2016, Photogrammetric Computer Vision, sec. 4.2.4: components of
             variance in turns.
         """
-        arms = times_s[..., None] * (2.0 * np.pi / self.step_s * _middles())
-        shapes = np.concatenate([np.cos(arms), np.sin(arms)], axis=-1).swapaxes(-1, -2)
-        apart = times_s[..., :, None] - times_s[..., None, :]
-        envelope = np.exp(-0.5 * self.width**2 * apart**2)
-
-        def by_band(matrices: Array) -> Array:
-            each = ((shapes @ (envelope * matrices)) * shapes).sum(axis=(0, 2))
-            return np.asarray(each.reshape(2, BANDS).sum(axis=0))
-
-        found, pulled = self, steps
+        found, squares = self, np.ones((1, BANDS))
         for _ in range(rounds):
-            inverse = found.inverse(times_s, known)
-            pulled = inverse @ steps
-            squares = by_band(pulled @ pulled.swapaxes(-1, -2)) / steps.shape[-1]
-            power = found.power * squares / np.maximum(by_band(inverse), 1e-300)
+            told = told_by_stretches(patterns, steps, found.waves())
+            traces, squares = told.traces[:BANDS], told.squares[:, :BANDS]
+            power = found.power * squares.mean(axis=0) / np.maximum(traces, 1e-300)
             found = Spectrum(self.step_s, np.maximum(power, _LEAST_POWER), self.noise)
-        each = [
-            by_band(one[..., :, None] * one[..., None, :]) for one in np.moveaxis(pulled, -1, 0)
-        ]
-        liveliest = np.max(each, axis=0) / np.maximum(np.mean(each, axis=0), 1e-300)
+        liveliest = np.max(squares, axis=0) / np.maximum(np.mean(squares, axis=0), 1e-300)
         return Spectrum(self.step_s, found.power * np.maximum(liveliest, 1.0), self.noise)
 
     def with_noise(self) -> Spectrum:
