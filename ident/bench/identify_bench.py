@@ -34,6 +34,7 @@ from freeswing.ident.bench.told.report_objects import (
 )
 from freeswing.ident.bench.told.rolled import rolled_sentences
 from freeswing.ident.bench.told.scatter_by_kind import scatter_sentence
+from freeswing.ident.bench.two_wires.free_roll import not_freed_sentence
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,6 +195,8 @@ def _notes(found: Solved, bench: Bench, robot: Robot) -> list[str]:
     notes += filter(None, [exchange_sentence(fitted)])
     notes += filter(None, [unchecked_lengths(found, fitted)])
     notes += held_sentences(found)
+    scaled = any(run.coordinates for run in fitted)
+    notes += filter(None, [not_freed_sentence(found.swings[0].model, found.held, scaled)])
     if bench.loads and found.mass is None and bench.mass_std_kg is None:
         notes.append(
             "no run carries a known payload: the loads' inertia rests on the declared platform "

@@ -55,6 +55,23 @@ def rolls_unseen(model: Model, held: Held, scaled: bool) -> bool:
     return scaled and model.robot.n_cables == 2 and any(m[1:].any() for m in held.values())
 
 
+def not_freed_sentence(model: Model, held: Held, scaled: bool) -> str:
+    """That numbers which roll would show are still held at a fit's end, and why; or nothing.
+
+    Args:
+        model: of the bench.
+        held: which are held, by block, once all was fitted.
+        scaled: whether a coordinate was measured.
+    """
+    if not rolls_unseen(model, held, scaled):
+        return ""
+    return (
+        "what roll shows of bodies could not be fitted: no start led to a minimum. Centres of mass "
+        "and moments beside Izz are held where they are believed, and deviations are wide for it: "
+        "record one run with full poses"
+    )
+
+
 def unlevelled(swings: tuple[BenchSwing, ...], held: Held) -> tuple[BenchSwing, ...]:
     """The swings without what a level showed where centres of mass are held.
 

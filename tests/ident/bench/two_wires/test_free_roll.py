@@ -22,6 +22,7 @@ from freeswing.ident.bench.two_wires import free_roll
 from freeswing.ident.bench.two_wires.free_roll import (
     between,
     held_possible,
+    not_freed_sentence,
     possible_body,
     rolls_unseen,
     sides,
@@ -64,6 +65,7 @@ def of_izz(height: float, width: float) -> float:
 def test_roll_shows_what_two_wires_leave_unseen(wires, held, scaled, free) -> None:
     model = SimpleNamespace(robot=SimpleNamespace(n_cables=wires))
     assert rolls_unseen(model, held, scaled) == free
+    assert bool(not_freed_sentence(model, held, scaled)) == free, "held at a fit's end all the same"
 
 
 def test_held_moments_spread_as_those_of_bodies_that_have_this_izz() -> None:
