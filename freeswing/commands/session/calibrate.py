@@ -50,6 +50,7 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
     from freeswing.cdpr.files.robot_file import read_robot
 
     source = session.calibration
+    _tell_unreadable(session, console)
     if settings.get("scene") or (source and source.scene and source.recordings is None):
         return _made(_by_scene(session, console, settings), session, console, {})
     if source is None or source.recordings is None or source.board is None:
@@ -115,6 +116,18 @@ def _made(
         console.complain(warning)
     files = ((session.cameras, cameras_text(found.cameras).encode()),)
     return Made((("calibration.json", document),), files)
+
+
+def _tell_unreadable(session: Session, console: Console) -> None:
+    """Files of the session that only later commands need, wrong: said here, before those refuse."""
+    from freeswing.cdpr.files.documents import InputError
+    from freeswing.session.load_swings import load_robot, load_target
+
+    for load in (load_robot, load_target):
+        try:
+            load(session)
+        except InputError as error:
+            console.complain(f"{error}; cameras can be calibrated, track and identify will refuse")
 
 
 def _swings(session: Session) -> SwingFilms | None:

@@ -132,6 +132,19 @@ def test_columns_and_rows_exchanged_are_named(few, tmp_path, capsys) -> None:
     assert "columns and rows are exchanged, 7 x 6" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("name", ["target.toml", "robot.toml"])
+def test_a_file_that_only_later_commands_need_is_named_already(
+    few, tmp_path, capsys, name
+) -> None:
+    """Whatever comes of the boards: whoever calibrates on Monday is not refused on Tuesday."""
+    folder = session(tmp_path / "s", few)
+    (folder / name).write_text("format = 3\n", encoding="utf-8")
+    main(["calibrate", str(folder), "--quiet"])
+    said = capsys.readouterr().err
+    assert f"{folder / name}: " in said, said
+    assert "cameras can be calibrated, track and identify will refuse" in said, said
+
+
 def test_squares_in_millimetres_are_named(few, tmp_path, capsys) -> None:
     folder = session(tmp_path / "s", few, square_m=24, marker_m=18)
     assert main(["calibrate", str(folder), "--quiet"]) == 2
