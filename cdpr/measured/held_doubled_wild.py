@@ -134,9 +134,9 @@ def _is_finer(values: Array, same: Mask) -> bool:
 
 def _wild(values: Array, times_s: Array, coordinates: tuple[str, ...]) -> list[tuple[int, int]]:
     """First and last of each few samples that lie far from those around them."""
-    single = _single(values)
+    single = _single(values, times_s)
     rest = np.where(single[:, None], np.nan, values)
-    steps, known = _steps(rest, coordinates), np.asarray(np.isfinite(rest).all(axis=1))
+    steps, known = _steps(rest, times_s, coordinates), np.asarray(np.isfinite(rest).all(axis=1))
     found = [(k, k) for k in np.flatnonzero(single).tolist()]
     joined = known[1:] & known[:-1] & ~steps.any(axis=1)
     starts = np.flatnonzero(known & ~np.concatenate([[False], joined])).tolist()
@@ -161,37 +161,45 @@ def _stands_off(steps: Array, first: int, last: int) -> bool:
     return bool(((np.abs(there + back) < BACK_WITHIN * sizes) & (sizes > 0.0)).any())
 
 
-def _single(values: Array) -> Mask:
-    """Samples far from the middle of their neighbours, (n_t,)."""
+def _single(values: Array, times_s: Array) -> Mask:
+    """Samples far from the line through their neighbours, (n_t,)."""
     wild = np.zeros(len(values), dtype=bool)
     if len(values) < 2 * FEWEST_HELD:
         return wild
     off = np.full(values.shape, np.nan)
-    off[1:-1] = values[1:-1] - 0.5 * (values[2:] + values[:-2])
+    ahead = np.full(len(values), np.nan)  # how much of that line is the sample after
+    ahead[1:-1] = (times_s[1:-1] - times_s[:-2]) / (times_s[2:] - times_s[:-2])
+    after_counts = ahead[1:-1, None]
+    off[1:-1] = values[1:-1] - after_counts * values[2:] - (1.0 - after_counts) * values[:-2]
+    pulls = np.nan_to_num(ahead[:-2], nan=0.5), np.nan_to_num(1.0 - ahead[2:], nan=0.5)
     for column in off.T:
         known = np.isfinite(column)
         if known.sum() < FEWEST_HELD:
             continue
         usual = NORMAL_BY_MAD * float(np.median(np.abs(column[known])))
         size = np.nan_to_num(np.abs(column))
-        # It pulls the middles of both neighbours half as far as it lies off, and no others do.
+        # It pulls both neighbours' lines by its part of how far it lies off, and no others do: half
+        # where stamps are even.
         before, here, after = column[:-2], column[1:-1], column[2:]
         halves = [
-            np.isnan(one) | (np.abs(one + 0.5 * here) < HALF_WITHIN * np.abs(here))
-            for one in (before, after)
+            np.isnan(one) | (np.abs(one + part * here) < HALF_WITHIN * np.abs(here))
+            for one, part in zip((before, after), pulls, strict=True)
         ]
         told = halves[0] & halves[1] & (np.isfinite(before) | np.isfinite(after))
         wild[1:-1] |= told & (size[1:-1] > WILD_DEVIATIONS * usual) & (usual > 0.0)
     return wild
 
 
-def _steps(values: Array, coordinates: tuple[str, ...]) -> Array:
-    """Steps from one sample to the next beyond their neighbours', 0 where usual, (n_t - 1, n_c)."""
-    steps = np.diff(values, axis=0)
+def _steps(values: Array, times_s: Array, coordinates: tuple[str, ...]) -> Array:
+    """Steps from one sample to the next beyond their neighbours', 0 where usual, (n_t - 1, n_c).
+
+    Neighbours' steps count by how long they took: where frames were thrown away some are longer.
+    """
+    steps, took_s = np.diff(values, axis=0), np.diff(times_s)[:, None]
     if len(steps) < 2 * FEWEST_HELD:
         return np.zeros(steps.shape)
-    padded = np.pad(steps, ((2, 2), (0, 0)), constant_values=np.nan)
-    around = np.stack([padded[k : len(steps) + k] for k in (0, 1, 3, 4)])
+    padded = np.pad(steps / took_s, ((2, 2), (0, 0)), constant_values=np.nan)
+    around = np.stack([padded[k : len(steps) + k] for k in (0, 1, 3, 4)]) * took_s
     beyond = np.nan_to_num(steps - around, nan=np.inf)  # of what a gap hides nothing is said
     nearest = np.abs(beyond).argmin(axis=0)
     off = np.take_along_axis(beyond, nearest[None], axis=0)[0]
@@ -199,7 +207,8 @@ def _steps(values: Array, coordinates: tuple[str, ...]) -> Array:
     usual = NORMAL_BY_MAD * np.median(np.abs(off), axis=0)
     least = [LEAST_STEP_M if name in ("x", "y", "z") else LEAST_STEP_RAD for name in coordinates]
     limit = np.where(usual > 0.0, np.maximum(STEP_DEVIATIONS * usual, least), np.inf)
-    return np.where(np.abs(off) > limit, off, 0.0)
+    longer = np.maximum(took_s / np.median(took_s), 1.0)
+    return np.where(np.abs(off) > limit * longer**2, off, 0.0)  # accelerations bend it by squares
 
 
 def _wild_text(trajectory: Trajectory, values: Array, first: int, last: int) -> str:

@@ -207,13 +207,13 @@ def with_spike(deviations: float, lopsided: float = 0.0) -> np.ndarray:
 
 @pytest.mark.parametrize(("deviations", "wild"), [(45.0, False), (56.0, True)])
 def test_a_sample_is_wild_beyond_fifty_deviations(deviations, wild):
-    assert bool(_single(with_spike(deviations))[250]) == wild
+    assert bool(_single(with_spike(deviations), TIMES)[250]) == wild
 
 
 @pytest.mark.parametrize(("lopsided", "wild"), [(0.21, True), (0.26, False)])
 def test_a_wild_sample_pulls_both_neighbours_by_half(lopsided, wild):
     """What moves a neighbour too is a motion: here/after keep half, before is that far from it."""
-    assert bool(_single(with_spike(1000.0, lopsided))[250]) == wild
+    assert bool(_single(with_spike(1000.0, lopsided), TIMES)[250]) == wild
 
 
 @pytest.mark.parametrize(("step_s", "followed"), [(0.9, True), (1.1, False)])
@@ -224,3 +224,33 @@ def test_steps_at_which_no_swing_is_followed(step_s, followed):
     else:
         with pytest.raises(InputError, match="times are in seconds"):
             check_stamps(made, "a.csv")
+
+
+def thinned(seed: int, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Every tenth row thrown away, stamps kept: twice and three times the step here and there."""
+    keep = np.random.default_rng(seed).random(len(TIMES)) > 0.1
+    keep[[0, 249, 250, 251]] = True
+    return values[keep], TIMES[keep]
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_steps_over_dropped_rows_are_no_jumps(seed):
+    """A turn of 1.5 rad/s: three steps at once are 45 mrad."""
+    values = swing(noise=3e-4, seed=seed)
+    values[:, 0] = 1.5 * TIMES + 3e-4 * np.random.default_rng(seed).normal(size=len(TIMES))
+    values, times = thinned(seed, values)
+    found = sound_samples(Trajectory(times, ("chi", "y"), values))
+    assert found.notes == ()
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_wild_samples_beside_dropped_rows_are_found(seed):
+    values = swing()
+    values[250, 1] += 0.05
+    values[100:120, 0] += 0.3
+    values, times = thinned(seed, values)
+    found = sound(values, times)
+    off = times[~found.is_known]
+    assert 2.5 in off
+    assert np.array_equal(off[off < 2.0], times[(times > 0.995) & (times < 1.195)]), off
+    assert len(found.notes) == 2, found.notes

@@ -133,9 +133,7 @@ def test_columns_and_rows_exchanged_are_named(few, tmp_path, capsys) -> None:
 
 
 @pytest.mark.parametrize("name", ["target.toml", "robot.toml"])
-def test_a_file_that_only_later_commands_need_is_named_already(
-    few, tmp_path, capsys, name
-) -> None:
+def test_a_file_that_only_later_commands_need_is_named_already(few, tmp_path, capsys, name) -> None:
     """Whatever comes of the boards: whoever calibrates on Monday is not refused on Tuesday."""
     folder = session(tmp_path / "s", few)
     (folder / name).write_text("format = 3\n", encoding="utf-8")
