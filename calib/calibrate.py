@@ -41,6 +41,7 @@ from freeswing.calib.verdict.calibration_result import (
     covariance_entry,
 )
 from freeswing.calib.verdict.halves_and_lengths import check_truth, widened
+from freeswing.calib.verdict.platform_layout import layout_entry
 from freeswing.calib.verdict.plumb_line import StringView, find_vertical, vertical_entry
 from freeswing.calib.verdict.plumb_line_file import read_plumb_line
 from freeswing.calib.verdict.survey_check import SurveyCheck, check_survey
@@ -171,7 +172,7 @@ def calibrate_session(
     warnings += [*rig_warnings(rig, truth.spread), *lens_warnings(rig.cameras, lenses)]
     verdict = replace(verdict, warnings=(*warnings, *verdict.warnings))
     verdict, vertical = _with_vertical(verdict, rig, strings, beside.plumb_line)
-    document = {**_document(rig, board, sightings, verdict), **vertical}
+    document = {**_document(rig, board, sightings, verdict), **vertical, **_layout(rig)}
     for entry, choice in zip(document["cameras"], lenses, strict=True):
         entry["lens_models_held_out_px"] = choice.held_out_px
     told("calibrated", 1.0)
@@ -277,7 +278,7 @@ def rig_from_sightings(
         all_seen.layout_std_m,
     )
     guessed = tuple(sightings[k].name for k in all_seen.unknown)
-    return replace(rig, guessed_clocks=guessed), alone
+    return replace(rig, guessed_clocks=guessed, platform=tags), alone
 
 
 def _tie(
@@ -340,6 +341,12 @@ def _document(
         },
         "covariance": covariance_entry(rig),
     }
+
+
+def _layout(rig: Rig) -> dict[str, Any]:
+    """`layout` of the document where the platform's tags tie the cameras."""
+    entry = layout_entry(rig)
+    return {} if entry is None else {"layout": entry}
 
 
 def _base_frame(rig: Rig) -> dict[str, Any]:

@@ -33,6 +33,7 @@ from freeswing.vision.fuse.tag_layout import layout_change, with_layout
 from freeswing.vision.jobs import Job, run_jobs
 from freeswing.vision.look.sightings import collect_sightings
 from freeswing.vision.look.target_check import examined_watch
+from freeswing.vision.look.tied_tags import tied_watch
 from freeswing.vision.look.watched_target import Watch
 from freeswing.vision.settings import Settings
 from freeswing.vision.track_run import RunTrack, track_run
@@ -104,8 +105,10 @@ def track_session(
     remarks = {name: examined(found, frame_rate_hz) for name, found in pairs}
     for run in filmed:
         remarks[run.name] += unmatched(run, cameras)
+    stated = watch.tag_corners_m
+    watch, tied = tied_watch(watch, results / "calibration.json")
     watch, said = examined_watch(watch, pairs[0][1])
-    remarks[pairs[0][0]] += said
+    remarks[pairs[0][0]] += [*tied, *said]
     jobs = [
         Job(
             f"{name} {camera.name}",
@@ -119,7 +122,7 @@ def track_session(
     sources = _by_run(pairs, paths)
     told = _scaled(progress, _FOLLOWING, 1.0)
     tracks = _fuse(sources, watch, results, settings, workers, told)
-    change = layout_change([track.layout for track in tracks], watch)
+    change = layout_change([track.layout for track in tracks], watch).against(stated)
     if settings.refine_layout:
         for _ in range(_LAYOUT_ROUNDS):
             refined = layout_change([track.layout for track in tracks], watch)

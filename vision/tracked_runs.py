@@ -21,6 +21,7 @@ from freeswing.vision.fuse.tag_layout import with_layout
 from freeswing.vision.look.pieces import Piece, load_piece
 from freeswing.vision.look.sightings import collect_sightings
 from freeswing.vision.look.target_check import examined_watch
+from freeswing.vision.look.tied_tags import tied_watch
 from freeswing.vision.look.watched_target import Watch
 from freeswing.vision.rig.rig_step import Finding
 from freeswing.vision.track_session import RecordedRun, run_recordings, sightings_folder
@@ -98,7 +99,8 @@ def tracked_run(
     if not csv.is_file():
         raise DataError(f"run {run.name}: {csv} is not there; run freeswing track first")
     recordings = run_recordings(run, cameras)
-    watch, _ = examined_watch(Watch.of(target, base_tags), recordings)
+    watch, _ = tied_watch(Watch.of(target, base_tags), results / "calibration.json")
+    watch, _ = examined_watch(watch, recordings)
     seen = []
     for camera, recording in recordings:
         folder = sightings_folder(results, run.name)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.calib.board.motion_pieces import Timeline, in_pieces
+from freeswing.calib.board.platform_as_board import PlatformTags
 from freeswing.calib.camera.camera import Camera
 from freeswing.calib.camera.intrinsics import CameraStart, start_camera
 from freeswing.calib.camera.lens_models import Array
@@ -27,7 +28,7 @@ from freeswing.calib.rig.outliers import (
     views_kept,
     without_far_corners,
 )
-from freeswing.calib.rig.reprojection import Scene, board_size, camera_slices
+from freeswing.calib.rig.reprojection import Scene, camera_slices
 from freeswing.calib.rig.reprojection_kernels import CLOCK, POSE, WARP
 from freeswing.calib.rig.survey_noise import survey_std
 from freeswing.calib.rig.tie_by_shared_boards import BaseTie, board_groups, place_in_base, start_rig
@@ -48,6 +49,7 @@ class Rig:
         dropped: views left out, by name.
         n_trimmed: single corners left out.
         guessed_clocks: cameras whose start is only known by their stamps, by name.
+        platform: the platform's tags where they take part beside the board, else None.
     """
 
     adjustment: Adjustment
@@ -56,6 +58,7 @@ class Rig:
     dropped: tuple[DroppedView, ...]
     n_trimmed: int
     guessed_clocks: tuple[str, ...] = ()
+    platform: PlatformTags | None = None
 
     @property
     def cameras(self) -> tuple[Camera, ...]:
@@ -65,8 +68,7 @@ class Rig:
     @property
     def is_tied_by_swings(self) -> bool:
         """Whether the platform's tags take part beside the board."""
-        points = self.problem.board_points_m
-        return board_size(points) < len(points)
+        return self.platform is not None
 
 
 def start_cameras(

@@ -22,7 +22,7 @@ TANGENT = (
     "pose entries tx_m ty_m tz_m rx_rad ry_rad rz_rad: t_true = t + dt, R_true = exp(dr) R of "
     "T_camera_base; base_point entries are metres in the base frame"
 )
-_MOST_BYTES = 1 << 28
+MOST_BYTES = 1 << 28
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +71,7 @@ def read_camera_covariance(path: Path | str) -> CameraCovariance:
         InputError: when the file is not such a document.
     """
     try:
-        document = json.loads(read_text(path, _MOST_BYTES))
+        document = json.loads(read_text(path, MOST_BYTES))
         if document.get("format") != FORMAT:
             raise InputError(f'{path}: format is {document.get("format")!r}, expected "{FORMAT}"')
         names = tuple(str(name) for name in document["covariance"]["names"])

@@ -117,6 +117,26 @@ class CalibratedBoard(Entry):
 
 
 @entry
+class TiedTag(Entry):
+    """Where a tag of the platform sits, and where target.toml had it; TL TR BR BL."""
+
+    family: str = ""
+    id: int | None = None
+    mismatch_mm: float | None = None
+    std_mm: float | None = None
+    corners_platform_m: tuple[Numbers, ...] = ()
+    target_corners_m: tuple[Numbers, ...] = ()
+
+
+@entry
+class TiedLayout(Entry):
+    """The places of the platform's tags that cameras were tied by."""
+
+    worst_mismatch_mm: float | None = None
+    tags: tuple[TiedTag, ...] = ()
+
+
+@entry
 class Adjustment(Entry):
     """How the bundle adjustment went; the condition is null where the rank does not suffice."""
 
@@ -144,6 +164,7 @@ class Calibration(Document):
         covariance: of all cameras together.
         vertical: the plumb line, where there was one.
         beside_colmap: each camera by COLMAP, where that was asked for.
+        layout: of the platform's tags, where these tie the cameras.
     """
 
     kind: ClassVar[str] = "calibration"
@@ -160,3 +181,4 @@ class Calibration(Document):
     covariance: Covariance | None = None
     vertical: Vertical | None = absent(default=None)
     beside_colmap: tuple[BesideColmap, ...] = absent(default=())
+    layout: TiedLayout | None = absent(default=None)

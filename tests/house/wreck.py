@@ -768,18 +768,19 @@ HELD = (
     Held(
         "cdpr/measured/quaternion_readings.py",
         ("LEFT_OVER",),
-        "tests/freeswing/doctor/test_orientations_against_lengths.py::test_what_is_left_by_the_right_reading",
+        "tests/freeswing/doctor/test_recordings_against_lengths.py::test_what_is_left_by_the_right_reading",
     ),
     Held(
-        "freeswing/doctor/orientations_against_lengths.py",
+        "freeswing/doctor/recordings_against_lengths.py",
         ("LENGTHS_OFF_M",),
-        "tests/freeswing/doctor/test_orientations_against_lengths.py::test_what_is_left_by_the_right_reading",
+        "tests/freeswing/doctor/test_recordings_against_lengths.py::test_what_is_left_by_the_right_reading",
     ),
     Held(
         "vision/rig/lag_accepted.py",
         ("REACH_FRAMES", "SURE_SIGMAS", "_LEAST_COMPARED", "_SAME_START_S"),
         START,
     ),
+    Held("vision/look/tied_tags.py", ("SAME_PLACE_M",), "tests/vision/look/test_tied_tags.py"),
     Held("vision/rig/correct_rig.py", ("_LEAST_KNOWN",), START),
     Held("vision/rig/lag_search.py", ("_LEAST_OVERLAP",), START),
     Held("vision/rig/rig_step.py", ("_KEEP_SCORE", "STRETCH_S", "LEAST_PARTS"), START),

@@ -43,6 +43,11 @@ class LayoutChange:
     change_m: Array
     std_m: Array
 
+    def against(self, stated_m: Array) -> LayoutChange:
+        """The same with changes from where a file has the tags, (n, 4, 3)."""
+        off = self.corners_m - stated_m
+        return replace(self, change_m=np.sqrt((off**2).sum(axis=2).mean(axis=1)))
+
 
 def layout_sums(poses: Poses, fit: Fit, views: Sequence[CameraViews], watch: Watch) -> LayoutSums:
     """What one run says about the layout."""

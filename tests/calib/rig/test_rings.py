@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 
 from freeswing.calib.camera.camera import Camera
 from freeswing.calib.camera.cameras_file import read_cameras
@@ -19,6 +20,7 @@ from freeswing.calib.rig.triangulation import triangulate
 from freeswing.calib.rig.views import FixedPoints, Views, make_views
 from freeswing.calib.verdict.halves_and_lengths import rigidly_fitted, volume_std_m
 from freeswing.cdpr.files.documents import DataError, dump_toml
+from freeswing.cdpr.files.trajectory_files import read_trajectory
 from freeswing.cdpr.measured.target import Tag, Target, write_target
 from freeswing.cdpr.rotation import exp_rotation, invert, log_rotation, transform
 from freeswing.main import main
@@ -329,10 +331,41 @@ def test_the_swings_tie_a_ring(tmp_path, count) -> None:
     # without base tags the frame is a camera's, and goes with its lens: what is left is the rig's
     error = rms(seen - rigidly_fitted(points, seen))
     assert error < 2e-4, f"{1e3 * error:.3f} mm"
+    assert document["layout"]["worst_mismatch_mm"] > 0.2, document["layout"]
+    check_track(tmp_path)
     for camera, one in zip(found, cameras, strict=True):
         late = camera.clock_offset_s - found[0].clock_offset_s
         wanted = one.clock_offset_s - cameras[0].clock_offset_s
         assert abs(late - wanted) < 2e-4, (camera.name, late, wanted)
+
+
+def check_track(folder: Path) -> None:
+    """Tracked by the cameras and tags of one fit: nothing is off, and claims of poses hold.
+
+    Both frames are free, 12 numbers: the base is a camera's, and what all tags do together is none
+    of theirs. With target.toml's own places cameras were 0.37 mm apart and two of them moved.
+    """
+    assert main(["track", str(folder), "--quiet"]) == 0
+    told = json.loads((folder / "results" / "tracking.json").read_text())
+    assert told["runs"][0]["problems"] == []
+    assert told["effects"] == []
+    assert told["layout"]["worst_mismatch_mm"] > 0.2, told["layout"]
+    track = read_trajectory(folder / "results" / "tracks" / "swing.csv")
+    deviations = track.standard_deviations()
+    assert deviations is not None
+    places, turns = swing(track.times_s)
+    first = log_rotation(track.rotations()[0] @ turns[0].T)
+    start = np.concatenate([first, track.positions()[0] - exp_rotation(first) @ places[0]])
+
+    def off(frames: np.ndarray) -> np.ndarray:
+        base, inner = exp_rotation(frames[:3]), exp_rotation(frames[6:9])
+        at = (places + turns @ frames[9:]) @ base.T + frames[3:6]
+        turned = track.rotations() @ np.swapaxes(base @ turns @ inner, 1, 2)
+        errors = np.concatenate([track.positions() - at, log_rotation(turned)], axis=1)
+        return (errors / deviations).ravel()
+
+    z = least_squares(off, np.concatenate([start, np.zeros(6)]), x_scale="jac").fun
+    assert np.sqrt(np.mean(z**2)) < 1.5, np.sqrt(np.mean(z.reshape(-1, 6) ** 2, axis=0))
 
 
 def rms(off: np.ndarray) -> float:
