@@ -11,7 +11,7 @@ from freeswing.cdpr.robot import Robot
 from freeswing.doctor.bench_units import refuse_wrong_units
 from freeswing.doctor.exchanged_by_lean import refuse_exchanged_by_lean
 from freeswing.doctor.finding import Finding
-from freeswing.doctor.orientations_against_lengths import refuse_mistaken_quaternions
+from freeswing.doctor.recordings_against_lengths import refuse_mistaken_recordings
 from freeswing.doctor.run_samples import run_findings
 from freeswing.ident.bench.identify_bench import check_runs
 from freeswing.ident.bench.runs import Bench
@@ -67,6 +67,6 @@ def refuse_wrong_bench_runs(bench: Bench, robot: Robot) -> None:
     refuse_wrong_units(bench, robot)
     swings = coordinate_swings(bench)
     refuse_repeated(swings)
-    refuse_mistaken_quaternions(swings, robot)
+    refuse_mistaken_recordings(swings, robot)
     refuse_exchanged_lengths(swings, robot, BENCH_DIFFERENCE_M)
     refuse_exchanged_by_lean(bench, robot)

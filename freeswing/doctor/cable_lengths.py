@@ -13,7 +13,7 @@ from freeswing.cdpr.model.equations import build_model
 from freeswing.cdpr.robot import Robot
 from freeswing.cdpr.rotation import transform
 from freeswing.doctor.finding import Finding
-from freeswing.doctor.orientations_against_lengths import mistaken_quaternions
+from freeswing.doctor.recordings_against_lengths import mistaken_recording
 from freeswing.ident.runs import SwingRun
 from freeswing.session.exchanged_lengths import (
     LENGTH_DIFFERENCE_M,
@@ -63,18 +63,18 @@ def cable_findings(
     poses = part.values[part.is_known]
     lengths = evaluate(model.lengths, poses, model.start_values)[0].reshape(len(poses), -1)
     if not np.isfinite(lengths).all():
-        said, remedy = mistaken_quaternions(run, robot)
+        said, remedy = mistaken_recording(run, robot)
         if said:
             yield Finding("error", subject, said, remedy)
             return
         text = "the poses put a cable inside its pulley or on its swivel axis"
         yield Finding("error", subject, text, "check the base frame of the poses and entry_m")
         return
-    yield from _turned(subject, part, robot, lengths)
-    said, remedy = mistaken_quaternions(run, robot)
+    said, remedy = mistaken_recording(run, robot)
     if said:
         yield Finding("error", subject, said, remedy)
         return
+    yield from _turned(subject, part, robot, lengths)
     for cable, column in zip(robot.cables, lengths.T, strict=True):
         spread = float(np.ptp(np.percentile(column, [1.0, 99.0])))
         if spread > LENGTH_CHANGE_M:

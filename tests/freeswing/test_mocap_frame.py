@@ -31,7 +31,8 @@ def say(folder: Path, section: str) -> None:
 def test_y_up_is_hinted_at_and_turned(lab: Path) -> None:
     before = positions(lab)
     move(lab, Y_UP, np.zeros(3))
-    lines = [line for line in checked(lab)[1] if "if its axis y points up" in line]
+    told = "its axis y points up: cable lengths are off by"
+    lines = [line for line in checked(lab)[1] if told in line]
     assert len(lines) == 3, lines
     assert '[mocap] up = "y"' in lines[0]
     say(lab, '\n[mocap]\nup = "y"\n')

@@ -52,7 +52,7 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
     from freeswing.cdpr.effects import catalogue
     from freeswing.cdpr.files.documents import InputError
     from freeswing.cdpr.system.threads import threads
-    from freeswing.doctor.orientations_against_lengths import refuse_mistaken_quaternions
+    from freeswing.doctor.recordings_against_lengths import refuse_mistaken_recordings
     from freeswing.ident.diagnose.diagnose import diagnose
     from freeswing.results.diagnosis import Diagnosis
     from freeswing.results.motion_from_results import ladder_motions
@@ -74,7 +74,7 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
     with threads(count):
         swings = list(load_swings(session, robot, load_target(session)))
         refuse_repeated(swings)
-        refuse_mistaken_quaternions(swings, robot)
+        refuse_mistaken_recordings(swings, robot)
         refuse_exchanged_lengths(swings, robot)
         found = diagnose(swings, robot, console.progress, count, candidates, crew.executor)
     document = Diagnosis.from_json(found.document())

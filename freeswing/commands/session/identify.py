@@ -70,7 +70,7 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
 
     from freeswing.cdpr.files.documents import InputError
     from freeswing.cdpr.system.threads import threads
-    from freeswing.doctor.orientations_against_lengths import refuse_mistaken_quaternions
+    from freeswing.doctor.recordings_against_lengths import refuse_mistaken_recordings
     from freeswing.ident.identify import IdentifySettings, identify
     from freeswing.ident.likelihood.cable_ends import GeometryPriors
     from freeswing.ident.swing_places import swing_places
@@ -93,7 +93,7 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
         markers = read_marker_runs(session, target)
         swings = load_swings(session, robot, target, markers)
     refuse_repeated(swings)
-    refuse_mistaken_quaternions(swings, robot)
+    refuse_mistaken_recordings(swings, robot)
     refuse_exchanged_lengths(swings, robot)
     try:
         geometry = GeometryPriors(settings.get("entry_std_m"), settings.get("attachment_std_m"))

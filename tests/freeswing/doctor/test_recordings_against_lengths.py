@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from dataclasses import replace
+from itertools import chain, repeat
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ from freeswing.cdpr.files.robot_file import read_robot
 from freeswing.cdpr.files.trajectory_files import read_trajectory
 from freeswing.cdpr.measured.quaternion_readings import READINGS
 from freeswing.cdpr.measured.trajectory import Trajectory
-from freeswing.doctor.orientations_against_lengths import mistaken_quaternions
+from freeswing.doctor.recordings_against_lengths import mistaken_recording
 from freeswing.ident.runs import SwingRun
 from freeswing.main import main
 from tests.places import SAMPLES
@@ -47,7 +48,7 @@ def test_each_is_named(order: str, inverse: bool, said: str, tmp_path: Path) -> 
     shutil.copy(SAMPLE / "runs" / "swing-01.csv", path)
     written(path, order, inverse)
     run = SwingRun("swing-01", "identify", read_trajectory(path))
-    found, remedy = mistaken_quaternions(run, ROBOT)
+    found, remedy = mistaken_recording(run, ROBOT)
     assert found.startswith(said), found
     assert remedy == READINGS[said[:-1]][1]
 
@@ -66,11 +67,11 @@ def test_commands_name_it(command: str, tmp_path: Path, capsys: pytest.CaptureFi
 
 def test_what_is_right_and_what_is_merely_wrong_is_not_named() -> None:
     right = SwingRun("a", "identify", read_trajectory(SAMPLE / "runs" / "swing-01.csv"))
-    assert mistaken_quaternions(right, ROBOT) == ("", "")
+    assert mistaken_recording(right, ROBOT) == ("", "")
     seen = right.trajectory
     moved = Trajectory.from_poses(seen.times_s, seen.positions() + 0.3, seen.rotations())
     far = replace(right, trajectory=moved, lengths_m=np.array([1.0, 1.0, 1.0]))
-    assert mistaken_quaternions(far, ROBOT) == ("", "")
+    assert mistaken_recording(far, ROBOT) == ("", "")
 
 
 @pytest.mark.parametrize(
@@ -84,13 +85,13 @@ def test_what_is_right_and_what_is_merely_wrong_is_not_named() -> None:
 )
 def test_what_is_left_by_the_right_reading(monkeypatch, off_m, left_m, named) -> None:
     """Lengths off by 2 cm, of which the right reading leaves a fifth at most."""
-    off = iter([off_m, left_m, off_m, off_m])
+    off = chain([off_m, left_m], repeat(off_m))
     monkeypatch.setattr(
-        "freeswing.doctor.orientations_against_lengths._lengths_off", lambda *_: next(off)
+        "freeswing.doctor.recordings_against_lengths._lengths_off", lambda *_: next(off)
     )
-    monkeypatch.setattr("freeswing.doctor.orientations_against_lengths.build_model", lambda _: None)
+    monkeypatch.setattr("freeswing.doctor.recordings_against_lengths.build_model", lambda _: None)
     still = Trajectory.from_poses(np.arange(9.0), np.zeros((9, 3)), np.tile(np.eye(3), (9, 1, 1)))
-    assert bool(mistaken_quaternions(SwingRun("a", "identify", still), ROBOT)[0]) == named
+    assert bool(mistaken_recording(SwingRun("a", "identify", still), ROBOT)[0]) == named
 
 
 def test_a_driven_session_is_told_so_too(

@@ -1,0 +1,124 @@
+"""Recordings that were meant otherwise: in another unit or axes, quaternions as x y z w or inverse.
+
+Every turn is a turn and every number a length, so no file tells it. Locked cables do: they keep
+their length, and the one that is stated, where a recording is read as it was meant. Mistakes come
+together, so every unit is tried with all axes and orders.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from freeswing.cdpr.files.problems import DataError
+from freeswing.cdpr.measured.quaternion_readings import LEFT_OVER, READINGS
+from freeswing.cdpr.measured.recording_to_base_frame import UP_TURNS, moved_trajectory
+from freeswing.cdpr.measured.trajectory import Trajectory
+from freeswing.cdpr.model.batch import evaluate
+from freeswing.cdpr.model.equations import Model, build_model
+from freeswing.cdpr.robot import Array, Robot
+from freeswing.cdpr.rotation import matrix_from_quaternion, quaternion_from_matrix, transform
+from freeswing.ident.runs import SwingRun
+
+# Geometry known to a centimetre moves lengths by some mm along a swing: more is another matter.
+LENGTHS_OFF_M = 0.02
+UNITS_M = {"millimetres": 1e-3, "centimetres": 1e-2, "inches": 0.0254, "feet": 0.3048}
+SAMPLES_TRIED = 200
+"""Looked at of a run; cables that keep their length keep it in any of them."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Reading:
+    """Poses as they may have been meant: what each mistake is called, and what to do about it."""
+
+    poses: Trajectory
+    said: tuple[str, ...]
+    remedies: tuple[str, ...]
+
+
+def mistaken_recording(run: SwingRun, robot: Robot) -> tuple[str, str]:
+    """How a run's poses were meant, and what to do; empty where they are read right.
+
+    Of readings that leave nearly as little the one with the fewest mistakes is told.
+
+    Source:
+        Murray, Li, Sastry 1994, A Mathematical Introduction to Robotic Manipulation, ch. 2: unit
+        quaternions, their order and conjugate.
+    """
+    try:
+        part = run.trajectory.window(*run.window_s) if run.window_s else run.trajectory
+    except DataError:  # an empty window is said where the run is prepared
+        return "", ""
+    part = part.take(part.is_known) if part.is_pose and part.is_known.any() else None
+    if part is None:
+        return "", ""
+    model = build_model(robot)
+    found = _lengths_off(model, part, run.lengths_m)
+    if found < LENGTHS_OFF_M:
+        return "", ""
+    readings = list(_readings(part))
+    off = np.array([_lengths_off(model, one.poses, run.lengths_m) for one in readings])
+    if off.min() > LEFT_OVER * found:
+        return "", ""
+    nearly = [k for k in range(len(off)) if off[k] <= min(off.min() / LEFT_OVER, LEFT_OVER * found)]
+    best = min(nearly, key=lambda k: (len(readings[k].said), off[k]))
+    told = (
+        f"cable lengths are off by {1e3 * found:.0f} mm" if np.isfinite(found) else "no cable fits"
+    )
+    said, remedy = ", ".join(readings[best].said), "; ".join(readings[best].remedies)
+    return f"{said}: {told} as recorded, by {1e3 * off[best]:.1f} mm so", remedy
+
+
+def _readings(part: Trajectory) -> Iterator[_Reading]:
+    """All other ways to read some of a run's poses."""
+    part = part.take(np.arange(len(part))[:: max(1, len(part) // SAMPLES_TRIED)])
+    q = quaternion_from_matrix(part.rotations())
+    # q and -q are one turn, but not once w stands elsewhere: signs follow the sample before.
+    signs = np.cumprod(np.where(np.sum(q[1:] * q[:-1], axis=1) < 0.0, -1.0, 1.0))
+    q[1:] *= signs[:, None]
+    orders = [("", (lambda same: same), ""), *((name, *how) for name, how in READINGS.items())]
+    units = [("", 1.0), *UNITS_M.items()]
+    for (order, mend, do), (unit, size_m), up in product(orders, units, UP_TURNS):
+        rotations = matrix_from_quaternion(mend(q))
+        poses = Trajectory.from_poses(part.times_s, size_m * part.positions(), rotations)
+        if up != "z":
+            poses = moved_trajectory(poses, transform(UP_TURNS[up], np.zeros(3)))
+        mistakes = [
+            (order, do),
+            (f"positions are in {unit}" if unit else "", "write metres"),
+            (
+                f"its axis {up} points up" if up != "z" else "",
+                f'say so in session.toml: [mocap] up = "{up}"',
+            ),
+        ]
+        made = [one for one in mistakes if one[0]]
+        if made:
+            yield _Reading(poses, tuple(m[0] for m in made), tuple(m[1] for m in made))
+
+
+def refuse_mistaken_recordings(swings: Sequence[SwingRun], robot: Robot) -> None:
+    """Refuse runs that fit the cables once they are read another way.
+
+    Raises:
+        DataError: naming the runs, and what to do.
+    """
+    told = [(swing.name, *mistaken_recording(swing, robot)) for swing in swings]
+    wrong = [one for one in told if one[1]]
+    if wrong:
+        name, said, remedy = wrong[0]
+        more = f" (and {len(wrong) - 1} more runs)" if len(wrong) > 1 else ""
+        raise DataError(f"run {name}{more}: {said}; {remedy}")
+
+
+def _lengths_off(model: Model, poses: Trajectory, stated_m: Array | None) -> float:
+    """What cables change along a run (98 % of its samples) or are off what is stated, m."""
+    lengths = evaluate(model.lengths, poses.values, model.start_values)[0].reshape(len(poses), -1)
+    if not np.isfinite(lengths).all():
+        return np.inf
+    spread = float(np.ptp(np.percentile(lengths, [1.0, 99.0], axis=0), axis=0).max())
+    if stated_m is None or len(stated_m) != lengths.shape[1]:
+        return spread
+    return max(spread, float(np.abs(lengths.mean(axis=0) - stated_m).max()))
