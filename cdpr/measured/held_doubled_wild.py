@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.cdpr.files.problems import InputError
+from freeswing.cdpr.measured.repeated_and_interpolated import interpolated, repeated
 from freeswing.cdpr.measured.trajectory import Trajectory
 
 Array = NDArray[np.float64]
@@ -32,6 +33,9 @@ LONGEST_DOUBLE = 4
 WILD_DEVIATIONS = 50.0
 NORMAL_BY_MAD = 1.4826
 HALF_WITHIN = 0.2
+# Rounding to a step makes a deviation of 1/sqrt(12) of it, and of the distance from the middle of
+# two others sqrt(1.5) of that.
+ROUNDED = 8.0**-0.5
 # A step from one sample to the next, beyond that of its neighbours, this many usual ones large and
 # this large: no platform jumps so, and a cable that goes taut makes less.
 STEP_DEVIATIONS = 40.0
@@ -68,8 +72,16 @@ def check_stamps(trajectory: Trajectory, source: str) -> None:
 
 def sound_samples(trajectory: Trajectory) -> Trajectory:
     """The trajectory without doubled, held and wild samples; what went is in its notes."""
-    doubled = _doubled(trajectory)
     notes: list[str] = []
+    between = interpolated(trajectory)
+    if between is not None:
+        rate = trajectory.sample_rate_hz
+        trajectory = trajectory.take(~between)
+        notes.append(
+            f"{rate:g} Hz interpolated from {trajectory.sample_rate_hz:g} Hz: {between.sum()} "
+            "samples lie on the line between their neighbours; they are left out"
+        )
+    doubled = _doubled(trajectory)
     if doubled is not None:
         rate = trajectory.sample_rate_hz
         trajectory = trajectory.take(doubled)
@@ -78,13 +90,31 @@ def sound_samples(trajectory: Trajectory) -> Trajectory:
             f"capture of {trajectory.sample_rate_hz:g} Hz; one of each is used"
         )
     values = np.array(trajectory.values)
-    for first, last in _held(trajectory):
-        length = trajectory.times_s[last] - trajectory.times_s[first]
-        notes.append(
-            f"the same sample stands from {trajectory.times_s[first]:.2f} s on for {length:.2f} s: "
-            "the capture stalled; the repeats are left out"
-        )
+    steps = _steps(values, trajectory.times_s, trajectory.coordinates)
+    held = list(_held(trajectory))
+    for first, last in held:
         values[first + 1 : last + 1] = np.nan
+        length = trajectory.times_s[last] - trajectory.times_s[first]
+        if not _stands_off(steps, first, last):
+            notes.append(
+                f"the same sample stands from {trajectory.times_s[first]:.2f} s on for "
+                f"{length:.2f} s: the capture stalled; the repeats are left out"
+            )
+    again = repeated(values)
+    if again.any():
+        notes.append(
+            f"{again.sum()} samples repeat the one before to the last digit, the first at "
+            f"{trajectory.times_s[np.argmax(again)]:.2f} s: copies, which lag; they are left out"
+        )
+        values[again] = np.nan
+    fills = [one for one in (*held, *_copied(again)) if _stands_off(steps, *one)]
+    if fills:
+        notes.append(
+            f"{len(fills)} times a sample that stands far from those around is repeated, the first "
+            f"time at {trajectory.times_s[fills[0][0]]:.2f} s: it fills a gap and is left out"
+        )
+    for first, _ in fills:
+        values[first] = np.nan
     for first, last in _wild(values, trajectory.times_s, trajectory.coordinates):
         notes.append(f"{_wild_text(trajectory, values, first, last)} left out")
         values[first : last + 1] = np.nan
@@ -120,6 +150,12 @@ def _held(trajectory: Trajectory) -> Iterator[tuple[int, int]]:
     for first, last in _runs(same):
         if last - first >= FEWEST_HELD:
             yield first, last
+
+
+def _copied(again: Mask) -> Iterator[tuple[int, int]]:
+    """First and last of each stretch of samples that are one sample and its copies."""
+    for first, end in _runs(again):
+        yield first - 1, end - 1
 
 
 def _is_finer(values: Array, same: Mask) -> bool:
@@ -172,11 +208,12 @@ def _single(values: Array, times_s: Array) -> Mask:
     after_counts = ahead[1:-1, None]
     off[1:-1] = values[1:-1] - after_counts * values[2:] - (1.0 - after_counts) * values[:-2]
     pulls = np.nan_to_num(ahead[:-2], nan=0.5), np.nan_to_num(1.0 - ahead[2:], nan=0.5)
-    for column in off.T:
+    for column, printed in zip(off.T, _print_steps(values), strict=True):
         known = np.isfinite(column)
         if known.sum() < FEWEST_HELD:
             continue
         usual = NORMAL_BY_MAD * float(np.median(np.abs(column[known])))
+        usual = max(usual, ROUNDED * printed)
         size = np.nan_to_num(np.abs(column))
         # It pulls both neighbours' lines by its part of how far it lies off, and no others do: half
         # where stamps are even.
@@ -188,6 +225,14 @@ def _single(values: Array, times_s: Array) -> Mask:
         told = halves[0] & halves[1] & (np.isfinite(before) | np.isfinite(after))
         wild[1:-1] |= told & (size[1:-1] > WILD_DEVIATIONS * usual) & (usual > 0.0)
     return wild
+
+
+def _print_steps(values: Array) -> Array:
+    """The least by which neighbours differ: what numbers are written to, or above it, (n_c,)."""
+    steps = np.abs(np.diff(values, axis=0))
+    steps[~(steps > 0.0)] = np.inf
+    least = steps.min(axis=0, initial=np.inf)
+    return np.where(np.isfinite(least), least, 0.0)
 
 
 def _steps(values: Array, times_s: Array, coordinates: tuple[str, ...]) -> Array:

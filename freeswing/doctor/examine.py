@@ -73,7 +73,9 @@ def _run(
         f"run {run.name}", lambda: load_swing(session, run, robot, target, markers)
     )
     if swing is not None:
-        yield from run_findings(swing, robot, session.frame_rate_hz)
+        yield from run_findings(
+            swing, robot, session.frame_rate_hz, measured=run.trajectory is not None
+        )
     return swing
 
 

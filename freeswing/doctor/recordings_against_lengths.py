@@ -1,4 +1,4 @@
-"""Recordings that were meant otherwise: in another unit or axes, quaternions as x y z w or inverse.
+"""Recordings and cables that were meant otherwise: units, axes, orders, ends of other cables.
 
 Every turn is a turn and every number a length, so no file tells it. Locked cables do: they keep
 their length, and the one that is stated, where a recording is read as it was meant. Mistakes come
@@ -8,10 +8,11 @@ together, so every unit is tried with all axes and orders.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from itertools import product
+from dataclasses import dataclass, replace
+from itertools import permutations, product
 
 import numpy as np
+from scipy.optimize import linear_sum_assignment
 
 from freeswing.cdpr.files.problems import DataError
 from freeswing.cdpr.measured.quaternion_readings import LEFT_OVER, READINGS
@@ -23,24 +24,28 @@ from freeswing.cdpr.robot import Array, Robot
 from freeswing.cdpr.rotation import matrix_from_quaternion, quaternion_from_matrix, transform
 from freeswing.ident.runs import SwingRun
 
-# Geometry known to a centimetre moves lengths by some mm along a swing: more is another matter.
+# Geometry known to a centimetre moves lengths by some mm along a swing: more is another matter,
+# and a reading that leaves more is not the one that was meant.
 LENGTHS_OFF_M = 0.02
 UNITS_M = {"millimetres": 1e-3, "centimetres": 1e-2, "inches": 0.0254, "feet": 0.3048}
 SAMPLES_TRIED = 200
 """Looked at of a run; cables that keep their length keep it in any of them."""
+MOST_ORDERED = 4
+"""Cables of which every order of ends is tried: 23 others."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Reading:
-    """Poses as they may have been meant: what each mistake is called, and what to do about it."""
+    """Poses and cables as they may have been meant, with what each mistake is and its remedy."""
 
     poses: Trajectory
+    model: Model
     said: tuple[str, ...]
     remedies: tuple[str, ...]
 
 
 def mistaken_recording(run: SwingRun, robot: Robot) -> tuple[str, str]:
-    """How a run's poses were meant, and what to do; empty where they are read right.
+    """How a run was meant, and what to do; empty where it is read right.
 
     Of readings that leave nearly as little the one with the fewest mistakes is told.
 
@@ -59,11 +64,12 @@ def mistaken_recording(run: SwingRun, robot: Robot) -> tuple[str, str]:
     found = _lengths_off(model, part, run.lengths_m)
     if found < LENGTHS_OFF_M:
         return "", ""
-    readings = list(_readings(part))
-    off = np.array([_lengths_off(model, one.poses, run.lengths_m) for one in readings])
-    if off.min() > LEFT_OVER * found:
+    readings = [*_readings(part, model), *_orders(part, robot)]
+    off = np.array([_lengths_off(one.model, one.poses, run.lengths_m) for one in readings])
+    most = min(LEFT_OVER * found, LENGTHS_OFF_M)
+    if off.min() > most:
         return "", ""
-    nearly = [k for k in range(len(off)) if off[k] <= min(off.min() / LEFT_OVER, LEFT_OVER * found)]
+    nearly = [k for k in range(len(off)) if off[k] <= min(off.min() / LEFT_OVER, most)]
     best = min(nearly, key=lambda k: (len(readings[k].said), off[k]))
     told = (
         f"cable lengths are off by {1e3 * found:.0f} mm" if np.isfinite(found) else "no cable fits"
@@ -72,18 +78,26 @@ def mistaken_recording(run: SwingRun, robot: Robot) -> tuple[str, str]:
     return f"{said}: {told} as recorded, by {1e3 * off[best]:.1f} mm so", remedy
 
 
-def _readings(part: Trajectory) -> Iterator[_Reading]:
+def _thinned(part: Trajectory) -> Trajectory:
+    return part.take(np.arange(len(part))[:: max(1, len(part) // SAMPLES_TRIED)])
+
+
+def _readings(part: Trajectory, model: Model) -> Iterator[_Reading]:
     """All other ways to read some of a run's poses."""
-    part = part.take(np.arange(len(part))[:: max(1, len(part) // SAMPLES_TRIED)])
+    part = _thinned(part)
     q = quaternion_from_matrix(part.rotations())
     # q and -q are one turn, but not once w stands elsewhere: signs follow the sample before.
     signs = np.cumprod(np.where(np.sum(q[1:] * q[:-1], axis=1) < 0.0, -1.0, 1.0))
     q[1:] *= signs[:, None]
     orders = [("", (lambda same: same), ""), *((name, *how) for name, how in READINGS.items())]
     units = [("", 1.0), *UNITS_M.items()]
-    for (order, mend, do), (unit, size_m), up in product(orders, units, UP_TURNS):
-        rotations = matrix_from_quaternion(mend(q))
-        poses = Trajectory.from_poses(part.times_s, size_m * part.positions(), rotations)
+    for (order, mend, do), (unit, size_m), up, hand in product(
+        orders, units, UP_TURNS, (1.0, -1.0)
+    ):
+        # Seen in a mirror that turns y round a turn goes the other way about x and z.
+        rotations = matrix_from_quaternion(mend(q) * np.array([1.0, hand, 1.0, hand]))
+        positions = size_m * part.positions() * np.array([1.0, hand, 1.0])
+        poses = Trajectory.from_poses(part.times_s, positions, rotations)
         if up != "z":
             poses = moved_trajectory(poses, transform(UP_TURNS[up], np.zeros(3)))
         mistakes = [
@@ -93,10 +107,37 @@ def _readings(part: Trajectory) -> Iterator[_Reading]:
                 f"its axis {up} points up" if up != "z" else "",
                 f'say so in session.toml: [mocap] up = "{up}"',
             ),
+            (
+                "its axes are left-handed" if hand < 0.0 else "",
+                "turn the signs of y_m, qx and qz",
+            ),
         ]
         made = [one for one in mistakes if one[0]]
         if made:
-            yield _Reading(poses, tuple(m[0] for m in made), tuple(m[1] for m in made))
+            yield _Reading(poses, model, tuple(m[0] for m in made), tuple(m[1] for m in made))
+
+
+def _orders(part: Trajectory, robot: Robot) -> Iterator[_Reading]:
+    """The cables with ends of each other."""
+    part, cables = _thinned(part), robot.cables
+    if len(cables) > MOST_ORDERED:
+        return
+    for order in permutations(range(len(cables))):
+        moved = [k for k, own in enumerate(order) if k != own]
+        if not moved:
+            continue
+        other = tuple(
+            replace(cable, attachment_m=cables[own].attachment_m)
+            for cable, own in zip(cables, order, strict=True)
+        )
+        names = ", ".join(cables[k].name for k in moved)
+        said = f"robot.toml has attachment_m of cables {names} in each other's place"
+        yield _Reading(
+            part,
+            build_model(replace(robot, cables=other)),
+            (said,),
+            ("put each attachment with its entry and its length",),
+        )
 
 
 def refuse_mistaken_recordings(swings: Sequence[SwingRun], robot: Robot) -> None:
@@ -114,11 +155,15 @@ def refuse_mistaken_recordings(swings: Sequence[SwingRun], robot: Robot) -> None
 
 
 def _lengths_off(model: Model, poses: Trajectory, stated_m: Array | None) -> float:
-    """What cables change along a run (98 % of its samples) or are off what is stated, m."""
+    """What cables change along a run (98 % of its samples) or are off what is stated, m.
+
+    In whatever order it is stated: lengths of other cables are another mistake, said elsewhere.
+    """
     lengths = evaluate(model.lengths, poses.values, model.start_values)[0].reshape(len(poses), -1)
     if not np.isfinite(lengths).all():
         return np.inf
     spread = float(np.ptp(np.percentile(lengths, [1.0, 99.0], axis=0), axis=0).max())
     if stated_m is None or len(stated_m) != lengths.shape[1]:
         return spread
-    return max(spread, float(np.abs(lengths.mean(axis=0) - stated_m).max()))
+    apart = np.abs(lengths.mean(axis=0)[:, None] - stated_m)
+    return max(spread, float(apart[linear_sum_assignment(apart)].max()))

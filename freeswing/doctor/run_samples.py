@@ -30,12 +30,14 @@ FARTHEST_REACHES = 20.0
 HARDLY_MOVES_M = 1e-4
 
 
-def run_findings(run: SwingRun, robot: Robot, frame_rate_hz: float | None) -> Iterator[Finding]:
+def run_findings(
+    run: SwingRun, robot: Robot, frame_rate_hz: float | None, *, measured: bool = True
+) -> Iterator[Finding]:
     """What stands out in one run, inside its window where it has one."""
     subject = f"run {run.name}"
     for note in run.trajectory.notes:
         yield Finding("warning", subject, note)
-    yield from stamp_findings(subject, run.trajectory, frame_rate_hz)
+    yield from stamp_findings(subject, run.trajectory, frame_rate_hz, measured=measured)
     try:
         part = run.trajectory.window(*run.window_s) if run.window_s else run.trajectory
     except DataError as failure:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -69,6 +70,12 @@ def load_swings(
     swings = (load_swing(session, run, robot, target, markers) for run in session.runs)
     errors |= markers.errors()
     return tuple(replace(swing, pose_errors=errors.get(swing.name)) for swing in swings)
+
+
+def measured_swings(session: Session, swings: Sequence[SwingRun]) -> tuple[SwingRun, ...]:
+    """Those that were recorded by something else than the session's cameras."""
+    filmed = {run.name for run in session.video_runs}
+    return tuple(swing for swing in swings if swing.name not in filmed)
 
 
 def calibration_errors(session: Session) -> dict[str, PoseErrors]:

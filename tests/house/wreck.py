@@ -230,7 +230,8 @@ HELD = (
     Held(
         "freeswing/doctor/time_stamps.py",
         (
-            "RATE_TOLERANCE", "ROUNDING_S", "LEAST_SAMPLES", "SKIPPED_STEPS",
+            "RATE_TOLERANCE", "ROUNDING_S", "LEAST_SAMPLES", "SKIPPED_STEPS", "RATE_CONTRADICTED",
+            "LEAST_LOST",
         ),
         "tests/freeswing/doctor/test_doctor.py",
     ),
@@ -382,6 +383,16 @@ HELD = (
             "LONGEST_WILD_S", "LONGEST_STEP_S",
         ),
         "tests/cdpr/measured/test_held_doubled_wild.py",
+    ),
+    Held(
+        "cdpr/measured/lost_rows.py",
+        ("CLEAR_STEPS", "TO_WITHIN", "EVEN", "LEAST_SAMPLES"),
+        "tests/cdpr/measured/test_lost_rows.py",
+    ),
+    Held(
+        "cdpr/measured/repeated_and_interpolated.py",
+        ("MOST_BY_CHANCE", "ON_THE_LINE", "INTERPOLATED_SHARE", "LEAST_SAMPLES", "PATTERN_SHARE"),
+        "tests/cdpr/measured/test_repeated_and_interpolated.py",
     ),
     Held("ident/bench/fit_rounds.py", ("LEAST_FOR_SCATTER",), BENCH),
     Held(

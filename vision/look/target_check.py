@@ -68,23 +68,37 @@ def examined_watch(
         return watch, []
     if len(seen) < _LEAST_FRAMES:
         return watch, []
-    miss = _miss(watch.tag_corners_m, seen)
-    if miss < WRONG_SHARE:
-        return watch, []
-    found = [(_miss(corners, seen), text, pair) for corners, text, pair in _mistakes(watch, seen)]
-    best = min(found, key=lambda trial: trial[0])
-    told = f"the platform's tags miss their places in target.toml by {100 * miss:.0f} % of a side"
-    if best[0] > max(_FITS_SHARE * miss, 0.5 * WRONG_SHARE):
-        raise DataError(
-            f"{told}, and none of the usual mistakes (ids exchanged, size, axes, unit, inverted "
-            "poses) explains it: measure the tags' places again"
+    return _mended(watch, seen)
+
+
+def _mended(watch: Watch, seen: Sequence[_Seen]) -> tuple[Watch, list[str]]:
+    """The watch with exchanged ids put right, and what is said of it; other mistakes are refused.
+
+    What is left once two ids are exchanged may be another mistake, which is told beside it.
+    """
+    said: list[str] = []
+    while (miss := _miss(watch.tag_corners_m, seen)) >= WRONG_SHARE:
+        found = [
+            (_miss(corners, seen), text, pair) for corners, text, pair in _mistakes(watch, seen)
+        ]
+        best = min(found, key=lambda trial: trial[0])
+        told = (
+            f"the platform's tags miss their places in target.toml by {100 * miss:.0f} % of a side"
         )
-    if best[2] is None:
-        raise DataError(f"{told}: {best[1]} (then {100 * best[0]:.1f} %). Correct target.toml")
-    order = np.arange(len(watch.tags))
-    order[list(best[2])] = order[list(best[2][::-1])]
-    said = f"{told}: {best[1]} (then {100 * best[0]:.1f} %); taken so, correct target.toml"
-    return replace(watch, tag_corners_m=watch.tag_corners_m[order]), [said]
+        if best[0] > max(_FITS_SHARE * miss, 0.5 * WRONG_SHARE):
+            why = (
+                f"{told}, and none of the usual mistakes (ids exchanged, size, axes, unit, "
+                "inverted poses) explains it: measure the tags' places again"
+            )
+            raise DataError("; then ".join([*said, why]))
+        told = f"{told}: {best[1]} (then {100 * best[0]:.1f} %)"
+        if best[2] is None:
+            raise DataError(f"{'; then '.join([*said, told])}. Correct target.toml")
+        order = np.arange(len(watch.tags))
+        order[list(best[2])] = order[list(best[2][::-1])]
+        said.append(f"{told}; taken so, correct target.toml")
+        watch = replace(watch, tag_corners_m=watch.tag_corners_m[order])
+    return watch, said
 
 
 def _looked(watch: Watch, camera: Camera, recording: Recording) -> Iterator[_Seen]:

@@ -53,12 +53,18 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
     from freeswing.cdpr.files.documents import InputError
     from freeswing.cdpr.system.threads import threads
     from freeswing.doctor.recordings_against_lengths import refuse_mistaken_recordings
+    from freeswing.doctor.time_stamps import refuse_wrong_stamps
     from freeswing.ident.diagnose.diagnose import diagnose
     from freeswing.results.diagnosis import Diagnosis
     from freeswing.results.motion_from_results import ladder_motions
     from freeswing.session.exchanged_lengths import refuse_exchanged_lengths
     from freeswing.session.load_bench import is_bench
-    from freeswing.session.load_swings import load_robot, load_swings, load_target
+    from freeswing.session.load_swings import (
+        load_robot,
+        load_swings,
+        load_target,
+        measured_swings,
+    )
     from freeswing.session.made import Made
     from freeswing.session.repeated_runs import refuse_repeated
 
@@ -75,6 +81,7 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
         swings = list(load_swings(session, robot, load_target(session)))
         refuse_repeated(swings)
         refuse_mistaken_recordings(swings, robot)
+        refuse_wrong_stamps(measured_swings(session, swings), session.frame_rate_hz)
         refuse_exchanged_lengths(swings, robot)
         found = diagnose(swings, robot, console.progress, count, candidates, crew.executor)
     document = Diagnosis.from_json(found.document())

@@ -71,6 +71,7 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
     from freeswing.cdpr.files.documents import InputError
     from freeswing.cdpr.system.threads import threads
     from freeswing.doctor.recordings_against_lengths import refuse_mistaken_recordings
+    from freeswing.doctor.time_stamps import refuse_wrong_stamps
     from freeswing.ident.identify import IdentifySettings, identify
     from freeswing.ident.likelihood.cable_ends import GeometryPriors
     from freeswing.ident.swing_places import swing_places
@@ -79,7 +80,12 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
     from freeswing.results.motion_from_results import predicted_motions
     from freeswing.session.exchanged_lengths import refuse_exchanged_lengths
     from freeswing.session.load_bench import is_bench
-    from freeswing.session.load_swings import load_robot, load_swings, load_target
+    from freeswing.session.load_swings import (
+        load_robot,
+        load_swings,
+        load_target,
+        measured_swings,
+    )
     from freeswing.session.made import Made
     from freeswing.session.marker_runs import read_marker_runs
     from freeswing.session.repeated_runs import refuse_repeated
@@ -94,6 +100,7 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
         swings = load_swings(session, robot, target, markers)
     refuse_repeated(swings)
     refuse_mistaken_recordings(swings, robot)
+    refuse_wrong_stamps(measured_swings(session, swings), session.frame_rate_hz)
     refuse_exchanged_lengths(swings, robot)
     try:
         geometry = GeometryPriors(settings.get("entry_std_m"), settings.get("attachment_std_m"))

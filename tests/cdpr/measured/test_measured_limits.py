@@ -99,4 +99,4 @@ def test_steps_that_no_platform_makes(name, size, wild) -> None:
     """However quiet the samples are."""
     values = 1e-6 * np.resize([1.0, -1.0, 0.5], (60, 1))
     values[30:] += size
-    assert _steps(values, (name,)).any() == wild
+    assert _steps(values, np.arange(60.0), (name,)).any() == wild

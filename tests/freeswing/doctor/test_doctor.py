@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from freeswing.cdpr.files.problems import DataError
 from freeswing.cdpr.measured.trajectory import Trajectory
 from freeswing.cdpr.model.batch import evaluate
 from freeswing.cdpr.model.equations import build_model
@@ -17,6 +18,7 @@ from freeswing.doctor.footage import calibration_findings
 from freeswing.doctor.geometry import robot_findings
 from freeswing.doctor.run_roles import split_findings
 from freeswing.doctor.run_samples import run_findings
+from freeswing.doctor.time_stamps import refuse_wrong_stamps
 from freeswing.ident.runs import SwingRun
 from freeswing.session.session_file import read_session
 from tests.oracle.scenes.robots import declared_robot
@@ -91,6 +93,45 @@ def said(run, words, rate_hz=None):
 def test_rates(share, levels) -> None:
     """Half a thousandth, and a millisecond of rounded stamps over six seconds."""
     assert said(swing(), "the session says", 100.0 / (1.0 + share)) == levels
+
+
+@pytest.mark.parametrize(
+    ("factor", "levels"),
+    [
+        (1.0031, ["warning"]), (1.0033, ["error"]), (0.9969, ["warning"]), (0.9967, ["error"]),
+        (2.0, ["warning"]), (0.5, ["warning"]), (1.5, ["error"]),
+    ],
+)  # fmt: skip
+def test_rates_that_contradict_each_other(factor, levels) -> None:
+    """Three thousandths and the rounding, but for whole parts of a rate."""
+    run = swing()
+    assert said(run, "the session says", 100.0 / factor) == levels
+    filmed = run_findings(run, ROBOT, 100.0 / factor, measured=False)
+    assert told(filmed, "the session says") == ["warning"]
+    if levels == ["error"]:
+        with pytest.raises(DataError, match="one of the two clocks is wrong"):
+            refuse_wrong_stamps([run], 100.0 / factor)
+    else:
+        refuse_wrong_stamps([run], 100.0 / factor)
+
+
+def counted_on(lost: int) -> SwingRun:
+    """A swing that lost rows where it was fast, its stamps counted on."""
+    run = swing()
+    values = run.trajectory.values.copy()
+    values[:, 0] += 3e-7 * np.random.default_rng(2).normal(size=len(values))
+    keep = np.ones(len(values), dtype=bool)
+    keep[[80, 160, 238][:lost]] = False
+    return swing(values[keep], run.trajectory.times_s[: keep.sum()], window_s=None)
+
+
+@pytest.mark.parametrize(("lost", "levels"), [(0, []), (2, ["warning"]), (3, ["error"])])
+def test_rows_that_were_lost_while_stamps_were_counted_on(lost, levels) -> None:
+    run = counted_on(lost)
+    assert said(run, "rows were lost and the stamps counted on") == levels
+    refuse_wrong_stamps([counted_on(2)], None)
+    with pytest.raises(DataError, match=r"run s \(and 1 more runs\): 2 steps, the first at 0.80 s"):
+        refuse_wrong_stamps([counted_on(0), counted_on(2), counted_on(1)], None)
 
 
 @pytest.mark.parametrize(("step", "levels"), [(1.45, []), (1.55, ["note"])])

@@ -81,10 +81,12 @@ def test_what_is_right_and_what_is_merely_wrong_is_not_named() -> None:
         (0.0195, 0.001, False),
         (0.1, 0.0195, True),
         (0.1, 0.0205, False),
+        (1.0, 0.0195, True),
+        (1.0, 0.0205, False),
     ],
 )
 def test_what_is_left_by_the_right_reading(monkeypatch, off_m, left_m, named) -> None:
-    """Lengths off by 2 cm, of which the right reading leaves a fifth at most."""
+    """Lengths off by 2 cm, of which the right reading leaves a fifth and 2 cm at most."""
     off = chain([off_m, left_m], repeat(off_m))
     monkeypatch.setattr(
         "freeswing.doctor.recordings_against_lengths._lengths_off", lambda *_: next(off)

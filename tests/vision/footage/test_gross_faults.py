@@ -125,6 +125,18 @@ def test_a_wrong_tag_size_is_named_with_the_right_one(tmp_path, capsys) -> None:
 
 
 @pytest.mark.slow
+def test_exchanged_ids_and_a_wrong_size_are_both_named(tmp_path, capsys) -> None:
+    def mistaken(text: str) -> str:
+        larger = re.sub(r"size_m = ([\d.]+)", lambda m: f"size_m = {1.13 * float(m[1])}", text)
+        return exchanged_ids(larger)
+
+    assert track(write_session(tmp_path, target=mistaken)) == 1
+    said = capsys.readouterr().err
+    assert re.search(r"tag36h11 [01] and tag36h11 [01] exchanged they fit", said), said
+    assert re.search(r"with size_m 0\.8[89] times as large they fit", said), said
+
+
+@pytest.mark.slow
 def test_tags_in_another_convention_are_named(tmp_path, capsys) -> None:
     folder = write_session(tmp_path)
     target = read_target(folder / "target.toml")
