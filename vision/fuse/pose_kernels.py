@@ -272,8 +272,8 @@ def _balanced(normal: Array) -> Array:
     balanced = normal.copy()
     for i in range(len(normal)):
         for j in range(len(normal)):
-            scale = math.sqrt(normal[i, i]) + 1e-300
-            balanced[i, j] /= scale * (math.sqrt(normal[j, j]) + 1e-300)
+            scale = math.sqrt(normal[i, i]) + 1e-150
+            balanced[i, j] /= scale * (math.sqrt(normal[j, j]) + 1e-150)
     return balanced
 
 

@@ -125,6 +125,22 @@ def test_a_wrong_tag_size_is_named_with_the_right_one(tmp_path, capsys) -> None:
 
 
 @pytest.mark.slow
+def test_millimetres_are_named_beside_a_late_start_and_dropped_frames(tmp_path, capsys) -> None:
+    """Kilometres away nothing weighs, and the search for the start divided by it."""
+    folder = write_session(
+        tmp_path, lambda c: [replace(in_millimetres(one), clock_offset_s=0.0) for one in c]
+    )
+    for seed, camera in enumerate(("left", "right")):
+        keep = np.random.default_rng(seed).random(108) > 0.05
+        keep[: 14 * seed] = False
+        stamps = np.flatnonzero(keep) / RATE_HZ
+        frames = [image for image, is_kept in zip(frames_of(camera), keep, strict=True) if is_kept]
+        write_frames(folder / "runs" / "swing-01" / f"{camera}.mp4", frames, stamps - stamps[0])
+    assert track(folder) == 1
+    assert "t_camera_base_m is in millimetres" in capsys.readouterr().err
+
+
+@pytest.mark.slow
 def test_exchanged_ids_and_a_wrong_size_are_both_named(tmp_path, capsys) -> None:
     def mistaken(text: str) -> str:
         larger = re.sub(r"size_m = ([\d.]+)", lambda m: f"size_m = {1.13 * float(m[1])}", text)
