@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol
 
@@ -18,6 +18,7 @@ from freeswing.vision.fuse.calibration_share import (
     run_share,
     share_instants,
 )
+from freeswing.vision.fuse.found_share import FoundTimes, widened_by_found
 from freeswing.vision.fuse.fuse_cameras import Fit, free_of
 from freeswing.vision.fuse.poses import Poses
 from freeswing.vision.fuse.run_views import CameraViews
@@ -93,6 +94,8 @@ def track_run(
     counts = tuple(camera_count(view) for view in views)
     corrected = correct_rig(views, watch, settings.survey_std_m, look=settings.correct_rig)
     poses, lone = recorded_by_two(corrected.poses, corrected.views)
+    found = _found_times(corrected.findings)
+    poses = widened_by_found(poses, corrected.after, corrected.views, watch, found)
     known = int(poses.known.sum())
     shared = _shared(poses, corrected, watch, platform)
     share = run_share(poses, corrected.after, corrected.views, watch, noise, shared)
@@ -114,6 +117,19 @@ def track_run(
         (*corrected.remarks, *lone, *_problems(counts, corrected.after, watch)),
         layout_sums(poses, corrected.after, corrected.views, watch),
     )
+
+
+def _found_times(findings: Sequence[Finding]) -> dict[str, FoundTimes]:
+    """What was found of each camera's times, by its name."""
+    found: dict[str, FoundTimes] = {}
+    for one in findings:
+        told = {name: std for name, _, std in one.parameters}
+        own = found.get(one.camera, FoundTimes())
+        if one.effect == "clock_offset":
+            found[one.camera] = replace(own, clock_std_s=told["offset_s"])
+        elif one.effect == "rolling_shutter":
+            found[one.camera] = replace(own, line_std_s=told["line_time_s"])
+    return found
 
 
 def _shared(

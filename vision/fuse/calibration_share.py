@@ -101,16 +101,9 @@ def run_share(
     if not len(known):
         return None
     chosen = share_instants(poses)
-    roots = np.zeros((0, 0)) if noise is None else noise.roots()
-    found = []
-    for block in blocks(views, watch, poses.times_s, poses):
-        if noise is None:
-            break
-        mine = chosen[(chosen >= block.first) & (chosen < block.first + len(block.starts) - 1)]
-        if len(mine):
-            slopes = _pose_slopes(block, poses, views, fit.noise, noise.names, mine, free_of(watch))
-            found.append(slopes @ roots)
-    slopes = np.concatenate(found) if found else np.zeros((len(chosen), 6, 0))
+    slopes = np.zeros((len(chosen), 6, 0))
+    if noise is not None:
+        slopes = pose_slopes(poses, fit, views, watch, noise.names) @ noise.roots()
     moving = slopes.shape[2]  # clocks are the calibration's alone: other causes know no velocity
     if shared is not None:
         slopes = np.concatenate([slopes, shared], axis=2)
@@ -128,6 +121,30 @@ def run_share(
         PoseErrors(origin, turn, modes),
         np.linalg.qr(terms / np.sqrt(len(terms)))[1].T,
     )
+
+
+def pose_slopes(
+    poses: Poses, fit: Fit, views: Sequence[CameraViews], watch: Watch, names: tuple[str, ...]
+) -> Array:
+    """How poses at `share_instants` change with numbers of the cameras, (n, 6, n_names).
+
+    Args:
+        poses: of a run.
+        fit: how its sightings agree with them.
+        views: its cameras.
+        watch: what was looked for.
+        names: such as `cam0.fx` and `cam0.line_time_s`.
+
+    Source:
+        Triggs et al. 2000, Bundle Adjustment: A Modern Synthesis, sec. 6: what is held changes
+        what is estimated through the normal equations.
+    """
+    chosen, found = share_instants(poses), []
+    for block in blocks(views, watch, poses.times_s, poses):
+        mine = chosen[(chosen >= block.first) & (chosen < block.first + len(block.starts) - 1)]
+        if len(mine):
+            found.append(_pose_slopes(block, poses, views, fit.noise, names, mine, free_of(watch)))
+    return np.concatenate(found) if found else np.zeros((0, 6, len(names)))
 
 
 def share_instants(poses: Poses) -> Ints:
