@@ -26,17 +26,33 @@ INSTANTS_A_BLOCK = 400
 
 
 def blocks(
-    views: Sequence[CameraViews], watch: Watch, instants_s: Array, poses: Poses | None = None
+    views: Sequence[CameraViews],
+    watch: Watch,
+    instants_s: Array,
+    poses: Poses | None = None,
+    *,
+    pixels_alone: bool = False,
 ) -> Iterator[Block]:
     """All sightings of the platform, each at the instant nearest to its frame; see `RunBlocks`."""
-    return RunBlocks(views, watch, instants_s).at(poses)
+    return RunBlocks(views, watch, instants_s, pixels_alone=pixels_alone).at(poses)
 
 
 class RunBlocks:
-    """A run's sightings for any number of passes; where all are one block it is made once."""
+    """A run's sightings for any number of passes; where all are one block it is made once.
 
-    def __init__(self, views: Sequence[CameraViews], watch: Watch, instants_s: Array) -> None:
+    With `pixels_alone` their covariances hold nothing of what is not known of a motion.
+    """
+
+    def __init__(
+        self,
+        views: Sequence[CameraViews],
+        watch: Watch,
+        instants_s: Array,
+        *,
+        pixels_alone: bool = False,
+    ) -> None:
         self.views, self.watch, self.instants_s = views, watch, instants_s
+        self.pixels_alone = pixels_alone
         self._only: Block | None = None
 
     def at(self, poses: Poses | None) -> Iterator[Block]:
@@ -50,7 +66,8 @@ class RunBlocks:
             if poses is None or poses.course is None:
                 yield block
             else:
-                yield _carried(block, self.views, poses, poses.course)
+                alone = self.pixels_alone
+                yield _carried(block, self.views, poses, poses.course, pixels_alone=alone)
 
     def _plain(self) -> Iterator[Block]:
         """The blocks as they were seen."""
@@ -67,11 +84,15 @@ class RunBlocks:
             yield block
 
 
-def _carried(block: Block, views: Sequence[CameraViews], poses: Poses, course: Course) -> Block:
+def _carried(
+    block: Block, views: Sequence[CameraViews], poses: Poses, course: Course, *, pixels_alone: bool
+) -> Block:
     """The block with the platform's motion from each instant to its sightings."""
     instant = np.repeat(np.arange(len(block.starts) - 1), np.diff(block.starts))
     at = block.first + instant
     found = course.carried(at, block.sighted_s() - poses.times_s[at])
+    if pixels_alone:
+        found = found._replace(variances=np.zeros_like(found.variances))
     block = replace(block, shifts=found.shifts, motions=found.motions)
     if not found.variances.any() and not any(v.camera.line_time_s for v in views):
         return block  # all was seen at the instants, each image at once

@@ -80,11 +80,13 @@ def fuse(
             noise in its parts: weighed by them, residuals would hide what turns tags, and turns
             would neither find it nor settle.
         rough: leaves the covariances out (0, 6, 6), more than half of what poses take.
-        plain: takes all noise as each corner's own, which what is wrong with a rig cannot pass for.
+        plain: takes all noise as each corner's own, and the motion between poses as known: what is
+            wrong with a rig can pass for neither. Poses and motion are not settled.
     """
-    run, noise = RunBlocks(views, watch, instants_s), Noise.unknown(len(views))
+    run = RunBlocks(views, watch, instants_s, pixels_alone=plain)
+    noise = Noise.unknown(len(views))
     poses = unknown_poses(instants_s) if start is None else start
-    settling, spare, left = Settling(), MOST_TO_SETTLE, passes
+    settling, spare, left = Settling(), 0 if plain else MOST_TO_SETTLE, passes
     while True:
         parts = NoiseSums(noise) if not plain and left == 2 else None
         found, usual, account = _solved(run, poses, noise, parts, kept=left == 1 and not rough)

@@ -54,7 +54,7 @@ def corner_bias(corners: Array, velocities: Array, times_s: Array) -> Array:
     right = 0.5 * (corners[:, 1] - corners[:, 0] + corners[:, 2] - corners[:, 3])
     down = 0.5 * (corners[:, 3] - corners[:, 0] + corners[:, 2] - corners[:, 1])
     axes = np.stack([right, down], axis=-1)
-    own = np.linalg.solve(axes[:, None], bent[..., None])[..., 0]
+    own = np.swapaxes(np.linalg.solve(axes, np.swapaxes(bent, 1, 2)), 1, 2)
     fitted = (own.reshape(len(corners), -1) @ nearest.T).reshape(-1, 4, 2)
     return fitted @ np.swapaxes(axes, 1, 2) - since[..., None] * velocities
 

@@ -23,7 +23,7 @@ from freeswing.vision.fuse.tag_growth import growth_of
 from freeswing.vision.look.marker_names import label_markers
 from freeswing.vision.look.watched_target import Watch
 from freeswing.vision.rig.gross_faults import moved_too_far, refuse_disagreement, refuse_gross
-from freeswing.vision.rig.lag_accepted import Missed, aligned
+from freeswing.vision.rig.lag_accepted import Missed, aligned, later
 from freeswing.vision.rig.moved_cameras import moved_cameras, repose_by_base_tags
 from freeswing.vision.rig.real_effects import LEAST_CLOCK_S, LEAST_LINE_S, is_real
 from freeswing.vision.rig.rig_kernels import CLOCK, LINE, PER_CAMERA, POSE
@@ -79,9 +79,11 @@ def correct_rig(
     calibrated, started = tuple(views), None
     if look and watch.tags and len(views):
         started = aligned(
-            views, _reference(views), lambda a, b: _missed([a, b], watch, survey_std_m)
+            _standing(views, watch, survey_std_m),
+            _reference(views),
+            lambda a, b: _missed([a, b], watch, survey_std_m),
         )
-        views = started.views
+        views = tuple(later(view, lag) for view, lag in zip(views, started.lags_s, strict=True))
         refuse_gross(views, watch, started.pairs)
     instants = instants_of(views)
     start = None
@@ -115,6 +117,18 @@ def correct_rig(
     findings = _findings(calibrated, settled, moved, clocks, lines, last)
     poses = widened_poses(poses, jitter)
     return Corrected(settled, poses, before, after, findings, (*remarks, *said), doubt)
+
+
+def _standing(
+    views: Sequence[CameraViews], watch: Watch, survey_std_m: float
+) -> tuple[CameraViews, ...]:
+    """Cameras as base tags have them after a knock, which needs no clock; others as calibrated."""
+    standing = list(views)
+    for index in moved_cameras(views, watch):
+        camera = repose_by_base_tags(views[index], watch, survey_std_m)
+        if not moved_too_far(views[index].camera, camera):
+            standing[index] = views[index].believed(camera)
+    return tuple(standing)
 
 
 def _motion_sentences(
@@ -185,7 +199,7 @@ def _missed(views: Sequence[CameraViews], watch: Watch, survey_std_m: float) -> 
     free[:, LINE] = True
     free[:, CLOCK] = np.arange(len(views)) != _reference(current)
     total = np.zeros_like(free, dtype=float)
-    iterated(current, watch, poses, fit, free, total, survey_std_m, told=False)
+    iterated(current, watch, poses, fit, free, total, survey_std_m, told=False, plain=True)
     poses, fit = fuse(current, watch, instants, start=poses, passes=2, rough=True, plain=True)
     squares = frame_squares_px2(current, watch, poses)
     clocks = [view.camera.clock_offset_s for view in current]

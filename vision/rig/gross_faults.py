@@ -59,7 +59,7 @@ def refuse_gross(
     told = _by_base_tags(views, watch)
     tied = {evidence.second for evidence in told}
     for (first, second), pair in pairs.items():
-        if not {first, second} <= tied and pair.known_m > MOST_APART_M + 3.0 * pair.miss_m:
+        if not {first, second} <= tied and stand_elsewhere(pair):
             told.append(Evidence(first, second, pair.T_first_second))
     poses = [view.camera.T_camera_base for view in views]
     wrong = [evidence for evidence in told if _badness(evidence, poses) > 1.0]
@@ -82,6 +82,11 @@ _UNEXPLAINED = (
     "axes, size of the tags): calibrate again, unless what this run holds of the cameras are "
     "recordings of different swings"
 )
+
+
+def stand_elsewhere(pair: Pair) -> bool:
+    """Whether two cameras see a platform that cannot be one as they are calibrated."""
+    return pair.known_m > MOST_APART_M + 3.0 * pair.miss_m
 
 
 def moved_too_far(before: Camera, after: Camera) -> bool:

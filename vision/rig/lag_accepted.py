@@ -11,24 +11,22 @@ from numpy.typing import NDArray
 from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.rotation import invert
 from freeswing.vision.fuse.run_views import CameraViews
-from freeswing.vision.rig.lag_search import OwnTrack, Pair, pair_of
+from freeswing.vision.rig.gross_faults import stand_elsewhere
+from freeswing.vision.rig.lag_search import OwnTrack, Pair, pair_of, sigmas_more
 
 Array = NDArray[np.float64]
 
 REACH_FRAMES = 0.5
 """Smaller lags are left to the adjustment of the clocks, which is exact that near."""
-CLEARLY_BETTER = 1.5
-"""An offset is looked for when poses fit so many times better there than as stamped."""
 SURE_SIGMAS = 4.0
-"""A start is believed when frame for frame any other misses by so many deviations more."""
+"""A start is believed when frame for frame any other misses by so many deviations more; one is
+looked for when as stamped poses do. 0.7 s of a swing of 0.7 s a period leave 4 mm at 0.2 m."""
 _LEAST_COMPARED = 20  # frames: the deviation of their differences is then good to a sixth
 _SAME_START_S = 0.005
 """Starts that end so near are one: they were frames apart, and the clocks were put right."""
 IN_EARNEST = 3.0
 """Starts that leave poses no more times as far apart as the best are tried with everything free."""
 MOST_TRIED = 10
-WORSE_M = 0.003
-"""Without an offset the platform must be missed by this much more: below, clocks are adjusted."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,13 +34,11 @@ class Aligned:
     """Cameras with clocks good to a fraction of a frame.
 
     Attributes:
-        views: with the lags added to their clocks.
-        lags_s: what was added, (n_c,).
+        lags_s: to be added to their clocks, (n_c,).
         pairs: by index of the first and the second camera.
         remarks: which camera was started when, and how sure that is.
     """
 
-    views: tuple[CameraViews, ...]
     lags_s: Array
     pairs: dict[tuple[int, int], Pair]
     remarks: tuple[str, ...]
@@ -93,7 +89,11 @@ def aligned(views: Sequence[CameraViews], reference: int, misfit: Misfit) -> Ali
         step = min(tracks[known].step_s, tracks[new].step_s)
         if abs(pair.lag_s) < REACH_FRAMES * step or not _needed(pair):
             continue
+        if stand_elsewhere(pair):
+            continue  # no start is right with such cameras, and pixels tell of none
         lag, best_px, rival_px, sure = _chosen(pair, current[known], views[new], misfit)
+        if abs(lag) < REACH_FRAMES * step:
+            continue  # as stamped after all
         here, there = views[new].camera.name, views[known].camera.name
         if sure < SURE_SIGMAS:
             raise DataError(
@@ -102,22 +102,23 @@ def aligned(views: Sequence[CameraViews], reference: int, misfit: Misfit) -> Ali
                 "Record the release too, or stamps of one clock"
             )
         lags[new] = lag
-        current[new] = _later(views[new], lag)
+        current[new] = later(views[new], lag)
         remarks.append(
             f"{here}: its clock is {lag:+.3f} s from {there}'s: they then disagree by "
             f"{best_px:.3f} px, next best start {_px(rival_px)} (as stamped poses are "
             f"{_mm(pair.at_zero_m)} apart)"
         )
-    return Aligned(tuple(current), lags, pairs, tuple(remarks))
+    return Aligned(lags, pairs, tuple(remarks))
 
 
 def _chosen(
     pair: Pair, known: CameraViews, new: CameraViews, misfit: Misfit
 ) -> tuple[float, float, float, float]:
     """The best lag, its misfit and the next best's in px, and how many deviations are between."""
-    lags = [pair.lag_s]
-    lags += [lag for lag, miss_m in pair.rivals if miss_m < IN_EARNEST * pair.decided_m]
-    tried = [misfit(known, _later(new, lag)) for lag in lags[:MOST_TRIED]]
+    most_m = IN_EARNEST * pair.decided_m
+    lags = [pair.lag_s, *([0.0] if pair.at_zero_m < most_m else [])]
+    lags += [lag for lag, miss_m in pair.rivals if miss_m < most_m]
+    tried = [misfit(known, later(new, lag)) for lag in lags[:MOST_TRIED]]
     order = sorted(range(len(tried)), key=lambda k: tried[k].size_px)
     best = tried[order[0]]
     others = [tried[k] for k in order[1:]]
@@ -131,8 +132,7 @@ def deviations_apart(best: Missed, rival: Missed) -> float:
     """By how many deviations the rival misses more, over the frames that both compared.
 
     Both look at the same corners, so that what their noise does cancels in each frame's difference.
-    It is taken of the frame's squares together, so that one frame that the rival misses by far more
-    than others speaks for the best, and not for scatter. Starts without common frames are held
+    Starts without common frames are held
     against each other by the logarithm of their variances, two numbers a frame, since the errors of
     one frame's corners are much alike.
     """
@@ -141,8 +141,7 @@ def deviations_apart(best: Missed, rival: Missed) -> float:
     both = sorted(best.squares_px2.keys() & rival.squares_px2.keys())
     if len(both) >= _LEAST_COMPARED:
         theirs, own = (np.array([one.squares_px2[k] for k in both]) for one in (rival, best))
-        more = (theirs - own) / np.maximum(theirs + own, 1e-300)
-        return float(more.mean() / max(float(more.std(ddof=1)), 1e-300) * np.sqrt(len(more)))
+        return sigmas_more(theirs, own)
     counts = (max(len(one.squares_px2), 1) for one in (best, rival))
     spread = np.sqrt(sum(1.0 / count for count in counts))
     return float(2.0 * np.log(rival.size_px / best.size_px) / spread)
@@ -185,10 +184,11 @@ def _next(
 
 def _needed(pair: Pair) -> bool:
     """Whether the records do not fit as they are stamped."""
-    return pair.at_zero_m > CLEARLY_BETTER * pair.decided_m + WORSE_M
+    return pair.at_zero_sigmas > SURE_SIGMAS
 
 
-def _later(view: CameraViews, lag_s: float) -> CameraViews:
+def later(view: CameraViews, lag_s: float) -> CameraViews:
+    """The camera with a clock that many seconds later."""
     camera = view.camera
     return view.believed(replace(camera, clock_offset_s=camera.clock_offset_s + float(lag_s)))
 

@@ -69,6 +69,8 @@ class Pair:
         known_m: the same with the cameras where their calibration has them.
         decided_m: of the two, the one that decided between lags.
         at_zero_m: that measure without a lag, infinite where the records then do not overlap.
+        at_zero_sigmas: by how many deviations poses fit worse without a lag, frame by frame, with
+            the cameras as calibrated or by the platform alone: whichever tells more.
         rivals: other lags and that measure there, best first.
     """
 
@@ -78,6 +80,7 @@ class Pair:
     known_m: float
     decided_m: float
     at_zero_m: float
+    at_zero_sigmas: float
     rivals: tuple[tuple[float, float], ...]
 
 
@@ -124,8 +127,33 @@ def pair_of(first: OwnTrack, second: OwnTrack, T_known: Array) -> Pair | None:
         if all(abs(fit.lag_s - lag) > 2.0 * step for lag in taken):
             rivals.append((fit.lag_s, size(fit)))
     at_zero = float("inf") if zero is None else size(zero)
+    sigmas = float("inf") if zero is None else _worse(zero, best)
     parts = best.lag_s, best.T_first_second, best.miss_m, best.known_m
-    return Pair(*parts, size(best), at_zero, tuple(rivals))
+    return Pair(*parts, size(best), at_zero, sigmas, tuple(rivals))
+
+
+def _worse(one: Fitted, best: Fitted) -> float:
+    """By how many deviations a lag leaves poses farther apart than the best."""
+    both = (one.misses_m > 0.0).all(axis=0) & (best.misses_m > 0.0).all(axis=0)
+    if both.sum() < _LEAST_OVERLAP:
+        return float("inf")
+    return max(
+        sigmas_more(theirs[both] ** 2, own[both] ** 2)
+        for theirs, own in zip(one.misses_m, best.misses_m, strict=True)
+    )
+
+
+def sigmas_more(theirs: Array, own: Array) -> float:
+    """By how many deviations squares (n,) exceed others (n,), pair by pair.
+
+    Each difference is taken of the sum of its two, so that one by far larger than others speaks
+    for being larger, and not for scatter.
+
+    Source:
+        Press et al. 2007, Numerical Recipes, sec. 14.2: means of paired samples.
+    """
+    more = (theirs - own) / np.maximum(theirs + own, 1e-300)
+    return float(more.mean() / max(float(more.std(ddof=1)), 1e-300) * np.sqrt(len(more)))
 
 
 def _speeds(track: OwnTrack) -> tuple[Array, Array]:
@@ -182,12 +210,21 @@ def _candidates(lags: Array, scores: Array) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class Fitted:
-    """Two tracks at one lag: the motion between the cameras, what it and the known one leave."""
+    """Two tracks at one lag.
+
+    Attributes:
+        lag_s: to be added to the second's times.
+        miss_m: what the motion between the cameras leaves, the median.
+        known_m: what the known motion leaves.
+        T_first_second: the motion between the cameras, (4, 4).
+        misses_m: both for each of the second's frames, zero where not compared, (2, n).
+    """
 
     lag_s: float
     miss_m: float
     known_m: float
     T_first_second: Array
+    misses_m: Array
 
 
 def _fitted(first: OwnTrack, second: OwnTrack, lag: float, T_known: Array) -> Fitted | None:
@@ -208,8 +245,10 @@ def _fitted(first: OwnTrack, second: OwnTrack, lag: float, T_known: Array) -> Fi
     miss = _misses(_onto(own, seen), own, seen)
     good = miss <= 2.0 * np.median(miss)
     T = _onto(own[good], seen[good])
-    known = float(np.median(_misses(T_known, own, seen)))
-    return Fitted(lag, float(np.median(_misses(T, own, seen))), known, T)
+    misses = np.zeros((2, len(at)))
+    misses[:, inside] = _misses(T, own, seen), _misses(T_known, own, seen)
+    miss_m, known_m = np.median(misses[:, inside], axis=1)
+    return Fitted(lag, float(miss_m), float(known_m), T, misses)
 
 
 def _cubic(times: Array, at: Array) -> Array:

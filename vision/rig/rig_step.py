@@ -78,16 +78,17 @@ def rig_step(
     survey_std_m: float = SURVEY_STD_M,
     *,
     told: bool = True,
+    plain: bool = False,
 ) -> RigStep:
     """Solves for the rig's numbers marked in `free` (n_c, 8), the poses eliminated.
 
     Squeezed pictures err alike from frame to frame, each tag in its own way: deviations are those
     of leaving out one stretch of the recording, or one tag of one camera, at a time where these
-    are larger; without `told` those of the equations alone.
+    are larger; without `told` those of the equations alone. `plain` is that of `fuse`.
     """
     n_c = len(views)
     size = PER_CAMERA * n_c
-    parts, others = _equations(views, watch, poses, fit, told)
+    parts, others = _equations(views, watch, poses, fit, told, pixels_alone=plain)
     normal = sum((part.normal for part in parts), np.zeros((size, size)))
     right = sum((part.right for part in parts), np.zeros(size))
     for index, view in enumerate(views):
@@ -117,7 +118,13 @@ def rig_step(
 
 
 def _equations(
-    views: Sequence[CameraViews], watch: Watch, poses: Poses, fit: Fit, by_tags: bool
+    views: Sequence[CameraViews],
+    watch: Watch,
+    poses: Poses,
+    fit: Fit,
+    by_tags: bool,
+    *,
+    pixels_alone: bool,
 ) -> tuple[list[RigEquations], list[RigEquations]]:
     """The rig's equations of each stretch, and what is lost of all without each camera's tag."""
     size = PER_CAMERA * len(views)
@@ -126,7 +133,7 @@ def _equations(
     by_stretch: dict[int, RigEquations] = {}
     by_tag: dict[tuple[int, int], RigEquations] = {}
     stretch_of = stretches(poses.times_s)
-    for block in blocks(views, watch, poses.times_s, poses):
+    for block in blocks(views, watch, poses.times_s, poses, pixels_alone=pixels_alone):
         span = slice(block.first, block.first + len(block.starts) - 1)
         known = poses.known[span] & (np.abs(poses.motions[span]).sum(axis=1) > 0.0)
         instant = np.repeat(np.arange(len(known)), np.diff(block.starts))
@@ -208,14 +215,15 @@ def iterated(
     survey_std_m: float,
     *,
     told: bool = True,
+    plain: bool = False,
 ) -> RigStep:
     """Gauss-Newton over rig and poses in turn; `current` and `total` are brought up to date.
 
-    Without `told` the deviations are those of the equations alone.
+    Without `told` the deviations are those of the equations alone; `plain` is that of `fuse`.
     """
     done = 0
     while True:
-        step = rig_step(current, watch, poses, fit, free, survey_std_m, told=False)
+        step = rig_step(current, watch, poses, fit, free, survey_std_m, told=False, plain=plain)
         done += 1
         settled = bool((np.abs(step.changes) <= _SETTLED * step.deviations).all())
         last = done == _MOST_STEPS or (settled and done >= _STEPS)
@@ -226,7 +234,9 @@ def iterated(
         total += step.changes
         if last:
             return step
-        poses, fit = fuse(current, watch, poses.times_s, start=poses, passes=2, rough=True)
+        poses, fit = fuse(
+            current, watch, poses.times_s, start=poses, passes=2, rough=True, plain=plain
+        )
 
 
 def frame_squares_px2(views: Sequence[CameraViews], watch: Watch, poses: Poses) -> dict[int, float]:

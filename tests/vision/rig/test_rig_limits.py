@@ -183,12 +183,9 @@ def test_a_clock_that_is_the_cameras_own(apart_s, written) -> None:
     assert (kept.clock_offset_s != 0.0) == written
 
 
-@pytest.mark.parametrize(
-    ("at_zero_m", "decided_m", "needed"),
-    [(0.0175, 0.01, False), (0.0185, 0.01, True), (0.0335, 0.02, True), (0.0325, 0.02, False)],
-)
-def test_when_a_camera_was_started_apart(at_zero_m, decided_m, needed) -> None:
-    assert _needed(stub(at_zero_m=at_zero_m, decided_m=decided_m)) == needed
+@pytest.mark.parametrize(("sigmas", "needed"), [(3.9, False), (4.1, True)])
+def test_when_a_start_is_looked_for(sigmas, needed) -> None:
+    assert _needed(stub(at_zero_sigmas=sigmas)) == needed
 
 
 def test_starts_are_compared_frame_by_frame() -> None:
@@ -222,7 +219,7 @@ def test_a_frame_that_a_rival_misses_by_far_does_not_speak_for_it() -> None:
 
 def test_a_start_that_ends_where_the_best_does_is_no_rival() -> None:
     view = stub(camera=VIEW, believed=lambda camera: camera)
-    pair = stub(lag_s=1.0, decided_m=0.01, rivals=[(1.07, 0.011), (2.0, 0.012)])
+    pair = stub(lag_s=1.0, decided_m=0.01, at_zero_m=0.04, rivals=[(1.07, 0.011), (2.0, 0.012)])
     ends = iter((1.02, 1.021, 2.0))
 
     def misfit(known, new):
@@ -233,10 +230,13 @@ def test_a_start_that_ends_where_the_best_does_is_no_rival() -> None:
     assert sure == 0.0  # the third fits as well and is another start
 
 
-@pytest.mark.parametrize(("miss_m", "tried"), [(0.029, 2), (0.031, 1)])
-def test_other_starts_that_are_tried_in_earnest(miss_m, tried) -> None:
+@pytest.mark.parametrize(
+    ("miss_m", "at_zero_m", "tried"), [(0.029, 0.1, 2), (0.031, 0.1, 1), (0.031, 0.029, 2)]
+)
+def test_other_starts_that_are_tried_in_earnest(miss_m, at_zero_m, tried) -> None:
+    """As stamped, too."""
     view = stub(camera=VIEW, believed=lambda camera: camera)
-    pair = stub(lag_s=1.0, decided_m=0.01, rivals=[(2.0, miss_m)])
+    pair = stub(lag_s=1.0, decided_m=0.01, at_zero_m=at_zero_m, rivals=[(2.0, miss_m)])
     asked = []
 
     def misfit(known, new):

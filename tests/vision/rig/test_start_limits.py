@@ -32,9 +32,11 @@ def stub(**attributes: Any) -> Any:
     return SimpleNamespace(**attributes)
 
 
-def started(monkeypatch, lag_s: float, deviations: float) -> lag_accepted.Aligned:
+def started(
+    monkeypatch, lag_s: float, deviations: float, known_m: float = 0.0
+) -> lag_accepted.Aligned:
     """Two cameras of 10 Hz, the second so much later."""
-    pair = stub(lag_s=lag_s, at_zero_m=0.1)
+    pair = stub(lag_s=lag_s, at_zero_m=0.1, miss_m=0.001, known_m=known_m)
     view = stub(camera=VIEW, believed=lambda moved: moved)
     monkeypatch.setattr(lag_accepted, "own_track", lambda _: stub(step_s=0.1))
     monkeypatch.setattr(lag_accepted, "_next", lambda *_: (0, 1, pair))
@@ -46,6 +48,12 @@ def started(monkeypatch, lag_s: float, deviations: float) -> lag_accepted.Aligne
 @pytest.mark.parametrize(("lag_s", "later"), [(0.048, False), (0.052, True)])
 def test_half_a_frame_is_left_to_the_clocks(monkeypatch, lag_s, later) -> None:
     assert bool(started(monkeypatch, lag_s, 99.0).lags_s[1]) == later
+
+
+@pytest.mark.parametrize(("known_m", "asked"), [(0.062, True), (0.064, False)])
+def test_cameras_that_stand_elsewhere_are_asked_for_no_start(monkeypatch, known_m, asked) -> None:
+    """Nothing that pixels say of it is right then; what is wrong is named afterwards."""
+    assert bool(started(monkeypatch, 1.0, 99.0, known_m).lags_s[1]) == asked
 
 
 @pytest.mark.parametrize(("deviations", "sure"), [(3.9, False), (4.1, True)])
@@ -66,7 +74,7 @@ def test_frames_that_both_starts_share(common, by_frame) -> None:
 @pytest.mark.parametrize(("apart_s", "rivals"), [(0.0048, 0), (0.0052, 1)])
 def test_starts_that_end_five_milliseconds_apart_are_two(apart_s, rivals) -> None:
     view = stub(camera=VIEW, believed=lambda moved: moved)
-    pair = stub(lag_s=1.0, decided_m=0.01, rivals=[(1.07, 0.011)])
+    pair = stub(lag_s=1.0, decided_m=0.01, at_zero_m=0.1, rivals=[(1.07, 0.011)])
     ends = iter((1.02, 1.02 + apart_s))
     chosen = _chosen(
         pair, view, view, lambda *_: Missed(0.1, dict.fromkeys(range(50), 0.01), next(ends))
@@ -123,7 +131,7 @@ def test_sightings_that_fit_badly_say_less_of_the_rig(monkeypatch) -> None:
         counts=np.ones(3, int), things=np.arange(3),
     )  # fmt: skip
     residuals = np.sqrt(scores)[:, None] * np.ones(2)
-    monkeypatch.setattr(rig_step, "blocks", lambda *_: [block])
+    monkeypatch.setattr(rig_step, "blocks", lambda *_, **__: [block])
     monkeypatch.setattr(rig_step, "linearised", lambda *_: stub(residuals=residuals))
     monkeypatch.setattr(rig_step, "whitened", lambda *_: np.tile(np.eye(2), (3, 1, 1)))
     monkeypatch.setattr(
@@ -157,7 +165,7 @@ def test_deviations_between_stretches_hold_what_they_err_by_alike(monkeypatch) -
             normal[:2, :2] = np.diag([1e2, 1e2])
             right[:2] = 1e2 * one
             parts.append(rig_step.RigEquations(normal, right))
-        monkeypatch.setattr(rig_step, "_equations", lambda *_: (parts, []))
+        monkeypatch.setattr(rig_step, "_equations", lambda *_, **__: (parts, []))
         monkeypatch.setattr(rig_step, "base_equations", lambda *_: (np.zeros((6, 6)), np.zeros(6)))
         free = np.zeros((1, 8), dtype=bool)
         free[0, :2] = True
