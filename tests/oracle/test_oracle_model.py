@@ -112,8 +112,8 @@ def _linear_tether(robot: str, stiffness: float, anchor: tuple[float, float, flo
 # World fields (of a platform of `MASS_KG`, the product's forces being over the mass), the product's
 # values, and by how much of the effects' own size the two may differ: smooth effects agree to
 # integration error, |v| is rounded at 0.1 mm/s in the product, dry friction is smoothed over
-# 0.0002 rad/s here and 0.01 rad/s there.
-SMOOTH, ROUNDED, DRY = 1e-5, 1e-3, 0.25
+# 0.0002 rad/s here and 0.002 rad/s there.
+SMOOTH, ROUNDED, DRY = 1e-5, 1e-3, 5e-3
 EFFECTS = {
     "forces": (
         {

@@ -8,7 +8,8 @@ from freeswing.cdpr.effects.base import AMPLITUDES, Effect, Instant, Parameter
 from freeswing.cdpr.model.body import Expression
 from freeswing.cdpr.robot import Robot
 
-SMOOTHING_RAD_S = 0.01
+# As in the swivels (`swivel_friction`).
+SMOOTHING_RAD_S = 0.002
 
 
 class PulleyFriction(Effect):

@@ -8,11 +8,13 @@ from freeswing.cdpr.effects.base import AMPLITUDES, Effect, Instant, Parameter
 from freeswing.cdpr.model.body import Expression
 from freeswing.cdpr.robot import Robot
 
-SMOOTHING_RAD_S = 0.01
+# Five times as wide it left 1 % of the noise's power at a mode beside large friction, and that was
+# taken for a force; half as wide changes nothing, in more segments (docs/decisions/diagnosis.md).
+SMOOTHING_RAD_S = 0.002
 
 
 class SwivelFriction(Effect):
-    """Coulomb torque about every swivel axis, smoothed over +-0.01 rad/s."""
+    """Coulomb torque about every swivel axis, smoothed over +-0.002 rad/s."""
 
     name = "swivel_friction"
     summary = "dry friction in the swivel bearings"
