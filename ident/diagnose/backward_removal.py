@@ -54,7 +54,7 @@ def superfluous(current: Refit, kept: Sequence[str]) -> str:
 
 def is_no_worse(fewer: Refit, more: Refit, name: str, noise_scales: np.ndarray) -> bool:
     """Whether a fit without an effect is as good as the one with it, its unknowns counted."""
-    by_held_out = 2.0 * float(left_out(fewer, noise_scales).gains(more.score.held_out).sum())
+    by_held_out = 2.0 * float(left_out(fewer, noise_scales).gains(more.score).sum())
     by_evidence = included(fewer, more, name, noise_scales)
     return by_evidence <= ACCEPTED and by_held_out < CONFOUNDED_DIFFERENCE
 

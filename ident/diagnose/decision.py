@@ -143,12 +143,12 @@ def promising(
     """
     runs = left_out(current, noise_scales)
     excess = max((current.score.cost - float(runs.counts.sum())) / colour, LEAST_GAIN)
-    held_out = {n: 2.0 * float(runs.gains(one.held_out).sum()) for n, one in linear.items()}
+    held_out = {n: 2.0 * float(runs.gains(one).sum()) for n, one in linear.items()}
     likelihood = {
         n: (current.score.cost - one.cost) / colour - penalty(current, n)
         for n, one in linear.items()
     }
-    shares = {n: runs.share(one.held_out) for n, one in linear.items()}
+    shares = {n: runs.share(one) for n, one in linear.items()}
     of_likelihood = {n: gain / excess for n, gain in likelihood.items()}
     chosen: list[str] = []
     for gains, promise in ((held_out, shares), (likelihood, of_likelihood)):
@@ -168,7 +168,7 @@ def settles(decision: Decision, current: Refit, noise_scales: Array) -> bool:
     """
     if decision.winner is None:
         return False
-    gain = left_out(current, noise_scales).share(decision.winner.score.held_out)
+    gain = left_out(current, noise_scales).share(decision.winner.score)
     return gain >= LEAST_SHARE_EXPLAINED or lacks_little(decision.winner)
 
 
@@ -216,7 +216,7 @@ def decided(
         known = tried.get(one)
         seen = known.score if known else linear[one]
         bic = delta_bic(current, seen, one, colour)
-        gain = runs.share(seen.held_out)
+        gain = runs.share(seen)
         verdict, reason, others = _verdict(one, key, group, complaints, known, passed, gain)
         mine = [p for other, p in chances.items() if effect_of(other) == effect_of(one)]
         chance = sum(mine) if mine else None
@@ -293,7 +293,7 @@ def _complaint(current: Refit, one: Refit, name: str, noise_scales: Array, later
     if outside:
         return "; ".join(outside)
     excess, runs = excess_of(current), left_out(current, noise_scales)
-    gain, gains = runs.share(one.score.held_out), runs.gains(one.score.held_out)
+    gain, gains = runs.share(one.score), runs.gains(one.score)
     if excess < -MOST_BELOW_NOISE:
         return (
             f"left-out runs are predicted without it, {-100 * excess:.0f} % below their noise: "
@@ -302,7 +302,7 @@ def _complaint(current: Refit, one: Refit, name: str, noise_scales: Array, later
     chance = included(current, one, name, noise_scales)
     if chance <= ACCEPTED:
         return f"not sure: with probability {chance:.2g} it is there rather than nothing"
-    worse = runs_worse(current.score.held_out - one.score.held_out, current.score)
+    worse = runs_worse(current.score.surprise - one.score.surprise, current.score)
     if gains.sum() <= 0.0 or worse > MOST_WORSE * len(gains):
         return f"{worse} of {len(gains)} left-out runs are predicted worse with it"
     if worse >= CONTRADICTED * len(gains) and gains.sum() < 2.0 * _scatter(gains):
@@ -330,7 +330,7 @@ def runs_worse(gains: Array, before: Score) -> int:
 def left_out(current: Refit, noise_scales: Array) -> LeftOut:
     """The runs, each left out, as a fit predicts them."""
     independent = independent_numbers(current.fit, noise_scales)
-    return LeftOut(current.score.held_out, current.evidence.counts, independent, LEAST_EXCESS)
+    return LeftOut(current.score, current.evidence.counts, independent, LEAST_EXCESS)
 
 
 def excess_of(current: Refit) -> float:
@@ -353,7 +353,7 @@ def _winner(
     """
     if not passed:
         return "", ()
-    gains = {name: float(runs.gains(one.score.held_out).sum()) for name, one in passed.items()}
+    gains = {name: float(runs.gains(one.score).sum()) for name, one in passed.items()}
     best = max(gains.values())
     group = [
         name

@@ -357,7 +357,7 @@ def _with_own_noise(found: LikelihoodFit) -> LikelihoodFit:
 def _share_explained(search: Search, last: Refit) -> float:
     """Share of what forces had to explain, once lengths had settled the geometry."""
     first = next(one.before for one in search.rounds if not one.by_lengths)
-    return left_out(first, search.noise_scales).share(last.score.held_out)
+    return left_out(first, search.noise_scales).share(last.score)
 
 
 def _ladder(

@@ -8,12 +8,16 @@ solved, scored on runs that were left out, and told apart, without another simul
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from freeswing.cdpr.measured.leaving_out import leaving_out_std
 from freeswing.cdpr.robot import Array
 from freeswing.ident.diagnose.own_values import OwnValues
+
+# Of the largest singular value: what is below cannot be told from rounding.
+NO_RANK = 1e-10
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +65,9 @@ class Score:
         std: of that change for white noise, (p,).
         jackknife_std: from leaving out one run at a time, (p,).
         cost: sum of squares over all runs after the change.
-        held_out: sum of squares of each run with the change found on the others, (r,).
+        held_out: sum of squares of each run with the change found on the others, counted with the
+            covariance of that prediction, (r,).
+        wider: logarithm of that covariance's determinant over the noise's, (r,).
         rank: of the joint problem.
     """
 
@@ -70,7 +76,13 @@ class Score:
     jackknife_std: Array
     cost: float
     held_out: Array
+    wider: Array
     rank: int
+
+    @property
+    def surprise(self) -> Array:
+        """Of each run, left out: twice its negative log density, but for a constant, (r,)."""
+        return self.held_out + self.wider
 
 
 def score(evidence: Evidence) -> Score:
@@ -80,14 +92,32 @@ def score(evidence: Evidence) -> Score:
     scale = _column_scale(evidence)
     whole = _solve(evidence.triangles.reshape(-1, size), evidence.prior_rows, scale)
     changes = np.empty((r, p))
-    held_out = np.empty(r)
+    held_out, wider = np.empty(r), np.empty(r)
     for k in range(r):
         others = np.delete(evidence.triangles, k, axis=0).reshape(-1, size)
-        changes[k] = _solve(others, evidence.prior_rows, scale)[0]
-        held_out[k] = np.sum((evidence.triangles[k] @ np.append(changes[k], 1.0)) ** 2)
+        without = _solve(others, evidence.prior_rows, scale)
+        changes[k] = without.change
+        held_out[k], wider[k] = _predicted(evidence.triangles[k], without)
     jackknife = leaving_out_std(changes)
-    fitted = evidence.triangles.reshape(-1, size) @ np.append(whole[0], 1.0)
-    return Score(whole[0], whole[1], jackknife, float(fitted @ fitted), held_out, whole[2])
+    fitted = evidence.triangles.reshape(-1, size) @ np.append(whole.change, 1.0)
+    cost = float(fitted @ fitted)
+    return Score(whole.change, whole.std, jackknife, cost, held_out, wider, whole.rank)
+
+
+def _predicted(triangle: Array, others: Solution) -> tuple[float, float]:
+    """Squares of a run that others predict, and how much wider that is than noise (`Score`).
+
+    Near a singularity a run answers to everything at once, by more than the others know: what
+    these leave open is no error of a model.
+
+    Source:
+        Bishop 2006, Pattern Recognition and Machine Learning, sec. 3.3.2: the predictive
+        distribution.
+    """
+    error = triangle @ np.append(others.change, 1.0)
+    along, sizes, _ = np.linalg.svd(triangle[:, :-1] @ others.root)
+    variances = 1.0 + np.append(sizes, np.zeros(len(error) - len(sizes))) ** 2
+    return float(np.sum((along.T @ error) ** 2 / variances)), float(np.log(variances).sum())
 
 
 def _column_scale(evidence: Evidence) -> Array:
@@ -95,13 +125,34 @@ def _column_scale(evidence: Evidence) -> Array:
     return 1.0 / np.where(norms > 0.0, norms, 1.0)
 
 
-def _solve(rows: Array, prior: Array, scale: Array) -> tuple[Array, Array, int]:
-    """Least-squares change, its standard deviations, and the rank."""
+class Solution(NamedTuple):
+    """Of a linear problem.
+
+    Attributes:
+        change: of the unknowns, (p,).
+        root: of its covariance for white noise: that is root root^T, (p, p).
+        rank: of the problem; what is beyond may be anything.
+    """
+
+    change: Array
+    root: Array
+    rank: int
+
+    @property
+    def std(self) -> Array:
+        """Standard deviations of the change, of what can be told, (p,)."""
+        return np.sqrt(np.sum(self.root[:, : self.rank] ** 2, axis=1))
+
+
+def _solve(rows: Array, prior: Array, scale: Array) -> Solution:
+    """Least-squares change with its covariance and the rank."""
     stacked = np.vstack([rows, prior])
     matrix = stacked[:, :-1] * scale
     left, singular, right = np.linalg.svd(matrix, full_matrices=False)
-    kept = singular > 1e-10 * singular.max(initial=0.0)
+    least = NO_RANK * singular.max(initial=0.0)
+    kept = singular > least
     inverse = np.where(kept, 1.0 / np.where(kept, singular, 1.0), 0.0)
     change = -scale * (right.T @ (inverse * (left.T @ stacked[:, -1])))
-    std = scale * np.sqrt(np.sum((right.T * inverse) ** 2, axis=1))
-    return change, std, int(kept.sum())
+    floor = max(least, np.finfo(float).tiny)
+    root = scale[:, None] * right.T / np.maximum(singular, floor)
+    return Solution(change, root, int(kept.sum()))

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -65,6 +66,20 @@ def log_predictive(squares: Array, counts: Array, independent: Array) -> Array:
     return above + 0.5 * np.maximum(-excess, 0.0)
 
 
+class Prediction(Protocol):
+    """What others make of each run: a score (`leave_one_out.Score`)."""
+
+    @property
+    def held_out(self) -> Array:
+        """Sum of squares of each run, (r,)."""
+        ...
+
+    @property
+    def wider(self) -> Array:
+        """Log determinant of its covariance over the noise's, (r,)."""
+        ...
+
+
 @dataclass(frozen=True, slots=True)
 class LeftOut:
     """Runs that were left out, and what a prediction of them is worth.
@@ -73,35 +88,39 @@ class LeftOut:
     Their log densities, the size of what is missing being unknown, compare runs of any size.
 
     Attributes:
-        squares: of each run under the model that stands, (r,).
+        stands: what the model that stands makes of each run, left out.
         counts: how many numbers each run measured, (r,).
         independent: how many of them what is missing moves independently, (r,).
         least: excess over the noise, as a share of the noise, below which a share means nothing.
     """
 
-    squares: Array
+    stands: Prediction
     counts: Array
     independent: Array
     least: float
 
-    def gains(self, squares: Array) -> Array:
-        """Gain in log density of each run where its squares are these instead, (r,)."""
+    def gains(self, instead: Prediction) -> Array:
+        """Gain in log density of each run where it is predicted so instead, (r,).
+
+        What a model leaves open of a run is charged by how much wider it predicts it.
+        """
         now, then = (
-            log_predictive(one, self.counts, self.independent) for one in (squares, self.squares)
+            log_predictive(one.held_out, self.counts, self.independent) - 0.5 * one.wider
+            for one in (instead, self.stands)
         )
         return now - then
 
-    def share(self, squares: Array) -> float:
+    def share(self, instead: Prediction) -> float:
         """Share of the excess over the noise that is taken away: the runs' geometric mean.
 
         Source:
             MacKay 2003, Information Theory, Inference, and Learning Algorithms, ch. 28: by the
             densities of `log_predictive`.
         """
-        whole = -log_predictive(self.squares, self.counts, self.independent).sum()
+        whole = -log_predictive(self.stands.held_out, self.counts, self.independent).sum()
         floor = log_predictive((1.0 + self.least) * self.counts, self.counts, self.independent)
         excess = 2.0 * max(float(whole), -float(floor.sum())) / self.independent.sum()
-        taken = 2.0 * float(self.gains(squares).sum()) / self.independent.sum()
+        taken = 2.0 * float(self.gains(instead).sum()) / self.independent.sum()
         return float(np.expm1(-taken) / np.expm1(-excess))
 
 

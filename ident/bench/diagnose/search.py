@@ -229,13 +229,13 @@ def _judged(
     passed = [name for name in weighed if not complaints[name]]
     group: list[str] = []
     if passed:
-        first = min(passed, key=lambda name: weighed[name].score.held_out.sum())
-        least = weighed[first].score.held_out.sum() + CONFOUNDED_DIFFERENCE
+        first = min(passed, key=lambda name: weighed[name].score.surprise.sum())
+        least = weighed[first].score.surprise.sum() + CONFOUNDED_DIFFERENCE
         group = [
             name for name in passed
-            if weighed[name].score.held_out.sum() < least or chance[name] > RIVAL
+            if weighed[name].score.surprise.sum() < least or chance[name] > RIVAL
         ]  # fmt: skip
-        group.sort(key=lambda n: (len(by_block[n].parameters), weighed[n].score.held_out.sum()))
+        group.sort(key=lambda n: (len(by_block[n].parameters), weighed[n].score.surprise.sum()))
     for name in weighed:
         cause = by_block[name]
         share = _share(before, weighed[name], counts)
@@ -261,7 +261,7 @@ def _complaint(before: Fit, one: Fit, counts: Array) -> str:
     chance = float(chances([before, one], counts)[1])
     if chance <= ACCEPTED:
         return f"not sure: with probability {chance:.2g} it is there rather than nothing"
-    gains = before.score.held_out - one.score.held_out
+    gains = before.score.surprise - one.score.surprise
     worse = runs_worse(gains, before.score)
     if gains.sum() <= 0.0 or worse > MOST_WORSE * len(gains):
         return f"{worse} of {len(gains)} left-out runs are predicted worse with it"
@@ -270,8 +270,8 @@ def _complaint(before: Fit, one: Fit, counts: Array) -> str:
 
 def _share(before: Fit, one: Fit, counts: Array) -> float:
     """Share of the left-out runs' excess over the noise that a cause takes away."""
-    excess = float(before.score.held_out.sum() - counts.sum())
-    gain = float(before.score.held_out.sum() - one.score.held_out.sum())
+    excess = float(before.score.surprise.sum() - counts.sum())
+    gain = float(before.score.surprise.sum() - one.score.surprise.sum())
     return gain / max(excess, LEAST_GAIN)
 
 

@@ -117,8 +117,8 @@ def _judged(ground: Ground, last: Fit, bench: Bench, one: Removed) -> Removed:
     each_run = one.blocks == ("effects",)
     counts = last.squares
     chance = needed(without, last, int(each_run))
-    gains = without.score.held_out - last.score.held_out
-    excess = float(without.score.held_out.sum() - counts.sum())
+    gains = without.score.surprise - last.score.surprise
+    excess = float(without.score.surprise.sum() - counts.sum())
     more = len(counts) if each_run else len(one.names) * len(one.blocks)
     bic = last.solution.cost - without.solution.cost
     bic += 2.0 * more if each_run else more * float(np.log(counts.sum()))

@@ -279,7 +279,7 @@ def test_the_less_probable_is_not_taken_for_the_one_that_failed(
     def fit(block: str) -> Any:
         return SimpleNamespace(
             block=block, squares=np.ones(3), solution=SimpleNamespace(cost=1.0),
-            score=SimpleNamespace(held_out=np.full(3, 2.0 if block == spring.block else 1.0)),
+            score=SimpleNamespace(surprise=np.full(3, 2.0 if block == spring.block else 1.0)),
         )  # fmt: skip
 
     before = fit("")

@@ -36,7 +36,8 @@ NOTHING = np.zeros(0)
 
 
 def score(held_out, cost: float = 0.0) -> Score:
-    return Score(NOTHING, NOTHING, NOTHING, cost, np.asarray(held_out, dtype=float), 0)
+    squares = np.asarray(held_out, dtype=float)
+    return Score(NOTHING, NOTHING, NOTHING, cost, squares, np.zeros(len(squares)), 0)
 
 
 def fitted(held_out, cost: float = 0.0, count: float = 4.0) -> SimpleNamespace:
@@ -153,9 +154,9 @@ def test_an_excess_counts_as_half_a_per_cent_at_least() -> None:
     count = 1e6
     noise = np.array([count])
     before = fitted([count * 1.0042], 0.0, count)
-    assert left_out(before, np.ones(2)).share(noise) == pytest.approx(0.84, abs=0.01)
+    assert left_out(before, np.ones(2)).share(score(noise)) == pytest.approx(0.84, abs=0.01)
     wider = fitted([count * 1.0057], 0.0, count)
-    assert left_out(wider, np.ones(2)).share(noise) == pytest.approx(1.0, abs=0.01)
+    assert left_out(wider, np.ones(2)).share(score(noise)) == pytest.approx(1.0, abs=0.01)
 
 
 def ranked(gains: dict[str, float], tried=(), later=False) -> list[str]:

@@ -115,7 +115,8 @@ def test_what_lengths_settle_to_the_noise_leaves_a_verdict_on_the_others(tmp_pat
 
 def test_a_small_loss_beside_the_gain_contradicts_nothing():
     nothing = np.zeros(0)
-    before = Score(nothing, nothing, nothing, 900.0, np.array([600.0, 100.0, 100.0, 100.0]), 0)
+    squares = np.array([600.0, 100.0, 100.0, 100.0])
+    before = Score(nothing, nothing, nothing, 900.0, squares, np.zeros(4), 0)
     assert runs_worse(np.array([500.0, -4.0, -5.0, 1.0]), before) == 0
     assert runs_worse(np.array([500.0, -40.0, -50.0, 1.0]), before) == 2
     assert runs_worse(np.array([6.0, -4.0, -0.5, 1.0]), before) == 1

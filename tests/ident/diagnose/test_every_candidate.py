@@ -27,7 +27,7 @@ def moves_all(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def scored(held_out):
     nothing = np.zeros(0)
-    return Score(nothing, nothing, nothing, held_out, np.full(4, held_out / 4.0), 0)
+    return Score(nothing, nothing, nothing, held_out, np.full(4, held_out / 4.0), np.zeros(4), 0)
 
 
 def current_fit(held_out=10000.0, count=1000.0):

@@ -10,11 +10,12 @@ from freeswing.ident.diagnose.leave_one_out import Evidence, score
 TRUTH = np.array([0.5, -1.0, 2.0])
 
 
-def made_evidence(seed, runs=6, rows=200, noise=1.0, coloured=0.0):
+def made_evidence(seed, runs=6, rows=200, noise=1.0, coloured=0.0, steep=1.0):
     rng = np.random.default_rng(seed)
     triangles, raw = [], []
-    for _ in range(runs):
+    for run in range(runs):
         matrix = rng.normal(size=(rows, 3))
+        matrix[:, 2] *= steep if run == 4 else 1.0
         off = coloured * rng.normal(size=3)
         right = -matrix @ (TRUTH + off) + noise * rng.normal(size=rows)
         raw.append((matrix, right))
@@ -35,14 +36,45 @@ def test_score_equals_the_explicit_least_squares():
     assert found.rank == 3
 
 
-def test_held_out_cost_is_that_of_a_run_under_the_others_solution():
+def test_a_run_left_out_costs_what_it_adds_to_the_others():
+    """With the covariance of the prediction: the whole cost less that of the others alone."""
     evidence, raw = made_evidence(2)
     found = score(evidence)
     others = [pair for k, pair in enumerate(raw) if k != 4]
+    costs = []
+    for pairs in (raw, others):
+        matrix, right = (np.concatenate(part) for part in zip(*pairs, strict=True))
+        change = -np.linalg.lstsq(matrix, right, rcond=None)[0]
+        costs.append((np.sum((right + matrix @ change) ** 2), np.linalg.slogdet(matrix.T @ matrix)))
+    (whole, (_, log_whole)), (fewer, (_, log_fewer)) = costs
+    assert found.held_out[4] == pytest.approx(whole - fewer, rel=1e-9)
+    assert found.wider[4] == pytest.approx(log_whole - log_fewer, rel=1e-9)
+    assert found.surprise[4] == found.held_out[4] + found.wider[4]
+
+
+def test_a_run_that_no_other_tells_anything_of_has_no_veto():
+    """Near a singularity one run answers to an unknown a thousand times as much as the others.
+
+    What these leave open of it moves that run by tens of times its noise: no contradiction.
+    """
+    evidence, raw = made_evidence(10, steep=1e3)
+    others = [pair for k, pair in enumerate(raw) if k != 4]
     matrix, right = (np.concatenate(part) for part in zip(*others, strict=True))
     change = -np.linalg.lstsq(matrix, right, rcond=None)[0]
-    expected = np.sum((raw[4][1] + raw[4][0] @ change) ** 2)
-    assert found.held_out[4] == pytest.approx(expected, rel=1e-10)
+    plain = np.sum((raw[4][1] + raw[4][0] @ change) ** 2)
+    found = score(evidence)
+    assert plain > 100.0 * evidence.counts[4], plain
+    assert found.held_out[4] < 1.2 * evidence.counts[4], found.held_out
+    assert 10.0 < found.wider[4] < 20.0, found.wider
+
+
+def test_what_no_other_run_knows_at_all_costs_nothing():
+    """Others that are blind to an unknown let the run say what it is."""
+    evidence, _ = made_evidence(8)
+    triangles = evidence.triangles.copy()
+    triangles[np.arange(6) != 4, :, 2] = 0.0
+    found = score(Evidence(evidence.runs, triangles, evidence.counts, evidence.prior_rows))
+    assert found.held_out[4] < 1.2 * evidence.counts[4], found.held_out
 
 
 @settings(max_examples=20, deadline=None)

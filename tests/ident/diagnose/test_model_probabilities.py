@@ -1,5 +1,8 @@
 """Probabilities of rival models: noise, many unknowns, leads of one run, unknown discrepancies."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -108,6 +111,10 @@ def test_at_the_noise_half_the_squares_count_and_above_it_their_ratio():
     assert far == pytest.approx(np.full(RUNS, -10.0 * np.log(2.0)), rel=0.02)
 
 
+def predicted(squares, wider: float = 0.0) -> Any:
+    return SimpleNamespace(held_out=squares, wider=np.full(len(squares), wider))
+
+
 def test_no_single_run_decides_for_all_of_those_left_out() -> None:
     """A day in the laboratory: stretch takes most of five runs, and one stands 180 times the noise.
 
@@ -116,19 +123,27 @@ def test_no_single_run_decides_for_all_of_those_left_out() -> None:
     counts, independent = np.full(6, 3592.0), np.full(6, 40.0)
     before = counts * np.array([6.6, 183.2, 40.4, 242.5, 48.9, 172.1])
     after = counts * np.array([2.8, 302.2, 19.4, 23.9, 19.1, 23.4])
-    runs = LeftOut(before, counts, independent, 0.005)
-    gains, squares = runs.gains(after), before - after
+    runs = LeftOut(predicted(before), counts, independent, 0.005)
+    gains, squares = runs.gains(predicted(after)), before - after
     scatter = np.sqrt(6.0) * np.array([gains.std(ddof=1), squares.std(ddof=1)])
     assert gains.sum() > 2.0 * scatter[0], gains
     assert squares.sum() < 2.0 * scatter[1], squares
-    assert runs.share(after) == pytest.approx(0.7, abs=0.1)
+    assert runs.share(predicted(after)) == pytest.approx(0.7, abs=0.1)
 
 
 @pytest.mark.parametrize("size", [0.01, 1.0, 1e3])
 def test_the_share_of_runs_that_are_alike_is_that_of_their_excess(size: float) -> None:
     counts = np.full(4, 1000.0)
-    runs = LeftOut((1.0 + size) * counts, counts, np.full(4, 50.0), 0.005)
-    assert runs.share((1.0 + 0.3 * size) * counts) == pytest.approx(0.7, rel=1e-9)
+    runs = LeftOut(predicted((1.0 + size) * counts), counts, np.full(4, 50.0), 0.005)
+    assert runs.share(predicted((1.0 + 0.3 * size) * counts)) == pytest.approx(0.7, rel=1e-9)
+
+
+def test_what_a_prediction_leaves_open_is_charged_whatever_the_run_leaves() -> None:
+    """By the logarithm of how much wider it is: at the noise and far above it."""
+    counts, wider = np.full(4, 1000.0), 3.0
+    for size in (1.0, 100.0):
+        runs = LeftOut(predicted(size * counts), counts, np.full(4, 50.0), 0.005)
+        assert runs.gains(predicted(size * counts, wider)) == pytest.approx(np.full(4, -1.5))
 
 
 def test_one_effect_in_thirty_is_there_beforehand():
