@@ -11,7 +11,7 @@ from freeswing.cdpr.robot import Array
 from freeswing.ident.diagnose.answer.taken_back import TakenBack
 from freeswing.ident.diagnose.answer.unmet_validation import share_removed, unmet
 from freeswing.ident.diagnose.backward_removal import is_no_worse
-from freeswing.ident.diagnose.decision import LEAST_SHARE_EXPLAINED
+from freeswing.ident.diagnose.decision import ACCEPTED, LEAST_SHARE_EXPLAINED, included
 from freeswing.ident.diagnose.heldout import HeldOut
 from freeswing.ident.diagnose.refit import Refit, colour_of, polished, refit
 from freeswing.ident.diagnose.search import Round
@@ -64,7 +64,7 @@ def unless_validated(
 def gravity_instead(
     accepted: Sequence[Round], last: Refit, noise_scales: Array
 ) -> tuple[TakenBack, str] | None:
-    """The answer without its forces where gravity of another strength serves as well.
+    """The answer without its forces where gravity of another strength, surely so, serves as well.
 
     A clock at another rate looks the same: a file is asked before the robot is blamed.
 
@@ -85,6 +85,8 @@ def gravity_instead(
     except ValueError:  # no gravity lowers the cost
         return None
     found = polished(found.fit, noise_scales)
+    if included(before, found, GRAVITY, noise_scales) < ACCEPTED:
+        return None
     if not is_no_worse(found, last, accepted[-1].decision.key, noise_scales):
         return None
     stronger = float(found.fit.values[found.values_of(GRAVITY)][0])
