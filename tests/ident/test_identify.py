@@ -96,6 +96,7 @@ def test_nothing_but_the_geometry_is_needed_of_the_robot():
     assert np.isfinite(guessed_inertia(bare)).all(), f"{guessed_inertia(bare)}"
 
 
+@pytest.mark.slow
 def test_free_coordinates_can_be_chosen_by_the_program():
     found = identify(nine(POSE_COORDINATES), replace(ROBOT, free_coordinates=None), FIDIM)
     assert len(found.free_coordinates) == 2, f"{found.free_coordinates}"
@@ -154,6 +155,7 @@ def test_a_singular_choice_of_free_coordinates_is_named():
     assert "x, z" in text, f"{text}"
 
 
+@pytest.mark.slow
 def test_the_mass_comes_from_payload_runs():
     payload = Payload(1.0, np.array([0.25, 0.1, 0.05]))
     mass = 8.0

@@ -29,6 +29,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_it_is_small_and_left_alone(results: Path) -> None:
     files = [path for path in FILMED.rglob("*") if path.is_file()]
     size = sum(path.stat().st_size for path in files)

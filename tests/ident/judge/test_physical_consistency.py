@@ -140,7 +140,8 @@ def _identified(runs: list[SwingRun], settings: IdentifySettings) -> dict[str, E
     return identify(runs, paper_model().robot, settings).estimates
 
 
-@pytest.mark.parametrize("method", [pytest.param("likely", marks=pytest.mark.slow), "published"])
+@pytest.mark.slow
+@pytest.mark.parametrize("method", ["likely", "published"])
 def test_estimates_are_held_to_possible_bodies(method: str, request: pytest.FixtureRequest):
     free, held = request.getfixturevalue(method)
     assert not free.consistency.is_possible, f"{free.consistency}"

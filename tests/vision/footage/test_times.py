@@ -119,7 +119,8 @@ def test_half_pictures_are_refused_by_name(tmp_path, capsys) -> None:
     assert "left.mp4: interlaced" in said, said
 
 
-@pytest.mark.parametrize("late", [pytest.param(6, marks=pytest.mark.slow), 14])
+@pytest.mark.slow
+@pytest.mark.parametrize("late", [6, 14])
 def test_a_start_by_hand_is_found(tmp_path, late, capsys) -> None:
     """The right camera was started 0.3 or 0.7 s later; its clock is off by 3.1 ms besides."""
     folder = write_session(tmp_path, without_clocks)

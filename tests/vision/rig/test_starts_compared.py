@@ -19,7 +19,7 @@ from tests.vision.rig.made_views import NOISE_PX, Recorded, made_views
 LATE_S = 0.7
 
 
-@pytest.mark.parametrize("wrong_s", [-0.5, 1.9])
+@pytest.mark.parametrize("wrong_s", [pytest.param(-0.5, marks=pytest.mark.slow), 1.9])
 def test_a_wrong_start_is_no_unknown_motion(tmp_path, wrong_s) -> None:
     """Poses of a wrong start scatter, so that the motion between them is known to little.
 
@@ -38,7 +38,7 @@ def test_a_wrong_start_is_no_unknown_motion(tmp_path, wrong_s) -> None:
     assert deviations_apart(*missed) > 10.0
 
 
-@pytest.mark.parametrize("turned_rad", [0.0, 0.004])
+@pytest.mark.parametrize("turned_rad", [pytest.param(0.0, marks=pytest.mark.slow), 0.004])
 @pytest.mark.parametrize(("late_s", "looked_for"), [(0.0, False), (0.7, True)])
 def test_a_start_by_a_whole_period_is_looked_for(tmp_path, turned_rad, late_s, looked_for) -> None:
     """A swing of 0.7 s a period nearly repeats itself, and a knock is off by as much at any start.
