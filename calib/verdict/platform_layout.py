@@ -18,6 +18,7 @@ from freeswing.calib.rig.reprojection import shape_modes, warped
 from freeswing.calib.rig.reprojection_kernels import WARP
 from freeswing.calib.rig.solve_rig import Rig
 from freeswing.calib.verdict.calibration_result import MOST_BYTES
+from freeswing.calib.verdict.survey_check import rms_distance
 from freeswing.cdpr.files.documents import InputError, read_text
 
 
@@ -57,7 +58,7 @@ def layout_entry(rig: Rig) -> dict[str, Any] | None:
             {
                 "family": family,
                 "id": number,
-                "mismatch_mm": 1e3 * _rms(found[k] - told[k]),
+                "mismatch_mm": 1e3 * rms_distance(found[k] - told[k]),
                 "std_mm": 1e3 * float(np.sqrt(square)),
                 "corners_platform_m": found[k].tolist(),
                 "target_corners_m": told[k].tolist(),
@@ -89,7 +90,3 @@ def read_layout(path: Path | str) -> PlatformLayout | None:
     if not (np.isfinite(found).all() and np.isfinite(stated).all()):
         raise InputError(f"{path}: its layout holds numbers that are not finite")
     return PlatformLayout(names, found, stated)
-
-
-def _rms(corners: Array) -> float:
-    return float(np.sqrt(np.mean(np.sum(corners**2, axis=-1))))

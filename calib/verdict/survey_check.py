@@ -51,7 +51,7 @@ def check_survey(cameras: tuple[Camera, ...], fixed: FixedPoints) -> SurveyCheck
     survey, seen = fixed.points_base_m[good], points[good]
     residual, scale = _fit(survey, seen, mirror=False)
     mirrored, _ = _fit(survey, seen, mirror=True)
-    rms, mirrored_rms = _rms(residual), _rms(mirrored)
+    rms, mirrored_rms = rms_distance(residual), rms_distance(mirrored)
     names = np.array(fixed.names)[good]
     reasons: list[str] = []
     if mirrored_rms < MIRRORED * rms and rms > TAG_LIMIT_M:
@@ -89,8 +89,10 @@ def _wrong_tags(names: np.ndarray, survey: Array, seen: Array) -> list[str]:
         others = ~own
         base = own if others.sum() < LEAST_TRIANGULATED else others
         moved = _placed(seen, survey[base], seen[base])
-        error = _rms(moved[own] - survey[own])
-        if error <= TAG_LIMIT_M or (base is others and _rms(moved[base] - survey[base]) > error):
+        error = rms_distance(moved[own] - survey[own])
+        if error <= TAG_LIMIT_M or (
+            base is others and rms_distance(moved[base] - survey[base]) > error
+        ):
             continue
         hint = _order_hint(moved, survey, own)
         reasons.append(f"base tag {tag} lies {1e3 * error:.1f} mm from its survey{hint}")
@@ -114,13 +116,14 @@ def _order_hint(moved: Array, survey: Array, own: np.ndarray) -> str:
     if len(a) != 4:
         return ": survey it again"
     for shift in (1, 2, 3):
-        if _rms(np.roll(a, shift, axis=0) - b) < TAG_LIMIT_M:
+        if rms_distance(np.roll(a, shift, axis=0) - b) < TAG_LIMIT_M:
             return f": its corners are listed {90 * shift} degrees turned; the order is TL TR BR BL"
     for shift in range(4):
-        if _rms(np.roll(a[::-1], shift, axis=0) - b) < TAG_LIMIT_M:
+        if rms_distance(np.roll(a[::-1], shift, axis=0) - b) < TAG_LIMIT_M:
             return ": its corners run the wrong way round; the order is TL TR BR BL"
     return ": survey it again"
 
 
-def _rms(residuals: Array) -> float:
+def rms_distance(residuals: Array) -> float:
+    """Root mean square length of vectors (.., 3)."""
     return float(np.sqrt(np.mean(np.sum(residuals**2, axis=-1))))

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.cdpr.files.problems import InputError
-from freeswing.cdpr.measured.repeated_and_interpolated import interpolated, repeated
+from freeswing.cdpr.measured.repeated_and_interpolated import interpolated, off_the_line, repeated
 from freeswing.cdpr.measured.trajectory import Trajectory
 
 Array = NDArray[np.float64]
@@ -204,9 +204,7 @@ def _single(values: Array, times_s: Array) -> Mask:
         return wild
     off = np.full(values.shape, np.nan)
     ahead = np.full(len(values), np.nan)  # how much of that line is the sample after
-    ahead[1:-1] = (times_s[1:-1] - times_s[:-2]) / (times_s[2:] - times_s[:-2])
-    after_counts = ahead[1:-1, None]
-    off[1:-1] = values[1:-1] - after_counts * values[2:] - (1.0 - after_counts) * values[:-2]
+    off[1:-1], ahead[1:-1] = off_the_line(values, times_s)
     pulls = np.nan_to_num(ahead[:-2], nan=0.5), np.nan_to_num(1.0 - ahead[2:], nan=0.5)
     for column, printed in zip(off.T, _print_steps(values), strict=True):
         known = np.isfinite(column)

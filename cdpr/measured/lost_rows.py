@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from freeswing.cdpr.measured.held_doubled_wild import NORMAL_BY_MAD
 from freeswing.cdpr.measured.trajectory import Trajectory
 
 Array = NDArray[np.float64]
@@ -20,7 +21,6 @@ CLEAR_STEPS = 6.0
 # Twice or three times the steps around, to so much of these, in size and to the side; these agree
 # with each other to twice that.
 TO_WITHIN = 0.25
-NORMAL_BY_MAD = 1.4826
 # Of a step: one that took longer has its gap in the stamps.
 EVEN = 0.3
 LEAST_SAMPLES = 20

@@ -29,6 +29,19 @@ RAISED = (2, 3, 4, 5)
 PATTERN_SHARE = 0.9
 
 
+def off_the_line(values: Array, times_s: Array) -> tuple[Array, Array]:
+    """How far samples lie from the line through their neighbours, (n_t - 2, n_c).
+
+    Also, by sample, how much of that line is the sample after, (n_t - 2,).
+
+    Source:
+        Press et al. 2007, Numerical Recipes, sec. 3.1: linear interpolation.
+    """
+    share = (times_s[1:-1] - times_s[:-2]) / (times_s[2:] - times_s[:-2])
+    after = share[:, None]
+    return values[1:-1] - after * values[2:] - (1.0 - after) * values[:-2], share
+
+
 def repeated(values: Array) -> Mask:
     """Samples that equal the one before in all coordinates, where chance makes none, (n_t,).
 
@@ -52,8 +65,7 @@ def interpolated(trajectory: Trajectory) -> Mask | None:
     values, times_s = trajectory.values, trajectory.times_s
     if len(values) < LEAST_SAMPLES:
         return None
-    share = ((times_s[1:-1] - times_s[:-2]) / (times_s[2:] - times_s[:-2]))[:, None]
-    off = np.abs(values[1:-1] - share * values[2:] - (1.0 - share) * values[:-2])
+    off = np.abs(off_the_line(values, times_s)[0])
     known = np.isfinite(off).all(axis=1)
     moves = known & (np.diff(values, axis=0)[:-1] != 0.0).any(axis=1)
     if moves.sum() < LEAST_SAMPLES:

@@ -62,17 +62,13 @@ def cable_findings(
     model = build_model(robot)
     poses = part.values[part.is_known]
     lengths = evaluate(model.lengths, poses, model.start_values)[0].reshape(len(poses), -1)
-    if not np.isfinite(lengths).all():
-        said, remedy = mistaken_recording(run, robot)
-        if said:
-            yield Finding("error", subject, said, remedy)
-            return
-        text = "the poses put a cable inside its pulley or on its swivel axis"
-        yield Finding("error", subject, text, "check the base frame of the poses and entry_m")
-        return
     said, remedy = mistaken_recording(run, robot)
     if said:
         yield Finding("error", subject, said, remedy)
+        return
+    if not np.isfinite(lengths).all():
+        text = "the poses put a cable inside its pulley or on its swivel axis"
+        yield Finding("error", subject, text, "check the base frame of the poses and entry_m")
         return
     yield from _turned(subject, part, robot, lengths)
     for cable, column in zip(robot.cables, lengths.T, strict=True):

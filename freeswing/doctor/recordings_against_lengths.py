@@ -22,6 +22,7 @@ from freeswing.cdpr.model.batch import evaluate
 from freeswing.cdpr.model.equations import Model, build_model
 from freeswing.cdpr.robot import Array, Robot
 from freeswing.cdpr.rotation import matrix_from_quaternion, quaternion_from_matrix, transform
+from freeswing.doctor.named_runs import named_runs
 from freeswing.ident.runs import SwingRun
 
 # Geometry known to a centimetre moves lengths by some mm along a swing: more is another matter,
@@ -149,9 +150,8 @@ def refuse_mistaken_recordings(swings: Sequence[SwingRun], robot: Robot) -> None
     told = [(swing.name, *mistaken_recording(swing, robot)) for swing in swings]
     wrong = [one for one in told if one[1]]
     if wrong:
-        name, said, remedy = wrong[0]
-        more = f" (and {len(wrong) - 1} more runs)" if len(wrong) > 1 else ""
-        raise DataError(f"run {name}{more}: {said}; {remedy}")
+        _, said, remedy = wrong[0]
+        raise DataError(f"{named_runs([one[0] for one in wrong])}: {said}; {remedy}")
 
 
 def _lengths_off(model: Model, poses: Trajectory, stated_m: Array | None) -> float:

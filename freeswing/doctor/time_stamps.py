@@ -10,6 +10,7 @@ from freeswing.cdpr.files.problems import DataError
 from freeswing.cdpr.measured.lost_rows import lost_rows
 from freeswing.cdpr.measured.trajectory import Trajectory
 from freeswing.doctor.finding import Finding
+from freeswing.doctor.named_runs import named_runs
 from freeswing.ident.runs import SwingRun
 
 # Cameras keep their rate to 0.01 %; 29.97 called 30 is 0.1 % and changes an inertia by 0.2 %.
@@ -74,8 +75,9 @@ def refuse_wrong_stamps(swings: Sequence[SwingRun], rate_hz: float | None) -> No
     if rate_hz is not None:
         wrong = [swing for swing in swings if _contradicts(swing.trajectory, rate_hz)]
         if wrong:
+            names = [swing.name for swing in wrong]
             raise DataError(
-                f"{_named(wrong)}: samples come at {_rate(wrong[0].trajectory):.2f} Hz, the "
+                f"{named_runs(names)}: samples come at {_rate(wrong[0].trajectory):.2f} Hz, the "
                 f"session says {rate_hz:g} Hz: one of the two clocks is wrong, and an inertia by "
                 "twice of it; correct frame_rate_hz or the time stamps"
             )
@@ -84,8 +86,8 @@ def refuse_wrong_stamps(swings: Sequence[SwingRun], rate_hz: float | None) -> No
         found.sort(key=lambda one: -len(one[1]))
         lost = found[0][1]
         said = _lost_text(len(lost), float(lost[0]))
-        wrong = [swing for swing, one in found if len(one)]
-        raise DataError(f"{_named(wrong)}: {said}; {LOST_REMEDY}")
+        names = [swing.name for swing, one in found if len(one)]
+        raise DataError(f"{named_runs(names)}: {said}; {LOST_REMEDY}")
 
 
 LOST_REMEDY = "export the capture's own stamps, or lost rows with empty cells"
@@ -101,11 +103,6 @@ def _lost_text(count: int, first_s: float) -> str:
         f"{steps} twice as long as those around, in all coordinates and at even time stamps: rows "
         "were lost and the stamps counted on"
     )
-
-
-def _named(runs: Sequence[SwingRun]) -> str:
-    more = f" (and {len(runs) - 1} more runs)" if len(runs) > 1 else ""
-    return f"run {runs[0].name}{more}"
 
 
 def _contradicts(trajectory: Trajectory, rate_hz: float) -> bool:

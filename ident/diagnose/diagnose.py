@@ -28,6 +28,7 @@ from freeswing.ident.diagnose.answer.final_verdicts import final_verdicts, rival
 from freeswing.ident.diagnose.answer.next_swing import NextSwing, next_swing
 from freeswing.ident.diagnose.answer.not_the_cause import (
     all_settled,
+    before_forces,
     gravity_instead,
     removing_little,
     suspected,
@@ -356,8 +357,7 @@ def _with_own_noise(found: LikelihoodFit) -> LikelihoodFit:
 
 def _share_explained(search: Search, last: Refit) -> float:
     """Share of what forces had to explain, once lengths had settled the geometry."""
-    first = next(one.before for one in search.rounds if not one.by_lengths)
-    return left_out(first, search.noise_scales).share(last.score)
+    return left_out(before_forces(search.rounds), search.noise_scales).share(last.score)
 
 
 def _ladder(

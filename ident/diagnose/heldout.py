@@ -48,13 +48,23 @@ class HeldOut:
 
     runs: tuple[HeldOutRun, ...]
 
-    def document(self) -> dict[str, object]:
-        """Root mean squares and medians over the runs."""
-        errors = [
+    @property
+    def errors_m(self) -> list[float]:
+        """Prediction errors of the runs whose positions could be predicted."""
+        return [
             run.prediction.rmse_m
             for run in self.runs
             if run.prediction is not None and run.prediction.rmse_m is not None
         ]
+
+    @property
+    def noise_floor_m(self) -> float | None:
+        """What the samples' own noise leaves, over all runs."""
+        return rms([run.noise_floor_m for run in self.runs])
+
+    def document(self) -> dict[str, object]:
+        """Root mean squares and medians over the runs."""
+        errors = self.errors_m
         turns = [
             run.prediction.rmse_rad
             for run in self.runs
@@ -64,7 +74,7 @@ class HeldOut:
         return {
             "sigma_perp": rms(sigmas),
             "prediction_rmse_m": rms(errors),
-            "noise_floor_m": rms([run.noise_floor_m for run in self.runs]),
+            "noise_floor_m": self.noise_floor_m,
             "prediction_rmse_rad": rms(turns),
             "sigma_perp_median": median(sigmas),
             "prediction_median_m": median(errors),

@@ -132,9 +132,8 @@ def deviations_apart(best: Missed, rival: Missed) -> float:
     """By how many deviations the rival misses more, over the frames that both compared.
 
     Both look at the same corners, so that what their noise does cancels in each frame's difference.
-    Starts without common frames are held
-    against each other by the logarithm of their variances, two numbers a frame, since the errors of
-    one frame's corners are much alike.
+    Starts without common frames are held against each other by the logarithm of their variances,
+    two numbers a frame, since the errors of one frame's corners are much alike.
     """
     if not np.isfinite(rival.size_px):
         return float("inf")

@@ -26,12 +26,17 @@ def all_settled(accepted: Sequence[Round]) -> bool:
     return all(one.by_lengths for one in accepted)
 
 
+def before_forces(accepted: Sequence[Round]) -> Refit:
+    """The fit that the first force was added to."""
+    return next(one.before for one in accepted if not one.by_lengths)
+
+
 def without_forces(accepted: Sequence[Round], why: str) -> TakenBack:
     """What lengths have settled alone: the fit before any force, and why no force counts."""
     names = [effect_of(one.decision.key) for one in accepted if not one.by_lengths]
     settled = [one for one in accepted if one.by_lengths]
-    before = accepted[len(settled)].before
-    return TakenBack(before, settled, f"{', '.join(names)} {why}; not accepted")
+    note = f"{', '.join(names)} {why}; not accepted"
+    return TakenBack(before_forces(accepted), settled, note)
 
 
 def removing_little(share: float, of_what: str) -> str:
@@ -78,7 +83,7 @@ def gravity_instead(
     """
     if all_settled(accepted):
         return None
-    before = next(one.before for one in accepted if not one.by_lengths)
+    before = before_forces(accepted)
     try:
         colour = colour_of(before.fit, noise_scales)
         found = refit(before.fit, GRAVITY, np.zeros(1), noise_scales, colour)

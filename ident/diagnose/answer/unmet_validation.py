@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from freeswing.ident.diagnose.answer.averages import rms
 from freeswing.ident.diagnose.heldout import HeldOut, HeldOutRun
 from freeswing.ident.diagnose.unexplained import Unexplained
 
@@ -50,11 +51,8 @@ def with_unmet(rest: Unexplained, held: HeldOut) -> Unexplained:
 
 def _over_noise(held: HeldOut) -> float | None:
     """Prediction error in metres over the samples' noise, root mean squares over the runs."""
-    told = held.document()
-    error, floor = told["prediction_rmse_m"], told["noise_floor_m"]
-    if not isinstance(error, float) or not isinstance(floor, float) or floor <= 0.0:
-        return None
-    return error / floor
+    error, floor = rms(held.errors_m), held.noise_floor_m
+    return error / floor if error is not None and floor else None
 
 
 def _run_over_noise(run: HeldOutRun) -> float:

@@ -25,6 +25,7 @@ from tests.samples import make_filmed as filmed
 from tests.vision.scenes import SurveyedTag
 
 Motion = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
+Mode = tuple[float, tuple[float, float, float], tuple[float, float, float]]
 RATE_HZ = 20.0
 NOISE_PX = 0.02
 # Hz, m along x, y, z, rad about them
@@ -60,15 +61,22 @@ class Recorded:
     line_time_s: float = 0.0
 
 
-def swing(times_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Positions (n, 3) and rotations (n, 3, 3)."""
-    t = np.asarray(times_s)[:, None]
-    places, turns = np.zeros((len(t), 3)) + filmed.CENTRE_M, np.zeros((len(t), 3))
-    for k, (hz, way, turn) in enumerate(MODES):
-        phase = 2.0 * np.pi * hz * t + np.array([0.2, 1.4, 2.7]) * (k + 1)
-        places = places + np.exp(-0.04 * t) * np.array(way) * np.sin(phase)
-        turns = turns + np.exp(-0.04 * t) * np.array(turn) * np.cos(phase)
-    return places, exp_rotation(turns)
+def damped(modes: Sequence[Mode]) -> Motion:
+    """Positions (n, 3) and rotations (n, 3, 3) of some modes, by times (n,)."""
+
+    def motion(times_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        t = np.asarray(times_s)[:, None]
+        places, turns = np.zeros((len(t), 3)) + filmed.CENTRE_M, np.zeros((len(t), 3))
+        for k, (hz, way, turn) in enumerate(modes):
+            phase = 2.0 * np.pi * hz * t + np.array([0.2, 1.4, 2.7]) * (k + 1)
+            places = places + np.exp(-0.04 * t) * np.array(way) * np.sin(phase)
+            turns = turns + np.exp(-0.04 * t) * np.array(turn) * np.cos(phase)
+        return places, exp_rotation(turns)
+
+    return motion
+
+
+SWING = damped(MODES)
 
 
 def frame_times(own: Recorded, seconds: float, rng: np.random.Generator):
@@ -134,7 +142,7 @@ def made_views(
     *,
     seconds: float = 6.0,
     with_base_tags: bool = True,
-    motion: Motion = swing,
+    motion: Motion = SWING,
     seed: int = 5,
     size: float = 1.0,
 ) -> tuple[list[CameraViews], Watch]:

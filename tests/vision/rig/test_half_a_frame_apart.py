@@ -10,35 +10,14 @@ import numpy as np
 import pytest
 
 from freeswing.cdpr.files.trajectory_files import read_trajectory
-from freeswing.cdpr.rotation import exp_rotation
 from freeswing.vision.render.record import record
 from freeswing.vision.render.render_scene import Scene
 from tests.samples import make_filmed as filmed
 from tests.vision.footage.sessions import RATE_HZ, START_S, track, without_clocks, write_session
 from tests.vision.footage.test_times import tracking
+from tests.vision.rig.made_views import MODES, damped
 
 FRAMES = 70
-# Hz, m along x, y, z, rad about them
-MODES = (
-    (0.83, (0.05, 0.02, 0.01), (0.02, 0.05, 0.03)),
-    (1.31, (0.01, 0.03, 0.02), (0.05, 0.01, 0.06)),
-)
-
-
-def swinging(fast_hz: float):
-    """Positions and rotations of slow modes and a fast one by times."""
-    modes = (*MODES, (fast_hz, (0.003, 0.002, 0.004), (0.01, 0.02, 0.01)))
-
-    def motion(times_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        t = np.asarray(times_s)[:, None]
-        places, turns = np.zeros((len(t), 3)) + filmed.CENTRE_M, np.zeros((len(t), 3))
-        for k, (hz, way, turn) in enumerate(modes):
-            phase = 2.0 * np.pi * hz * t + np.array([0.2, 1.4, 2.7]) * (k + 1)
-            places = places + np.exp(-0.04 * t) * np.array(way) * np.sin(phase)
-            turns = turns + np.exp(-0.04 * t) * np.array(turn) * np.cos(phase)
-        return places, exp_rotation(turns)
-
-    return motion
 
 
 def session(folder: Path, late_s: float, fast_hz: float) -> None:
@@ -46,7 +25,10 @@ def session(folder: Path, late_s: float, fast_hz: float) -> None:
     write_session(folder, without_clocks)
     place = folder / "runs" / "swing-01"
     shutil.rmtree(place)
-    world = Scene((*filmed._still(), *filmed._platform()), swinging(fast_hz))
+    world = Scene(
+        (*filmed._still(), *filmed._platform()),
+        damped((*MODES[:2], (fast_hz, (0.003, 0.002, 0.004), (0.01, 0.02, 0.01)))),
+    )
     stamps = np.arange(FRAMES) / RATE_HZ
     for camera in filmed.cameras():
         start = START_S + (late_s if camera.name == "right" else 0.0)
@@ -68,7 +50,9 @@ def test_cameras_between_each_others_frames(tmp_path, late_s, fast_hz) -> None:
     assert abs(wrong) < 3.5, f"{wrong:.1f} deviations, {offset}"
     assert offset["std"] < 1e-4, offset
     found = read_trajectory(tmp_path / "results" / "tracks" / "swing-01.csv")
-    true, _ = swinging(fast_hz)(found.times_s + START_S)
+    true, _ = damped((*MODES[:2], (fast_hz, (0.003, 0.002, 0.004), (0.01, 0.02, 0.01))))(
+        found.times_s + START_S
+    )
     error = (found.values[:, :3] - true)[found.is_known]
     deviations = found.standard_deviations()
     assert deviations is not None
