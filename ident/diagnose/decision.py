@@ -43,6 +43,9 @@ LEAST_PROMISE_LATER = 0.05
 # the likelihood of left-out runs. A gain that 15 % of the runs contradict is none.
 RIVAL = 0.05
 CONFOUNDED_DIFFERENCE = 12.0
+# Of such a group none leads that is less probable than the likeliest by more than the factor that
+# is worth a bare mention (Kass, Raftery 1995, Bayes Factors, sec. 3.2).
+CLEARLY_LIKELIER = 1.0 / 3.0
 LEAST_EXCESS = 0.005
 CONTRADICTED = 0.15
 # Inertias are anywhere within so many of their usual sizes: a centre of mass within half a metre,
@@ -349,7 +352,8 @@ def _winner(
     """The best of those that passed, and all effects that the runs cannot tell from it.
 
     These are the ones that left-out runs predict as well but for the noise, and those that may
-    well be it instead.
+    well be it instead. Of those about as probable as any, the one with fewest unknowns leads, then
+    the one that predicts best.
     """
     if not passed:
         return "", ()
@@ -360,7 +364,8 @@ def _winner(
         for name in passed
         if 2.0 * (best - gains[name]) < CONFOUNDED_DIFFERENCE or chances[name] > RIVAL
     ]
-    group.sort(key=lambda n: (sum(unknowns(current, n)), -gains[n]))
+    likely = CLEARLY_LIKELIER * max(chances[n] for n in group)
+    group.sort(key=lambda n: (chances[n] < likely, sum(unknowns(current, n)), -gains[n]))
     return group[0], tuple(dict.fromkeys(map(effect_of, group)))
 
 

@@ -223,6 +223,12 @@ def test_leads_that_are_none(lead, chance, told_apart) -> None:
     assert group_of(lead, chance) == (("best",) if told_apart else ("best", "one"))
 
 
+@pytest.mark.parametrize(("chance", "leads"), [(0.74, "best"), (0.76, "one")])
+def test_the_likelier_of_a_group_leads(chance, leads) -> None:
+    """A third as probable it still leads by its prediction; below, by nothing."""
+    assert group_of(11.2, chance)[0] == leads
+
+
 @pytest.mark.parametrize(("excess", "believed"), [(0.47, True), (0.53, False)])
 def test_the_nearest_is_not_the_cause_where_much_is_left(monkeypatch, excess, believed) -> None:
     count = 1e4
