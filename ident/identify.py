@@ -22,6 +22,12 @@ from freeswing.ident.judge.free_swing_law import LawlessError, fidim_complaint
 from freeswing.ident.judge.lawful_runs import best_ml_estimate
 from freeswing.ident.judge.prediction import Prediction, fitted_motions
 from freeswing.ident.judge.validate import ValidatedRun, validate_run
+from freeswing.ident.judge.wrong_geometry import (
+    WrongGeometry,
+    geometry_of,
+    with_wrong_geometry,
+    wrong_geometry,
+)
 from freeswing.ident.likelihood.cable_ends import GeometryPriors, corrected
 from freeswing.ident.likelihood.calibration_modes import freed
 from freeswing.ident.likelihood.session_estimates import Asked
@@ -187,11 +193,13 @@ class Fitted:
         estimate: as it is reported.
         robot: with its cable ends where the fit found them.
         motions: its runs beside what it found for them.
+        wrong: how large errors of the cables' geometry its residuals ask for.
     """
 
     estimate: Estimate
     robot: Robot
     motions: tuple[Prediction, ...]
+    wrong: WrongGeometry
 
 
 def _estimated(
@@ -225,6 +233,9 @@ def _estimated(
         taut, by_fidim, failures = fidim_estimates(model, prepared, *how)
         if served >= {run.name for run in taut.runs}:
             break
+    if size := max((one.wrong.size for one in fitted.values()), default=0.0):
+        told = replace(how[0], wrong=geometry_of(robot), wrong_size=size), *how[1:]
+        taut, by_fidim, failures = fidim_estimates(model, prepared, *told)
     return taut, by_fidim, fitted, {**failures, **more}, lawless
 
 
@@ -262,8 +273,9 @@ def _likelihood_estimates(
             failures[name] = str(error)
             lawless = isinstance(error, LawlessError)
             continue
-        starts = [entry.values, *starts]
-        found[name] = Fitted(entry, corrected(robot, fit.model, fit.values), fitted_motions(fit))
+        starts, wrong = [entry.values, *starts], wrong_geometry(fit)
+        truer, motions = corrected(robot, fit.model, fit.values), fitted_motions(fit)
+        found[name] = Fitted(with_wrong_geometry(entry, wrong), truer, motions, wrong)
     return found, failures, lawless
 
 

@@ -16,8 +16,9 @@ from freeswing.doctor.footage import (
     footage_findings,
     video_findings,
 )
-from freeswing.doctor.geometry import robot_findings
 from freeswing.doctor.markers import marker_findings
+from freeswing.doctor.robot_file.mistaken_cables import mistaken_cables
+from freeswing.doctor.robot_file.units_and_places import robot_findings
 from freeswing.doctor.run_roles import split_findings
 from freeswing.doctor.run_samples import run_findings
 from freeswing.ident.runs import SwingRun
@@ -57,6 +58,10 @@ def _findings(session: Session, progress: Progress) -> Iterator[Finding]:
             swings += [] if swing is None else [swing]
     if robot is not None and bench:
         swings = yield from bench_findings(session, robot, target)
+    if robot is not None and not bench:
+        said, remedy = mistaken_cables(swings, robot)
+        if said:
+            yield Finding("error", "robot", said, remedy)
     yield from split_findings(session, swings, left_out=bench)
     progress("examining the runs", 1.0)
 

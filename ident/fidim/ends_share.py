@@ -14,6 +14,7 @@ import numpy as np
 
 from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.model.regressor import SwingMotion, regressor
+from freeswing.cdpr.robot import Array
 from freeswing.ident.fidim.shares import Share, Stack
 from freeswing.ident.signals.constant_lengths import mean_lengths
 from freeswing.ident.signals.motions import free_motion
@@ -35,6 +36,35 @@ def ends_share(model: Model, runs: Sequence[PreparedRun], full: bool, stack: Sta
     Source:
         JCGM 100:2008, Guide to the Expression of Uncertainty in Measurement, eq. (10).
     """
+    changes = _changes(model, runs, full, stack)
+    return Share("cable ends known to their tolerances", "tolerances_std", changes)
+
+
+def geometry_share(
+    model: Model, size: float, runs: Sequence[PreparedRun], full: bool, stack: Stack
+) -> Share:
+    """The share of cables' geometry that is so many times its tolerances off, each value a cause.
+
+    Args:
+        model: the robot with cables' geometry as values of known spread.
+        size: how many times that.
+        runs: those FIDIM was solved for.
+        full: by full poses, or by free coordinates alone.
+        stack: their regressors.
+
+    Raises:
+        ValueError: when no pose fits geometry that is off by its tolerance, with the sample.
+
+    Source:
+        JCGM 100:2008, Guide to the Expression of Uncertainty in Measurement, eq. (10): to first
+        order.
+    """
+    name = "geometry as wrong as residuals of the motions ask for"
+    return Share(name, "geometry_std", size * _changes(model, runs, full, stack))
+
+
+def _changes(model: Model, runs: Sequence[PreparedRun], full: bool, stack: Stack) -> Array:
+    """What each value does, off by its deviation, to the solution, (k, 9 + e)."""
     changes = []
     for k, parameter in enumerate(model.parameters):
         off = list(model.parameters)
@@ -42,7 +72,7 @@ def ends_share(model: Model, runs: Sequence[PreparedRun], full: bool, stack: Sta
         moved = replace(model, parameters=tuple(off))
         motions = {place: _seen(moved, run, full) for place, run in enumerate(runs)}
         changes.append(stack.change({k: regressor(moved, one) for k, one in motions.items()}))
-    return Share("cable ends known to their tolerances", "tolerances_std", np.array(changes))
+    return np.array(changes)
 
 
 def _seen(model: Model, run: PreparedRun, full: bool) -> SwingMotion:

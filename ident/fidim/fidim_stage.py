@@ -14,7 +14,7 @@ from freeswing.cdpr.system.progress import Progress
 from freeswing.ident.estimate import Estimate, fidim_entry
 from freeswing.ident.fidim.bias import noise_bias, smoothing_bias
 from freeswing.ident.fidim.calibration_share import calibration_share
-from freeswing.ident.fidim.ends_share import ends_share
+from freeswing.ident.fidim.ends_share import ends_share, geometry_share
 from freeswing.ident.fidim.fidim import FidimEstimate, fidim
 from freeswing.ident.fidim.length_share import length_share
 from freeswing.ident.fidim.payload_mass import LoadedCentre, MassEstimate, mass_from_payloads
@@ -55,11 +55,16 @@ class How:
             alone, which is enough where values to start from are wanted.
         ends: the robot with cable ends of known spread
             (`ident.likelihood.cable_ends.GeometryPriors.model`); None where they are exact.
+        wrong: the robot with cables' geometry of known spread that errs as a whole, so many times
+            as far as that (`ident.judge.wrong_geometry`); None where no residuals say so.
+        wrong_size: how many.
     """
 
     weighting: Weighting = "published"
     settings: SignalSettings | None = None
     ends: Model | None = None
+    wrong: Model | None = None
+    wrong_size: float = 0.0
 
 
 def fidim_estimates(
@@ -175,6 +180,8 @@ def _shares(
     found = [calibration_share(model, runs, full, stack)]
     if how.ends is not None:
         found.append(ends_share(how.ends, runs, full, stack))
+    if how.wrong is not None:
+        found.append(geometry_share(how.wrong, how.wrong_size, runs, full, stack))
     if how.settings is not None:
         found.append(None if full else length_share(model, runs, stack))
         uneven = noise_bias(noisy, stack) if noisy else None

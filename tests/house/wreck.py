@@ -205,7 +205,7 @@ HELD = (
         "tests/calib/verdict/test_limits_of_use.py",
     ),
     Held(
-        "freeswing/doctor/geometry.py",
+        "freeswing/doctor/robot_file/units_and_places.py",
         (
             "LARGEST_FRAME_M", "LARGEST_PLATFORM_M", "LARGEST_PULLEY_M", "LEAST_GRAVITY_M_S2",
             "MOST_GRAVITY_M_S2", "SAME_POINT_M",
@@ -248,6 +248,7 @@ HELD = (
         "tests/freeswing/session/test_exchanged_lengths.py",
     ),
     Held("ident/diagnose/search.py", ("MOST_ROUNDS",), "tests/ident/diagnose/test_search.py"),
+    Held("ident/judge/wrong_geometry.py", ("CHANCE",), "tests/ident/judge/test_wrong_geometry.py"),
     Held("ident/judge/lawful_runs.py", ("AS_BAD",), "tests/ident/judge/test_lawful_runs.py"),
     Held(
         "ident/judge/far_samples.py", ("FAR", "MOST_FAR"), "tests/ident/judge/test_far_samples.py"
@@ -781,6 +782,11 @@ HELD = (
         "cdpr/measured/quaternion_readings.py",
         ("LEFT_OVER",),
         "tests/freeswing/doctor/test_recordings_against_lengths.py::test_what_is_left_by_the_right_reading",
+    ),
+    Held(
+        "freeswing/doctor/robot_file/mistaken_cables.py",
+        ("LEAST_CHANGE", "LEFT_OVER", "LEAST_RUNS", "LEAST_MEANS"),
+        "tests/freeswing/doctor/test_mistaken_cables.py",
     ),
     Held(
         "freeswing/doctor/recordings_against_lengths.py",

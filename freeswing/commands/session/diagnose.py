@@ -53,6 +53,7 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
     from freeswing.cdpr.files.documents import InputError
     from freeswing.cdpr.system.threads import threads
     from freeswing.doctor.recordings_against_lengths import refuse_mistaken_recordings
+    from freeswing.doctor.robot_file.mistaken_cables import refuse_mistaken_cables
     from freeswing.doctor.time_stamps import refuse_wrong_stamps
     from freeswing.ident.diagnose.diagnose import diagnose
     from freeswing.results.diagnosis import Diagnosis
@@ -83,6 +84,7 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
         refuse_mistaken_recordings(swings, robot)
         refuse_wrong_stamps(measured_swings(session, swings), session.frame_rate_hz)
         refuse_exchanged_lengths(swings, robot)
+        refuse_mistaken_cables(swings, robot)
         found = diagnose(swings, robot, console.progress, count, candidates, crew.executor)
     document = Diagnosis.from_json(found.document())
     _summarise(document, console)

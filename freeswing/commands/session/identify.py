@@ -71,6 +71,7 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
     from freeswing.cdpr.files.documents import InputError
     from freeswing.cdpr.system.threads import threads
     from freeswing.doctor.recordings_against_lengths import refuse_mistaken_recordings
+    from freeswing.doctor.robot_file.mistaken_cables import refuse_mistaken_cables
     from freeswing.doctor.time_stamps import refuse_wrong_stamps
     from freeswing.ident.identify import IdentifySettings, identify
     from freeswing.ident.likelihood.cable_ends import GeometryPriors
@@ -102,6 +103,7 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
     refuse_mistaken_recordings(swings, robot)
     refuse_wrong_stamps(measured_swings(session, swings), session.frame_rate_hz)
     refuse_exchanged_lengths(swings, robot)
+    refuse_mistaken_cables(swings, robot)
     try:
         geometry = GeometryPriors(settings.get("entry_std_m"), settings.get("attachment_std_m"))
     except ValueError as error:

@@ -15,7 +15,7 @@ from freeswing.cdpr.model.batch import evaluate
 from freeswing.cdpr.model.equations import build_model
 from freeswing.cdpr.robot import POSE_COORDINATES
 from freeswing.doctor.footage import calibration_findings
-from freeswing.doctor.geometry import robot_findings
+from freeswing.doctor.robot_file.units_and_places import robot_findings
 from freeswing.doctor.run_roles import split_findings
 from freeswing.doctor.run_samples import run_findings
 from freeswing.doctor.time_stamps import refuse_wrong_stamps

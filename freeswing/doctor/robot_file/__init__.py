@@ -1,0 +1,1 @@
+"""What is wrong in a robot file: by itself, and by the recordings."""
