@@ -19,6 +19,9 @@ CONTRADICTED = 3.0  # standard deviations between what runs say and what is stat
 GIVES_WAY = 0.01  # of the mass: stretch, or hooks that yield, by a hundredth of the wires' length
 STRAINED = 2.0  # the same: by chance one session in twenty, so that what hangs on it counts
 CHECKING = 0.05  # of the mass: payload runs that tell it as well check it, and what they say counts
+# Of a declared mass of which nobody says how well it is known: hooks, a clamp or wires' ends that
+# were not on the scale make a twentieth now and then, which is two deviations.
+LEFT_OFF_THE_SCALE = 0.025
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,12 +33,14 @@ class MassVerdict:
         fitted_kg: by the runs alone.
         fitted_std_kg: its deviation.
         contradicted: whether they exclude each other: the fitted one then serves.
+        stated: whether the file says how well the declared one is known.
     """
 
     declared_kg: float
     fitted_kg: float
     fitted_std_kg: float
     contradicted: bool
+    stated: bool = False
 
     @property
     def is_small(self) -> bool:
@@ -50,6 +55,37 @@ class MassVerdict:
         """Whether runs speak against the declared mass, which serves, without excluding it."""
         off = abs(self.fitted_kg - self.declared_kg)
         return not self.contradicted and off > STRAINED * self.fitted_std_kg
+
+    @property
+    def shift_kg(self) -> float:
+        """The declared mass over that of the runs where it counts in full, else 0.
+
+        It does not where runs tell next to nothing of the mass and do not speak against the
+        declared one either, or contradict it by more than wires and hooks that give way under a
+        load could make of it.
+        """
+        checked = self.fitted_std_kg <= CHECKING * self.declared_kg
+        counts = self.is_small if self.contradicted else checked or self.strained
+        return self.declared_kg - self.fitted_kg if counts else 0.0
+
+    @property
+    def open_kg(self) -> float:
+        """How far a declared mass that serves may be off beside that, nobody saying how well.
+
+        By what runs leave open and by what a scale is usually not shown: normal densities multiply.
+
+        Source:
+            JCGM 100:2008, sec. 4.3.8: an input of which little is known.
+        """
+        if self.stated or self.contradicted:
+            return 0.0
+        usual = LEFT_OFF_THE_SCALE * self.declared_kg
+        return usual * self.fitted_std_kg / float(np.hypot(usual, self.fitted_std_kg))
+
+    @property
+    def open_part(self) -> float:
+        """What is open, of all that is counted of the mass; 0 where nothing is."""
+        return self.open_kg / (float(np.hypot(self.shift_kg, self.open_kg)) or 1.0)
 
 
 def weighed_mass(
@@ -71,7 +107,8 @@ def weighed_mass(
     spread = float(found.std("platform")[0])
     fitted, std = without_prior(float(block.value[0]), spread, prior, bench.mass_std_kg)
     off = abs(fitted - declared) / np.hypot(std, bench.mass_std_kg or 0.0)
-    verdict = MassVerdict(declared, fitted, std, bool(off > CONTRADICTED))
+    stated = bool(bench.mass_std_kg)
+    verdict = MassVerdict(declared, fitted, std, bool(off > CONTRADICTED), stated)
     if verdict.contradicted:
         loose = np.array(prior.std)
         loose[0] = max(declared, 10.0 * std)
@@ -107,11 +144,7 @@ def mass_left_free(unknowns: Unknowns, mass: MassVerdict) -> Unknowns:
 
 
 def doubt(freed: Solution, mass: MassVerdict | None) -> Array:
-    """By how much all shared unknowns would differ, were it the other one of the two masses, (p,).
-
-    Zero where that is no doubt: runs that tell next to nothing of the mass and do not speak against
-    the declared one either, or that contradict it by more than wires and hooks that give way under
-    a load could make of it.
+    """By how much all shared unknowns would differ, were the mass off by all that it may be, (p,).
 
     Args:
         freed: the fit with the mass free.
@@ -121,16 +154,13 @@ def doubt(freed: Solution, mass: MassVerdict | None) -> Array:
         JCGM 100:2008, Guide to the Expression of Uncertainty in Measurement, sec. F.2.4.5: a
         correction that is not applied counts in full.
     """
-    nothing = np.zeros(len(freed.covariance))
-    if mass is None:
-        return nothing
-    checked = mass.fitted_std_kg <= CHECKING * mass.declared_kg
-    if not (mass.is_small if mass.contradicted else checked or mass.strained):
-        return nothing
+    if mass is None or not (mass.shift_kg or mass.open_kg):
+        return np.zeros(len(freed.covariance))
     place = int(freed.unknowns.columns("platform")[0])
-    shift = mass.declared_kg - mass.fitted_kg
-    change = freed.covariance[:, place] / freed.covariance[place, place] * shift
-    change[place] = shift if mass.contradicted else 0.0
+    size = float(np.copysign(np.hypot(mass.shift_kg, mass.open_kg), mass.shift_kg))
+    change = freed.covariance[:, place] / freed.covariance[place, place] * size
+    # A mass that was fitted beside what is stated of it has its deviation already.
+    change[place] = 0.0 if mass.stated and not mass.contradicted else size
     return np.asarray(change)
 
 

@@ -399,7 +399,7 @@ HELD = (
     Held("ident/bench/fit_rounds.py", ("LEAST_FOR_SCATTER",), BENCH),
     Held(
         "ident/bench/fit_rounds.py",
-        ("FIRST_S", "LONGER"),
+        ("FIRST_S", "LONGER", "FEW"),
         "tests/ident/bench/test_first_seconds.py",
     ),
     Held(
@@ -412,13 +412,18 @@ HELD = (
     ),
     Held(
         "ident/bench/mass_verdict.py",
-        ("CONTRADICTED", "STRAINED", "CHECKING", "GIVES_WAY"),
+        ("CONTRADICTED", "STRAINED", "CHECKING", "GIVES_WAY", "LEFT_OFF_THE_SCALE"),
         BENCH,
     ),
     Held("ident/bench/noise.py", ("BAND", "LEAST_SHARE",), BENCH),
     Held("ident/bench/scatter_between_runs.py", ("SIGNIFICANT",), BENCH),
     Held("ident/bench/told/classic_formula.py", ("LEAST_PERIODS", "LEANING_PERCENT"), BENCH),
     Held("ident/bench/told/report_objects.py", ("RESTS_ON_PRIOR", "TELLS_NOTHING"), BENCH),
+    Held(
+        "ident/bench/told/contradicted.py",
+        ("WORTH_WEIGHING",),
+        "tests/ident/bench/test_contradicted.py",
+    ),
     Held("ident/bench/told/rolled.py", ("ROLLED_RAD",), "tests/ident/bench/test_rolled.py"),
     Held(
         "ident/bench/two_wires/free_roll.py",
@@ -429,7 +434,7 @@ HELD = (
     Held("ident/bench/runs.py", ("STILL",), BENCH),
     Held("ident/bench/diagnose/taken_for_granted.py", ("SURE",), BENCH_DIAGNOSE),
     Held("ident/bench/diagnose/diagnose.py", ("LEAST_RUNS",), BENCH_DIAGNOSE),
-    Held("ident/bench/diagnose/unexplained.py", ("COLOURED", "SLOWEST_PARTS"), BENCH_DIAGNOSE),
+    Held("ident/bench/noise.py", ("COLOURED", "SLOWEST_PARTS"), BENCH_DIAGNOSE),
     Held(
         "ident/signals/usable_runs.py",
         ("LARGEST_AMPLIFICATION", "LEAST_SIGNAL"),

@@ -15,6 +15,8 @@ from freeswing.ident.bench.swing import COMMON, IZZ
 from freeswing.ident.bench.told.classic_formula import radii
 
 SAMPLES = "noise of the samples, drag and starts"
+MASS = "the platform's mass"
+WIRE_ENDS = "where the wires' ends are"
 BESIDE_IZZ = [4, 5, 7, 8, 9]  # of a body's ten numbers: Ixx Iyy Ixy Ixz Iyz
 ACROSS = "{name}: its moments and products beside Izz"
 
@@ -47,7 +49,7 @@ def sources(solved: Solved) -> dict[str, Array]:
         places = unknowns.columns(block.name)
         head, _, name = block.name.partition(".")
         if head == "platform":
-            found["the platform's mass"] = places[:1]
+            found[MASS] = places[:1]
             found["the platform's centre of mass"] = places[1:4]
             found[ACROSS.format(name="the platform")] = places[BESIDE_IZZ]
         elif head == "load":
@@ -63,6 +65,9 @@ def sources(solved: Solved) -> dict[str, Array]:
             found[f"channel {name}: gains"] = places
         elif head == SQUARE:
             found["amplitude: how far it really swung"] = places
+        elif head == "missing" and not block.mask.any():
+            known = found.get(WIRE_ENDS, np.zeros(0, dtype=np.int64))
+            found[WIRE_ENDS] = np.concatenate([known, places])
         elif head == "scatter":
             found["scatter between runs"] = places
     return found

@@ -13,8 +13,10 @@ from freeswing.ident.bench.mass_verdict import CONTRADICTED
 from freeswing.ident.bench.priors.wire_priors import UNSTATED_LENGTH_STD_M
 from freeswing.ident.bench.runs import BenchRun
 from freeswing.ident.bench.swing import COMMON, IZZ
+from freeswing.ident.bench.told.budget import MASS, budget
 from freeswing.ident.bench.told.classic_formula import radii
 
+WORTH_WEIGHING = 0.002  # of Izz: the best fixtures of industry reach as much
 WEIGH = (
     "Weigh the platform with all that hangs on it: if the declared mass was wrong, all is settled; "
     "if it was right, measure R"
@@ -96,7 +98,11 @@ def surely_contradicted(solved: Solved) -> bool:
 
 def contradictions(solved: Solved) -> list[str]:
     """What runs contradict of the stated mass and wire lengths, a sentence each."""
-    told = (group_sentence(solved), strained_sentence(solved), wires_sentence(solved))
+    told = (
+        group_sentence(solved),
+        strained_sentence(solved) or open_sentence(solved),
+        wires_sentence(solved),
+    )
     return [one for one in told if one]
 
 
@@ -131,11 +137,12 @@ def strained_sentence(solved: Solved) -> str:
     if mass is None or not mass.strained:
         return ""
     off = abs(mass.fitted_kg - mass.declared_kg) / mass.fitted_std_kg
+    part = abs(mass.shift_kg) / float(np.hypot(mass.shift_kg, mass.open_kg))
     found = []
     for block, change in solved.doubts.items():
         body, _, load = block.partition(".")
         if body in ("platform", "load"):
-            share = -100.0 * change[IZZ] / float(solved.solution.value(block)[IZZ])
+            share = -100.0 * part * change[IZZ] / float(solved.solution.value(block)[IZZ])
             found.append(f"that of {load or 'the platform'} by {share:+.2g} %")
     return (
         f"the payload runs speak against mass_kg = {mass.declared_kg:.4g} kg without excluding it: "
@@ -143,6 +150,29 @@ def strained_sentence(solved: Solved) -> str:
         f"The declared mass is used; by theirs Izz would change, {', '.join(found)}, all of which "
         "its deviation counts. Weigh the platform with all that hangs on it, or record more runs "
         "with the known mass"
+    )
+
+
+def open_sentence(solved: Solved) -> str:
+    """What a declared mass that nobody says to be well known adds to Izz, where it adds most."""
+    mass = solved.mass
+    if mass is None or not mass.open_kg:
+        return ""
+    found = []
+    for block in solved.doubts:
+        body, _, load = block.partition(".")
+        if body in ("platform", "load"):
+            largest = budget(solved, block)[0]
+            share = largest.std_kg_m2 / abs(float(solved.solution.value(block)[IZZ]))
+            if largest.what == MASS and share > WORTH_WEIGHING:
+                found.append(f"{100.0 * share:.2g} % of that of {load or 'the platform'}")
+    if not found:
+        return ""
+    return (
+        f"mass_kg = {mass.declared_kg:.4g} kg is used, and nothing says how well it is known: the "
+        f"payload runs give {mass.fitted_kg:.4g} +- {mass.fitted_std_kg:.2g} kg, and what that "
+        f"leaves open is most of Izz's deviation ({', '.join(found)}). Weigh the platform with all "
+        "that hangs on it, and say how well: mass_std_kg"
     )
 
 

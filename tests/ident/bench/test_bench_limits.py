@@ -69,7 +69,11 @@ def test_scatter_is_looked_for_between_enough_runs(monkeypatch, runs, looked) ->
         lambda _, unknowns, how: SimpleNamespace(**(fitted | {"unknowns": unknowns})),
     )
     monkeypatch.setattr(fit_rounds, "_rough", lambda swings, unknowns: unknowns)
-    monkeypatch.setattr(fit_rounds, "stretched", lambda swings, unknowns: unknowns)
+    monkeypatch.setattr(
+        fit_rounds,
+        "first_fit",
+        lambda swings, unknowns: fit_rounds.fit(swings, unknowns, fit_rounds.ROUGH),
+    )
     monkeypatch.setattr(fit_rounds, "_fastest", lambda *_: 1.0)
     monkeypatch.setattr(fit_rounds, "rescaled", lambda swings, *_, **__: swings)
     monkeypatch.setattr(
@@ -90,7 +94,7 @@ def test_payload_runs_that_check_a_declared_mass(share, counts) -> None:
     covariance = 1e-4 * np.eye(10)
     covariance[6, 0] = covariance[0, 6] = 2e-4
     freed = SimpleNamespace(covariance=covariance, unknowns=free.unknowns)
-    verdict = mass_verdict.MassVerdict(5.0, 4.9, 5.0 * share, contradicted=False)
+    verdict = mass_verdict.MassVerdict(5.0, 4.9, 5.0 * share, contradicted=False, stated=True)
     counted = mass_verdict.doubt(freed, verdict)
     assert counted[6] == pytest.approx(0.2 if counts else 0.0)
     assert counted[0] == 0.0
@@ -102,7 +106,8 @@ def test_a_declared_mass_that_runs_speak_against_counts_however_little_they_tell
     covariance = 1e-4 * np.eye(10)
     covariance[6, 0] = covariance[0, 6] = 2e-4
     freed = SimpleNamespace(covariance=covariance, unknowns=body(0.1).unknowns)
-    verdict = mass_verdict.MassVerdict(5.0, 5.0 + 0.5 * off, 0.5, contradicted=False)
+    told = 5.0, 5.0 + 0.5 * off, 0.5
+    verdict = mass_verdict.MassVerdict(*told, contradicted=False, stated=True)
     counted = mass_verdict.doubt(freed, verdict)
     assert counted[6] == pytest.approx(-off if counts else 0.0)
     solution = SimpleNamespace(value=lambda name: np.full(10, 5.0))
@@ -110,6 +115,32 @@ def test_a_declared_mass_that_runs_speak_against_counts_however_little_they_tell
     sentence = strained_sentence(solved)
     assert bool(sentence) == counts
     assert f"the platform by {20.0 * off:+.2g} %" in sentence or not counts, sentence
+
+
+@pytest.mark.parametrize(("std_kg", "open_kg"), [(0.01, 0.01), (0.125, 0.0884), (10.0, 0.125)])
+def test_a_declared_mass_that_nobody_says_to_be_known(std_kg, open_kg) -> None:
+    """5 kg, to a fortieth as scales go and to `std_kg` by runs: what is left of both is open."""
+    covariance = 1e-4 * np.eye(10)
+    covariance[6, 0] = covariance[0, 6] = 2e-4
+    freed = SimpleNamespace(covariance=covariance, unknowns=body(0.1).unknowns)
+    verdict = mass_verdict.MassVerdict(5.0, 5.0, std_kg, contradicted=False)
+    counted = mass_verdict.doubt(freed, verdict)
+    np.testing.assert_allclose(counted[[0, 6]], [open_kg, 2.0 * open_kg], rtol=0.01)
+    stated = mass_verdict.MassVerdict(5.0, 5.0, std_kg, contradicted=False, stated=True)
+    assert not mass_verdict.doubt(freed, stated).any()
+    used = mass_verdict.MassVerdict(5.0, 6.0, std_kg, contradicted=True)
+    assert not mass_verdict.doubt(freed, used).any()
+
+
+def test_what_runs_say_and_what_is_open_add_up() -> None:
+    """4.9 kg by runs that know it to 0.1: off by that, and open by what scales leave of it."""
+    verdict = mass_verdict.MassVerdict(5.0, 4.9, 0.1, contradicted=False)
+    covariance = 1e-4 * np.eye(10)
+    freed = SimpleNamespace(covariance=covariance, unknowns=body(0.1).unknowns)
+    counted = mass_verdict.doubt(freed, verdict)
+    open_kg = 0.1 * 0.125 / np.hypot(0.1, 0.125)
+    assert counted[0] == pytest.approx(np.hypot(0.1, open_kg))
+    assert verdict.open_part == pytest.approx(open_kg / counted[0])
 
 
 @pytest.mark.parametrize(("fitted_kg", "counts"), [(5.048, True), (5.052, False), (4.952, True)])

@@ -217,7 +217,11 @@ def test_a_run_whose_izz_is_a_hundredth_off_is_lost(monkeypatch) -> None:
 
     monkeypatch.setattr(fit_rounds, "fit", fit)
     monkeypatch.setattr(fit_rounds, "_rough", lambda swings, unknowns: unknowns)
-    monkeypatch.setattr(fit_rounds, "stretched", lambda swings, unknowns: unknowns)
+    monkeypatch.setattr(
+        fit_rounds,
+        "first_fit",
+        lambda swings, unknowns: fit_rounds.fit(swings, unknowns, fit_rounds.ROUGH),
+    )
     monkeypatch.setattr(fit_rounds, "_fastest", lambda *_: 1.0)
     monkeypatch.setattr(fit_rounds, "rescaled", lambda swings, *_, **__: swings)
     monkeypatch.setattr(

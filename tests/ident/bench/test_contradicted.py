@@ -13,6 +13,8 @@ from freeswing.ident.bench.diagnose.entries import mass_candidate, mass_found
 from freeswing.ident.bench.fit_rounds import WiresVerdict
 from freeswing.ident.bench.mass_verdict import MassVerdict
 from freeswing.ident.bench.runs import BenchRun, Signal
+from freeswing.ident.bench.told import contradicted
+from freeswing.ident.bench.told.budget import MASS, Share
 from freeswing.ident.bench.told.contradicted import (
     exchange_sentence,
     group_sentence,
@@ -188,3 +190,24 @@ def test_wires_that_nobody_could_tell_apart(longest_mm, std_mm, told) -> None:
     poses = run_of(("x", "y", "z", "phi", "theta", "chi"), [1200.0, longest_mm, 1200.5], std_mm)
     assert exchange_sentence([poses]) == ""
     assert exchange_sentence([poses, run_of(("chi",), [1200.0, longest_mm, 1200.5])]) == ""
+
+
+@pytest.mark.parametrize(
+    ("largest", "share", "stated", "said"),
+    [
+        (MASS, 0.0021, False, True),
+        (MASS, 0.0019, False, False),
+        (MASS, 0.0021, True, False),
+        ("wire lengths", 0.0021, False, False),
+    ],
+)
+def test_a_mass_worth_weighing_is_named(monkeypatch, largest, share, stated, said) -> None:
+    """By the best fixtures' 0.2 % of Izz, where nothing adds more and nobody says how well."""
+    monkeypatch.setattr(contradicted, "budget", lambda *_: [Share(largest, 0.04 * share)])
+    solved = solved_of()
+    solved.mass = MassVerdict(1.2, 1.201, 0.01, False, stated)
+    solved.doubts = {"platform": np.zeros(10), "effects": np.zeros(3)}
+    solved.solution.value = lambda _: np.full(10, 0.04)
+    told = contradicted.open_sentence(solved)
+    assert ("mass_std_kg" in told) == said, told
+    assert "0.21 % of that of the platform" in told or not said, told

@@ -85,6 +85,38 @@ def test_long_runs_are_followed_in_growing_stretches(monkeypatch, lasts_s, follo
     monkeypatch.setattr(fit_rounds, "fit", fit)
     swings: Any = (Swing(span_s=(2.0, 2.0 + lasts_s)), Swing(span_s=(5.0, 9.0)))
     none: Any = []
-    assert fit_rounds.stretched(swings, none) == list(range(1, 1 + len(followed_s)))
+    assert fit_rounds.stretched(swings, none, fit_rounds.FIRST_S) == list(
+        range(1, 1 + len(followed_s))
+    )
     np.testing.assert_allclose([parts[0] for parts in asked], followed_s, rtol=0.05)
     np.testing.assert_allclose([parts[1] for parts in asked], followed_s, rtol=0.05)
+
+
+@pytest.mark.parametrize(
+    ("lost", "again", "kept", "followed_s"),
+    [(False, 1.0, 9.0, []), (True, 1.0, 1.0, [3.3, 9.9]), (True, 10.0, 9.0, [3.3, 9.9])],
+)
+def test_a_lost_fit_is_made_again_from_a_few_swings(
+    monkeypatch, lost, again, kept, followed_s
+) -> None:
+    """Wires of 1.2 m swing in 2.2 s; one and a half swings first, and the cheaper fit stands."""
+    asked, costs = [], iter([9.0, again])
+
+    class Swing(SimpleNamespace):
+        def until(self, end_s):
+            return end_s
+
+    def fit(parts, unknowns, how):
+        whole = not isinstance(parts[0], float)
+        if not whole:
+            asked.append(parts[0])
+        return SimpleNamespace(unknowns=unknowns, cost=next(costs) if whole else 0.0)
+
+    monkeypatch.setattr(fit_rounds, "fit", fit)
+    monkeypatch.setattr(fit_rounds, "left_worst", lambda *_: "phi" if lost else None)
+    robot = SimpleNamespace(gravity_m_s2=np.array([0.0, 0.0, -9.81]))
+    swing = Swing(span_s=(0.0, 11.0), lengths_m=LENGTHS_M, model=SimpleNamespace(robot=robot))
+    swings: Any = (swing,)
+    none: Any = []
+    assert fit_rounds.first_fit(swings, none).cost == kept
+    np.testing.assert_allclose(asked, followed_s, rtol=0.02)
