@@ -225,18 +225,24 @@ def planned(case: BenchCase, fixed: tuple[str, ...] = ()) -> tuple[BenchCase, li
     return best, rows
 
 
-def bench_case(robot: Robot, load_kg: float | None, load_izz: float | None) -> BenchCase:
+def bench_case(
+    robot: Robot,
+    load_kg: float | None,
+    load_izz: float | None,
+    mass_kg: float | None = None,
+) -> BenchCase:
     """The case of a robot file whose wires hang parallel.
 
     Args:
         robot: two or three parallel wires.
         load_kg: of the object; None: as heavy as the platform.
         load_izz: a guess of its inertia, kg m2; None: a small object's.
+        mass_kg: of the platform; None: the robot file's.
 
     Raises:
         DataError: when the platform's mass is not given.
     """
-    mass = robot.platform.mass_kg
+    mass = mass_kg or robot.platform.mass_kg
     if mass is None:
         raise DataError("mass_kg of the platform is not given: weigh it with all that hangs on it")
     radius = spread_of(robot.attachments_m)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -66,6 +67,29 @@ def add_effects(parser: ArgumentParser, name: str, asked: str, numbers: str) -> 
         metavar="PARAMETER=VALUE",
         help=numbers,
     )
+
+
+def refuse_given(options: Namespace, names: Sequence[str], why: str) -> None:
+    """Refuse flags that would do nothing.
+
+    Args:
+        options: as parsed; a flag that was not given is None, empty or False.
+        names: of those that do nothing here.
+        why: they do not.
+
+    Raises:
+        InputError: naming those that were given.
+    """
+    from freeswing.cdpr.files.documents import InputError
+
+    asked = [(name, getattr(options, name)) for name in names]
+    given = [
+        f"--{name.replace('_', '-')}"
+        for name, value in asked
+        if value is not None and value is not False and value not in ((), [])
+    ]
+    if given:
+        raise InputError(f"{', '.join(given)}: {why}; leave it out")
 
 
 def worker_count(text: str) -> int:

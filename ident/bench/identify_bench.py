@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from freeswing.cdpr.robot import POSE_COORDINATES, Array, Robot
 from freeswing.ident.bench.assemble import EFFECTS, assembled
 from freeswing.ident.bench.channels import check_moves
 from freeswing.ident.bench.fit_rounds import Solved, solved
+from freeswing.ident.bench.noise import left_worst
 from freeswing.ident.bench.priors.wire_priors import with_lengths
 from freeswing.ident.bench.runs import Bench, BenchRun, Signal, check_swings
 from freeswing.ident.bench.told.budget import budget
@@ -34,7 +35,9 @@ from freeswing.ident.bench.told.report_objects import (
 )
 from freeswing.ident.bench.told.rolled import rolled_sentences
 from freeswing.ident.bench.told.scatter_by_kind import scatter_sentence
+from freeswing.ident.bench.told.wire_ends import UNSCALED, with_ends_counted
 from freeswing.ident.bench.two_wires.free_roll import not_freed_sentence
+from freeswing.ident.likelihood.cable_ends import GeometryPriors
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +51,7 @@ class BenchResult:
         validation: held-out runs.
         notes: what a reader must know.
         decay: amplitude of yaw against time, by run.
+        ends: how well it is known where the wires end.
     """
 
     solved: Solved
@@ -56,6 +60,7 @@ class BenchResult:
     validation: tuple[HeldOut, ...]
     notes: tuple[str, ...]
     decay: tuple[Envelope, ...] = ()
+    ends: GeometryPriors = field(default_factory=GeometryPriors)
 
     def document(self) -> dict[str, Any]:
         """results/identification.json."""
@@ -105,8 +110,13 @@ class BenchResult:
         }
 
 
-def identify_bench(bench: Bench, robot: Robot) -> BenchResult:
+def identify_bench(bench: Bench, robot: Robot, ends: GeometryPriors | None = None) -> BenchResult:
     """Fit all runs of a bench session together.
+
+    Args:
+        bench: the session.
+        robot: as declared.
+        ends: how well it is known where the wires end; what it leaves out is as the robot says.
 
     Raises:
         DataError: when the data cannot give a result, naming run, number and remedy.
@@ -120,14 +130,18 @@ def identify_bench(bench: Bench, robot: Robot) -> BenchResult:
         found = with_kinds_counted(solved(model, bench, assembled(model, bench, fitted)))
     except (ValueError, np.linalg.LinAlgError) as error:
         raise DataError(f"the bench's runs cannot be fitted: {error}") from error
-    rolled = rolled_sentences(found, fitted)
     checked = [run for run in bench.runs if run.role == "validate"]
     validation = tuple(held_out(model, bench, found, run) for run in checked)
     classic = tuple(classic_runs(found, robot.platform.mass_kg))
+    ends = (ends or GeometryPriors()).or_declared(robot)
+    found = with_ends_counted(found, robot, ends)
+    rolled = rolled_sentences(found, fitted)
+    if ends.stds and not any(run.coordinates for run in fitted):
+        rolled.append(UNSCALED)
     sway = any({"x", "y"} & set(run.coordinates) for run in fitted)
     leaning = leaning_sentence(classic, sway)
     notes = [*([leaning] if leaning else []), *_notes(found, bench, robot), *rolled]
-    return BenchResult(found, bench, classic, validation, tuple(notes), envelopes(found))
+    return BenchResult(found, bench, classic, validation, tuple(notes), envelopes(found), ends)
 
 
 def check_runs(bench: Bench, robot: Robot) -> None:
@@ -202,6 +216,13 @@ def _notes(found: Solved, bench: Bench, robot: Robot) -> list[str]:
             "no run carries a known payload: the loads' inertia rests on the declared platform "
             "mass (I_load = s m_load + (s - s_tare) m_platform); a run with a known mass far from "
             "the middle, or mass_std_kg, says how well"
+        )
+    left = left_worst(found.swings, found.solution)
+    if left is not None:
+        notes.append(
+            f"{left.sentence}: something is missing that the fit does not have, or it has lost "
+            "count of the swings. Run `freeswing diagnose`; where that finds nothing, do not rely "
+            "on the result"
         )
     notes += _gain_notes(found, bench)
     scattered = scatter_sentence(found)

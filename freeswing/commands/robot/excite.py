@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from collections.abc import Mapping
+from typing import Any
 
 from freeswing.commands.arguments import (
     add_results,
@@ -10,9 +12,10 @@ from freeswing.commands.arguments import (
     finite,
     positive,
     positive_whole,
+    refuse_given,
     whole,
 )
-from freeswing.commands.robot.excite_bench import add_bench_arguments, run_bench
+from freeswing.commands.robot.excite_bench import OF_BENCHES, add_bench_arguments, run_bench
 from freeswing.commands.robot.excite_drive import (
     RANDOM,
     SCORED,
@@ -22,32 +25,50 @@ from freeswing.commands.robot.excite_drive import (
 )
 from freeswing.console import Console
 
+USUAL: Mapping[str, Any] = {
+    "swings": 12,
+    "samples": 100,
+    "duration_s": 10.0,
+    "tension_n": (20.0, 200.0),
+    "reach_m": 0.1,
+    "starts": 30,
+    "seed": 0,
+    "random": 0,
+    "criterion": "cost",
+}
+OF_SWINGS = (
+    "swings", "samples", "tension_n", "reach_m", "starts", "seed", "random", "winch", "criterion"
+)  # fmt: skip
+NO_SWINGS = (
+    "two or three parallel wires are twisted by hand, and the plan of a bench is one table by its "
+    "error budget: nothing is drawn or searched"
+)
+
 
 def add_arguments(parser: ArgumentParser) -> None:
     """The robot and the limits."""
     add_robot(parser, " with nominal inertia and mass")
     add_results(parser, "ROBOT's folder/results")
-    parser.add_argument("--swings", type=positive_whole, default=12, metavar="N", help="default 12")
+    parser.add_argument("--swings", type=positive_whole, metavar="N", help="default 12")
+    parser.add_argument("--samples", type=positive_whole, metavar="N", help="a swing (100)")
     parser.add_argument(
-        "--samples", type=positive_whole, default=100, metavar="N", help="a swing (100)"
-    )
-    parser.add_argument(
-        "--duration-s", type=positive, help="of a swing, default 10; of a driven record 5"
+        "--duration-s",
+        type=positive,
+        help="of a swing, default 10; of a driven record 5; of a bench's run: as the plan says",
     )
     parser.add_argument(
         "--tension-n",
         type=finite,
         nargs=2,
-        default=(20.0, 200.0),
         metavar=("LOW", "HIGH"),
         help="cable tensions, default 20 200",
     )
-    parser.add_argument("--reach-m", type=positive, default=0.1, help="displacement, default 0.1")
+    parser.add_argument("--reach-m", type=positive, help="displacement, default 0.1")
     parser.add_argument("--mass-kg", type=positive, help="instead of the robot file's")
     parser.add_argument(
         "--starts", type=positive_whole, metavar="N", help="default 30; with --drive 60 plans"
     )
-    parser.add_argument("--seed", type=whole, default=0)
+    parser.add_argument("--seed", type=whole, help="default 0")
     parser.add_argument(
         "--random",
         type=whole,
@@ -62,8 +83,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--criterion",
         choices=("cost", "information"),
-        default="cost",
-        help="conditioning of FIDIM, or information of the maximum-likelihood fit",
+        help="conditioning of FIDIM (default), or information of the maximum-likelihood fit",
     )
     add_drive_arguments(parser)
     add_bench_arguments(parser)
@@ -75,20 +95,24 @@ def run(options: Namespace, console: Console) -> None:
     from freeswing.cdpr.simulation.parallel_wires import hangs_parallel
 
     if options.drive:
-        asked = {"duration_s": SECONDS, "starts": SCORED, "random": RANDOM}
-    else:
-        asked = {"duration_s": 10.0, "starts": 30, "random": 0}
-    for name, value in asked.items():
-        if getattr(options, name) is None:
-            setattr(options, name, value)
-    if options.drive:
+        _fill(options, {**USUAL, "duration_s": SECONDS, "starts": SCORED, "random": RANDOM})
         run_drive(options, console)
         return
     robot = read_robot(options.robot)
     if hangs_parallel(robot):
+        refuse_given(options, OF_SWINGS, NO_SWINGS)
         run_bench(robot, options, console)
-    else:
-        _plan_swings(options, console)
+        return
+    refuse_given(options, OF_BENCHES, "they plan a bench, and this robot's cables are not parallel")
+    _fill(options, USUAL)
+    _plan_swings(options, console)
+
+
+def _fill(options: Namespace, usual: Mapping[str, Any]) -> None:
+    """What no flag says, as it usually is."""
+    for name, value in usual.items():
+        if getattr(options, name) is None:
+            setattr(options, name, value)
 
 
 def _plan_swings(options: Namespace, console: Console) -> None:

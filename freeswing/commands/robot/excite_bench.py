@@ -13,6 +13,9 @@ if TYPE_CHECKING:
     from freeswing.cdpr.robot import Robot
 
 
+OF_BENCHES = ("load_kg", "load_izz_kg_m2", "known_kg", "gain_std", "keep")
+
+
 def add_bench_arguments(parser: ArgumentParser) -> None:
     """What only a bench has."""
     bench = parser.add_argument_group("benches: two or three parallel wires")
@@ -43,11 +46,12 @@ def run_bench(robot: Robot, options: Namespace, console: Console) -> None:
     from freeswing.results.planning import BenchPlan
     from freeswing.session.made import Made, write_made
 
-    case = bench_case(robot, options.load_kg, options.load_izz_kg_m2)
-    asked = {"known_kg": options.known_kg, "gain_std": options.gain_std}
+    case = bench_case(robot, options.load_kg, options.load_izz_kg_m2, options.mass_kg)
+    asked = {name: getattr(options, name) for name in ("known_kg", "gain_std", "duration_s")}
     case = replace(case, **{name: value for name, value in asked.items() if value is not None})
     refuse_wrong_plan(case)
-    told = bench_document(*planned(case, tuple(options.keep)))
+    kept = (*options.keep, *(() if options.duration_s is None else ("duration_s",)))
+    told = bench_document(*planned(case, kept))
     for line in bench_words(told):
         console.say(line)
     folder = results_folder(options.robot.parent, options.results)

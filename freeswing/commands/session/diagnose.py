@@ -75,6 +75,11 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
             raise InputError(f"--only {name}: not one of {', '.join(sorted(catalogue()))}")
     robot = load_robot(session)
     if is_bench(session, robot):
+        if crew.processes or crew.executor is not None:
+            console.say(
+                "note: a bench's fits follow one another in this process: --workers and --cluster "
+                "change nothing"
+            )
         return _make_bench(session, console, robot, only)
     count = crew.processes or os.cpu_count() or 1
     candidates = None if only is None else tuple(only)
@@ -107,7 +112,10 @@ def _make_bench(session: Session, console: Console, robot: Robot, only: list[str
     bench = load_bench(session, robot, load_target(session))
     refuse_wrong_bench_runs(bench, robot)
     found = diagnose_bench(bench, robot, console.progress, only)
-    document = Diagnosis.from_json(bench_document(found))
+    told = bench_document(found)
+    if only is not None:
+        told["candidates"] = [row for row in told["candidates"] if row["effect"] in only]
+    document = Diagnosis.from_json(told)
     for line in diagnosis_lines(document):
         console.say(f"  {line}")
     return Made((("diagnosis.json", document), ("diagnosis_motion.json", Motion())))

@@ -11,6 +11,7 @@ from freeswing.console import Console
 
 if TYPE_CHECKING:
     from freeswing.cdpr.robot import Robot
+    from freeswing.ident.likelihood.cable_ends import GeometryPriors
     from freeswing.ident.runs import SwingRun
     from freeswing.results.identification import Identification, ValidatedRun
     from freeswing.session.made import Made
@@ -68,13 +69,11 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
     """identification.json and motion.json as documents."""
     import os
 
-    from freeswing.cdpr.files.documents import InputError
     from freeswing.cdpr.system.threads import threads
     from freeswing.doctor.recordings_against_lengths import refuse_mistaken_recordings
     from freeswing.doctor.robot_file.mistaken_cables import refuse_mistaken_cables
     from freeswing.doctor.time_stamps import refuse_wrong_stamps
     from freeswing.ident.identify import IdentifySettings, identify
-    from freeswing.ident.likelihood.cable_ends import GeometryPriors
     from freeswing.ident.swing_places import swing_places
     from freeswing.results.identification import Identification
     from freeswing.results.markers import marker_document
@@ -93,7 +92,7 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
 
     robot = load_robot(session)
     if is_bench(session, robot):
-        return _make_bench(session, console, robot)
+        return _make_bench(session, console, robot, settings)
     target = load_target(session)
     count = crew.processes or os.cpu_count() or 1
     with threads(count):
@@ -104,10 +103,7 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
     refuse_wrong_stamps(measured_swings(session, swings), session.frame_rate_hz)
     refuse_exchanged_lengths(swings, robot)
     refuse_mistaken_cables(swings, robot)
-    try:
-        geometry = GeometryPriors(settings.get("entry_std_m"), settings.get("attachment_std_m"))
-    except ValueError as error:
-        raise InputError(f"--{str(error).replace('_', '-', 2)}") from error
+    geometry = _geometry(settings)
     chosen = IdentifySettings(
         weighting=settings["weighting"],
         maximum_likelihood=settings["likelihood"],
@@ -134,7 +130,18 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
     return Made((("identification.json", document), ("motion.json", predicted_motions(found))))
 
 
-def _make_bench(session: Session, console: Console, robot: Robot) -> Made:
+def _geometry(settings: dict[str, Any]) -> GeometryPriors:
+    """How well the cables' ends are known."""
+    from freeswing.cdpr.files.documents import InputError
+    from freeswing.ident.likelihood.cable_ends import GeometryPriors
+
+    try:
+        return GeometryPriors(settings.get("entry_std_m"), settings.get("attachment_std_m"))
+    except ValueError as error:
+        raise InputError(f"--{str(error).replace('_', '-', 2)}") from error
+
+
+def _make_bench(session: Session, console: Console, robot: Robot, settings: dict[str, Any]) -> Made:
     """The same of a bench: all its runs in one fit."""
     from freeswing.doctor.bench_runs import refuse_wrong_bench_runs
     from freeswing.ident.bench.identify_bench import identify_bench
@@ -145,13 +152,32 @@ def _make_bench(session: Session, console: Console, robot: Robot) -> Made:
     from freeswing.session.load_swings import load_target
     from freeswing.session.made import Made
 
+    _refuse_settings_of_cable_robots(settings)
     bench = load_bench(session, robot, load_target(session))
     refuse_wrong_bench_runs(bench, robot)
-    told = identify_bench(bench, robot).document()
+    told = identify_bench(bench, robot, _geometry(settings)).document()
     document = Identification.from_json({**told, "entries_m": robot.entries_m})
     for line in bench_lines(document):
         console.say(line)
     return Made((("identification.json", document), ("motion.json", Motion())))
+
+
+def _refuse_settings_of_cable_robots(settings: dict[str, Any]) -> None:
+    from freeswing.cdpr.files.documents import InputError
+
+    asked = {
+        "--weighting covariance": settings["weighting"] != "published",
+        "--fidim-only": not settings["likelihood"],
+        "--consistent": settings.get("consistent", False),
+    }
+    given = [name for name, there in asked.items() if there]
+    if given:
+        raise InputError(
+            f"{' and '.join(given)}: this session is a bench's (parallel wires, or runs that "
+            "measure less than the free coordinates), whose runs are all in one maximum-likelihood "
+            "fit of masses, centres and tensors; FIDIM and its settings are for cable robots. "
+            "Leave it out"
+        )
 
 
 def _recording_notes(

@@ -21,9 +21,15 @@ from freeswing.results.identification import ESTIMATE_ORDER, Estimate
 OF_BENCHES = (
     "Counted are the samples' noise as it was found, the start and drag of every run, the wires' "
     "lengths, masses and centres of mass as far as the session leaves them open, channels' gains, "
-    "and scatter between runs where there is any.",
-    "Taken as exact: where wires are hung up and clamped (entries and attachments of robot.toml), "
-    "places and masses of the payloads, gravity's size and direction, and the time stamps.",
+    "{ends}and scatter between runs where there is any.",
+    "Taken as exact: {ends}places and masses of the payloads, gravity's size and direction, and "
+    "the time stamps.",
+)
+WIRE_ENDS = "where the wires' ends are"  # of a budget
+ENDS_COUNTED = "where wires are hung up and clamped as far as that is stated, "
+ENDS_EXACT = (
+    "where wires are hung up and clamped (entries and attachments of robot.toml; how far they may "
+    "be off counts with --entry-std-m and --attachment-std-m), "
 )
 
 
@@ -65,7 +71,10 @@ def exact(material: Material) -> list[str]:
     identification = material.identification
     best = material.estimates[identification.best or ""] if identification else Estimate()
     if identification is not None and identification.objects:
-        return list(OF_BENCHES)
+        budgets = identification.budgets or ()
+        counted = any(share.what == WIRE_ENDS for one in budgets for share in one.shares)
+        told = (ENDS_COUNTED, "") if counted else ("", ENDS_EXACT)
+        return [one.format(ends=ends) for one, ends in zip(OF_BENCHES, told, strict=True)]
     told = best.further
     taken = []
     if "geometry" not in told and not any("std" in str(one) for one in told):

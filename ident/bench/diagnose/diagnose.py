@@ -30,6 +30,7 @@ from freeswing.ident.bench.told.kinds_doubt import (
     with_kinds_counted,
 )
 from freeswing.ident.bench.told.scatter_by_kind import is_systematic
+from freeswing.ident.bench.told.wire_ends import with_ends_counted
 from freeswing.ident.likelihood.fit import Solution, fit
 
 LEAST_RUNS = 3  # of two, either is predicted by the other alone, drag, wires and all
@@ -152,8 +153,10 @@ def _diagnosed(
     removed = removals(ground, last, identified.bench, only)
     told("before and after", 0.9)
     ladder = _ladder(identified.bench, ground, last, removed)
-    solved = _counted(identified.solved, ladder[-1].fit, rounds)
-    declared = _counted(identified.solved, ladder[0].fit)
+    counted = _counted(identified.solved, ladder[-1].fit, rounds)
+    solved = with_ends_counted(counted, robot, identified.ends, last.causes)
+    without = _counted(identified.solved, ladder[0].fit)
+    declared = with_ends_counted(without, robot, identified.ends)
     told("diagnosis", 1.0)
     return BenchDiagnosis(
         identified, tuple(rounds), removed, ladder, solved, declared, shares, seen
@@ -166,6 +169,7 @@ def _start(solved: Solved, scattered: bool = False) -> Fit:
     Scatter between runs that goes with what they carry is left out, unless it is asked for.
     """
     unknowns = solved.solution.unknowns
+    unknowns = unknowns.without(*(name for name in unknowns.names if name.startswith("missing.")))
     zero = unknowns.moved({COMMON: np.zeros(1)}).held(COMMON)
     if is_systematic(solved) and not scattered:  # or causes would be taken for chance
         zero = zero.without("scatter")
@@ -183,9 +187,13 @@ def _counted(solved: Solved, one: Fit, rounds: Sequence[Round] = ()) -> Solved:
     if mass is not None and mass.contradicted:
         value, std = float(found.value("platform")[0]), float(one.solution.std("platform")[0])
         off = abs(value - mass.declared_kg) > CONTRADICTED * std
-        mass = MassVerdict(mass.declared_kg, value, std, off)
-    if not one.causes:  # with a cause the runs no longer want what they wanted without
+        mass = MassVerdict(mass.declared_kg, value, std, off, mass.stated)
+    if not one.causes:
         found = with_change(found, solved.doubts)
+    elif solved.mass is not None and not solved.mass.contradicted:
+        # With a cause the runs no longer want what they wanted without: only what is open counts.
+        part = solved.mass.open_part
+        found = with_change(found, {name: part * one for name, one in solved.doubts.items()})
     elif mass is not None and mass.contradicted:
         change = doubt(found, mass)
         found = replace(found, covariance=found.covariance + np.outer(change, change))
