@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from freeswing.report.panels.answer import verdict
-from freeswing.report.words import millimetres, number, parameter_row, plain
+from freeswing.report.words import millimetres, number, parameter_row, plain, unit_of
 from freeswing.results.diagnosis import Diagnosis, HeldOut
 from freeswing.results.identification import BodyParameter, BudgetShare, ClassicRow, Identification
 
@@ -42,7 +42,7 @@ def _counting(shares: tuple[BudgetShare, ...]) -> list[BudgetShare]:
 
 def untold(rows: Sequence[BodyParameter]) -> list[str]:
     """Names of a body's parameters that the runs do not tell."""
-    return [row.name for row in rows if row.value is None]
+    return [plain(unit_of(row.name)[0]) for row in rows if row.value is None]
 
 
 def budget_row(share: BudgetShare) -> str:
@@ -52,10 +52,11 @@ def budget_row(share: BudgetShare) -> str:
 
 def object_row(row: BodyParameter) -> str:
     """One parameter of a body."""
+    told = parameter_row(row)
     if row.value is None or row.std is None:
-        return f"{row.name:14} not told by these runs"
+        return f"{told['name']:6} not told by these runs"
     weak = "" if row.identifiable else "  as given: these runs tell no more"
-    return f"{row.name:14} {number(row.value, 5)} ± {number(HALF_WIDTH_95 * row.std, 2)}{weak}"
+    return f"{told['name']:6} {told['value']:>9} ± {told['half_width']:<8} {told['unit']}{weak}"
 
 
 def classic_row(row: ClassicRow) -> str:

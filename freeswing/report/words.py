@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from freeswing.results.common import Parameter
+from freeswing.results.identification import BodyParameter
 
 ESTIMATES = {
     "ml_full": "maximum likelihood, full poses",
@@ -83,7 +84,7 @@ def unit_of(name: str, effect: str = "") -> tuple[str, float, str]:
     return name, 1.0, ""
 
 
-def parameter_row(parameter: Parameter, effect: str = "") -> dict[str, str]:
+def parameter_row(parameter: Parameter | BodyParameter, effect: str = "") -> dict[str, str]:
     """One parameter in a readable unit with its 95 % interval, digits following the interval."""
     stem, scale, unit = unit_of(parameter.name, effect)
     value, std = _scaled(parameter.value, scale), _scaled(parameter.std, scale)

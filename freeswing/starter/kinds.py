@@ -40,6 +40,13 @@ KINDS = {
 }
 
 
+FRAMES = "# Base frame: that of the recordings, in metres. Platform frame: see target.toml."
+BENCH_FRAMES = (
+    "# Platform frame: P in the middle of the wires' lower ends, z up. Base frame: that of the",
+    "# recordings, in metres; where these hold no place, P and its axes as the platform hangs.",
+)
+
+
 def robot_toml(name: str, kind: Kind, cables: int, mass_kg: float | None) -> str:
     """The text of robot.toml with every number that has to be measured marked `nan`."""
     free = kind.free_coordinates if cables == kind.cables else '"auto"'
@@ -47,12 +54,12 @@ def robot_toml(name: str, kind: Kind, cables: int, mass_kg: float | None) -> str
     if kind.is_bench:
         weighed = f"{mass_kg:g}" if mass_kg else MISSING
         mass = f"mass_kg = {weighed}      # with all that hangs on it: kg m2 go with it"
-        mass += "\n# mass_std_kg = 0.001   # how well; without it the mass is trusted"
+        mass += "\n# mass_std_kg = 0.001   # how well; else as payload runs leave it open"
     lines = [
         'format = "freeswing-robot/1"',
         f'name = "{name}"',
         f"# {kind.says}. Every `nan` below has to be measured: docs/formats.md says what each is.",
-        "# Base frame: that of the recordings, in metres. Platform frame: see target.toml.",
+        *(BENCH_FRAMES if kind.is_bench else [FRAMES]),
         "gravity_m_s2 = [0.0, 0.0, -9.80665]   # z up; another vertical axis: put -9.80665 there",
         f"free_coordinates = {free}",
         "",

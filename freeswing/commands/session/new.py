@@ -33,7 +33,8 @@ def add_arguments(parser: ArgumentParser) -> None:
         nargs="+",
         metavar="FILE",
         help="recordings of markers (.trc .c3d, text of Motive, Vicon, QTM) or poses (.csv): "
-        "markers, rate and free swings are read, the files copied",
+        "markers, rate and free swings are read, the files copied; of benches any part of a pose, "
+        "or uncalibrated columns (.csv)",
     )
     parser.add_argument(
         "--cameras",
@@ -64,6 +65,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(options: Namespace, console: Console) -> None:
     """Write the files and say what to do next; nothing that is there is written over."""
     from freeswing.cdpr.files.documents import InputError, replace_file
+    from freeswing.starter.bench_signals import are_signals
     from freeswing.starter.kinds import robot_toml
 
     folder = Path(options.folder)
@@ -78,6 +80,8 @@ def run(options: Namespace, console: Console) -> None:
     name = folder.resolve().name
     beside = _above if answers.measured_by == "above" else _filmed
     beside = _recorded if answers.recordings else beside
+    if answers.recordings and kind.is_bench and are_signals(answers.recordings):
+        beside = _signals
     written = {
         "robot.toml": robot_toml(name, kind, cables, answers.mass_kg).encode("utf-8"),
         **beside(name, answers, options.paper, console),
@@ -224,6 +228,20 @@ def _recorded(name: str, answers: Answers, paper: str, console: Console) -> dict
     texts = {"session.toml": files.recorded_session(name, found).encode("utf-8")}
     if found.names:
         texts["target.toml"] = files.marker_target(found).encode("utf-8")
+    return texts | {f"runs/{file.name}": file.read_bytes() for file in found.files}
+
+
+def _signals(name: str, answers: Answers, paper: str, console: Console) -> dict[str, bytes]:
+    """session.toml and recordings to copy, by their names, of a bench's signals."""
+    from freeswing.cdpr.files.documents import InputError
+    from freeswing.starter.bench_signals import look_over_signals, signals_session
+
+    if len({file.stem for file in answers.recordings}) < len(answers.recordings):
+        raise InputError("--mocap: two recordings have the same name; rename one")
+    found = look_over_signals(answers.recordings)
+    console.say(f"{len(found.files)} recordings of {found.words} at {found.rate_hz:g} Hz")
+    cables = KINDS[answers.kind or USUAL_KIND].cables if answers.cables is None else answers.cables
+    texts = {"session.toml": signals_session(name, found, cables).encode("utf-8")}
     return texts | {f"runs/{file.name}": file.read_bytes() for file in found.files}
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from freeswing.report.bench_words import HALF_WIDTH_95, changed_objects, classic_why, untold
 from freeswing.report.material import Material
-from freeswing.report.words import number
+from freeswing.report.words import number, parameter_row
 from freeswing.results.identification import BodyParameter, ChannelGain, ClassicRow
 
 
@@ -56,10 +56,10 @@ class BenchPanel:
 
 
 def _row(row: BodyParameter) -> dict[str, str]:
+    told = parameter_row(row)
     return {
-        "parameter": row.name,
-        "value": number(row.value, 5),
-        "± 95 %": "–" if row.std is None else number(HALF_WIDTH_95 * row.std, 2),
+        "parameter": told["name"],
+        "value ± 95 %": f"{told['value']} ± {told['half_width']} {told['unit']}",
         "remark": "" if row.identifiable else "as given: the runs tell no more",
     }
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 from freeswing.report.bench_words import bench_lines
 from freeswing.report.material import Material
 from freeswing.report.page import render_page
 from freeswing.report.panels.advice import steps
-from freeswing.results.identification import Identification
+from freeswing.report.panels.sure import exact
+from freeswing.results.identification import Budget, BudgetShare, Identification
 
 NOTE = "the platform: no run shows its centre of mass"
 
@@ -76,12 +78,12 @@ def _material() -> Material:
 def test_what_runs_do_not_tell_is_named_once() -> None:
     page = render_page(_material())
     assert "Not told by these runs: com x." in page
-    assert "Not told by these runs: com_x_m." in page
+    assert "Not told by these runs: com x." in page
     assert "not essential" not in page
     assert page.count(NOTE) == 1
     lines = bench_lines(_material().identification or Identification())
-    assert lines.count("  not told by these runs: com_x_m") == 1
-    assert not any(line.startswith("  com_x_m") for line in lines)
+    assert lines.count("  not told by these runs: com x") == 1
+    assert not any(line.startswith("  com x") for line in lines)
 
 
 def test_a_held_gain_has_no_interval_and_bends_are_folded_away() -> None:
@@ -101,3 +103,16 @@ def test_the_next_steps_are_commands_that_run() -> None:
     commands = [command for _, command in steps(_material())]
     assert "freeswing diagnose kth" in commands
     assert "freeswing export kth --urdf --mass-kg 0.875" in commands
+
+
+def test_whether_the_wires_ends_are_counted_is_said() -> None:
+    material = _material()
+    assert "clamped (entries and attachments" in " ".join(exact(material)), exact(material)
+    assert material.identification is not None
+    counted = Budget(
+        name="platform", shares=(BudgetShare(what="where the wires' ends are", std_kg_m2=1e-4),)
+    )
+    document = replace(material.identification, budgets=(counted,))
+    told, taken = exact(replace(material, identification=document))
+    assert "clamped as far as that is stated" in told, told
+    assert "clamped" not in taken, taken

@@ -281,3 +281,34 @@ def test_one_phone_above_a_bench_begins_with_a_sheet_to_glue(tmp_path: Path, cap
     assert sides == {1.2, -1.2}
     assert main(["new", str(tmp_path / "other"), "--kind", "hook", "--above"]) == 2
     assert "trifilar, bifilar" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("header", "held"),
+    [("t_s,chi_rad", "of chi at 50 Hz"), ("t_s,dot_px", "of dot_px at 50 Hz")],
+)
+def test_a_bench_of_yaw_or_a_signal_alone(tmp_path, capsys, header, held) -> None:
+    """A session that only wants what was measured: lengths, masses, which run carried what."""
+    for name in ("tare", "cube"):
+        rows = [f"{k / 50.0},{np.sin(0.1 * k)}" for k in range(200)]
+        (tmp_path / f"{name}.csv").write_text("\n".join([header, *rows, ""]))
+    files = [str(tmp_path / "tare.csv"), str(tmp_path / "cube.csv")]
+    folder = tmp_path / "wing"
+    assert main(["new", str(folder), "--kind", "bifilar", "--mocap", *files]) == 0
+    assert held in capsys.readouterr().out
+    robot, session = folder / "robot.toml", folder / "session.toml"
+    assert "target.toml" not in robot.read_text() + session.read_text()
+    filled = session.read_text().replace("nan", "0.9").replace("# loads =", "loads =", 1)
+    session.write_text(filled)
+    read = read_session(folder)
+    assert [run.name for run in read.runs] == ["cube", "tare"]
+    assert read.runs[0].cable_lengths_m is not None
+    assert [channel.column for channel in read.channels] == ["dot_px"] * ("dot_px" in header)
+
+
+def test_recordings_of_a_bench_hold_the_same_columns(tmp_path, capsys) -> None:
+    (tmp_path / "a.csv").write_text("t_s,chi_rad\n0,0\n0.1,1\n")
+    (tmp_path / "b.csv").write_text("t_s,x_m\n0,0\n0.1,1\n")
+    files = [str(tmp_path / "a.csv"), str(tmp_path / "b.csv")]
+    assert main(["new", str(tmp_path / "c"), "--kind", "trifilar", "--mocap", *files]) != 0
+    assert "it holds x, and" in capsys.readouterr().err
