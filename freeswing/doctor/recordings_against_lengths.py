@@ -8,7 +8,7 @@ together, so every unit is tried with all axes and orders.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import permutations, product
 
 import numpy as np
@@ -31,8 +31,23 @@ LENGTHS_OFF_M = 0.02
 UNITS_M = {"millimetres": 1e-3, "centimetres": 1e-2, "inches": 0.0254, "feet": 0.3048}
 SAMPLES_TRIED = 200
 """Looked at of a run; cables that keep their length keep it in any of them."""
+QUARTERS = tuple(
+    turn
+    for order in permutations(range(3))
+    for signs in product((1.0, -1.0), repeat=3)
+    if np.linalg.det(turn := np.diag(signs)[:, order]) > 0.0 and not np.array_equal(turn, np.eye(3))
+)
+"""All 23 turns of a frame that put its axes on axes."""
 MOST_ORDERED = 4
 """Cables of which every order of ends is tried: 23 others."""
+ENDS = {
+    "attachment_offset": ("attachment_m", "put each attachment with its entry and its length"),
+    "anchor_offset": (
+        "entry_m",
+        "put each entry with its swivel axes, its attachment and its length",
+    ),
+}
+"""By what moves them: the key of a cable, and what to do."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,12 +58,14 @@ class _Reading:
     model: Model
     said: tuple[str, ...]
     remedies: tuple[str, ...]
+    values: Array | None = None
 
 
 def mistaken_recording(run: SwingRun, robot: Robot) -> tuple[str, str]:
     """How a run was meant, and what to do; empty where it is read right.
 
-    Of readings that leave nearly as little the one with the fewest mistakes is told.
+    Of readings that leave nearly as little the one with the fewest mistakes is told; of those that
+    are one, as on a platform that looks alike once it is turned, the first.
 
     Source:
         Murray, Li, Sastry 1994, A Mathematical Introduction to Robotic Manipulation, ch. 2: unit
@@ -65,13 +82,14 @@ def mistaken_recording(run: SwingRun, robot: Robot) -> tuple[str, str]:
     found = _lengths_off(model, part, run.lengths_m)
     if found < LENGTHS_OFF_M:
         return "", ""
-    readings = [*_readings(part, model), *_orders(part, robot)]
-    off = np.array([_lengths_off(one.model, one.poses, run.lengths_m) for one in readings])
+    readings = [*_readings(part, model), *_orders(part, robot), *_turns(part, model)]
+    stated = run.lengths_m
+    off = np.array([_lengths_off(one.model, one.poses, stated, one.values) for one in readings])
     most = min(LEFT_OVER * found, LENGTHS_OFF_M)
     if off.min() > most:
         return "", ""
     nearly = [k for k in range(len(off)) if off[k] <= min(off.min() / LEFT_OVER, most)]
-    best = min(nearly, key=lambda k: (len(readings[k].said), off[k]))
+    best = min(nearly, key=lambda k: (len(readings[k].said), round(off[k], 6)))
     told = (
         f"cable lengths are off by {1e3 * found:.0f} mm" if np.isfinite(found) else "no cable fits"
     )
@@ -118,27 +136,34 @@ def _readings(part: Trajectory, model: Model) -> Iterator[_Reading]:
             yield _Reading(poses, model, tuple(m[0] for m in made), tuple(m[1] for m in made))
 
 
+def _turns(part: Trajectory, model: Model) -> Iterator[_Reading]:
+    """The platform's frame turned by quarters: attachments turned alike are poses turned back."""
+    part = _thinned(part)
+    said = "robot.toml has all attachment_m in a frame that is turned against the recorded one"
+    do = "give them in the frame of the platform that the poses are of"
+    for turn in QUARTERS:
+        turned = part.rotations() @ turn
+        poses = Trajectory.from_poses(part.times_s, part.positions(), turned)
+        yield _Reading(poses, model, (said,), (do,))
+
+
 def _orders(part: Trajectory, robot: Robot) -> Iterator[_Reading]:
     """The cables with ends of each other."""
     part, cables = _thinned(part), robot.cables
     if len(cables) > MOST_ORDERED:
         return
-    for order in permutations(range(len(cables))):
-        moved = [k for k, own in enumerate(order) if k != own]
-        if not moved:
-            continue
-        other = tuple(
-            replace(cable, attachment_m=cables[own].attachment_m)
-            for cable, own in zip(cables, order, strict=True)
-        )
-        names = ", ".join(cables[k].name for k in moved)
-        said = f"robot.toml has attachment_m of cables {names} in each other's place"
-        yield _Reading(
-            part,
-            build_model(replace(robot, cables=other)),
-            (said,),
-            ("put each attachment with its entry and its length",),
-        )
+    model = build_model(robot, tuple(ENDS))
+    for effect, (key, do) in ENDS.items():
+        ends = np.array([getattr(cable, key) for cable in cables])
+        for order in permutations(range(len(cables))):
+            moved = [k for k, own in enumerate(order) if k != own]
+            if not moved:
+                continue
+            values = np.zeros(len(model.parameters))
+            values[model.place_of(effect)] = (ends[list(order)] - ends).ravel()
+            names = ", ".join(cables[k].name for k in moved)
+            said = f"robot.toml has {key} of cables {names} in each other's place"
+            yield _Reading(part, model, (said,), (do,), values)
 
 
 def refuse_mistaken_recordings(swings: Sequence[SwingRun], robot: Robot) -> None:
@@ -154,12 +179,15 @@ def refuse_mistaken_recordings(swings: Sequence[SwingRun], robot: Robot) -> None
         raise DataError(f"{named_runs([one[0] for one in wrong])}: {said}; {remedy}")
 
 
-def _lengths_off(model: Model, poses: Trajectory, stated_m: Array | None) -> float:
+def _lengths_off(
+    model: Model, poses: Trajectory, stated_m: Array | None, values: Array | None = None
+) -> float:
     """What cables change along a run (98 % of its samples) or are off what is stated, m.
 
     In whatever order it is stated: lengths of other cables are another mistake, said elsewhere.
     """
-    lengths = evaluate(model.lengths, poses.values, model.start_values)[0].reshape(len(poses), -1)
+    values = model.start_values if values is None else values
+    lengths = evaluate(model.lengths, poses.values, values)[0].reshape(len(poses), -1)
     if not np.isfinite(lengths).all():
         return np.inf
     spread = float(np.ptp(np.percentile(lengths, [1.0, 99.0], axis=0), axis=0).max())

@@ -47,18 +47,20 @@ def refuse_exchanged_lengths(
     Raises:
         DataError: naming the runs, the cables and by how much.
     """
-    found, order = [], None
+    found, order, remedy = [], None, "put each cable's length in its place"
     for swing in swings:
         lengths = pose_lengths(swing, robot)
         if lengths is None:
             order, told = exchanged_at_rest(swing, robot, order)
+            # Without poses ends of other cables make it rest elsewhere as well.
+            remedy += ", or each cable's ends in robot.toml" * (bool(told) and not found)
         else:
             told = exchanged_sentence(swing, robot, lengths, least_m)
         if told:
             found.append(f"run {swing.name}: {told}")
     if found:
         more = f" and {len(found) - 3} more runs" if len(found) > 3 else ""
-        raise DataError(f"{'; '.join(found[:3])}{more}: put each cable's length in its place")
+        raise DataError(f"{'; '.join(found[:3])}{more}: {remedy}")
 
 
 def pose_lengths(swing: SwingRun, robot: Robot) -> Array | None:

@@ -74,6 +74,23 @@ def test_what_is_right_and_what_is_merely_wrong_is_not_named() -> None:
     assert mistaken_recording(far, ROBOT) == ("", "")
 
 
+def test_cables_with_ends_of_each_other_and_a_turned_platform_are_named() -> None:
+    """Exchanged entries had been called exchanged attachments, which left 14 mm."""
+    run = SwingRun("a", "identify", read_trajectory(SAMPLE / "runs" / "swing-01.csv"))
+    one, two, three = ROBOT.cables
+    for key, do in (("entry_m", "swivel axes"), ("attachment_m", "with its entry")):
+        ends = [{key: getattr(cable, key)} for cable in (two, one)]
+        swapped = replace(ROBOT, cables=(replace(one, **ends[0]), replace(two, **ends[1]), three))
+        said, remedy = mistaken_recording(run, swapped)
+        assert said.startswith(f"robot.toml has {key} of cables {one.name}, {two.name} in each")
+        assert do in remedy
+    turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    cables = tuple(replace(cable, attachment_m=turn @ cable.attachment_m) for cable in ROBOT.cables)
+    said, remedy = mistaken_recording(run, replace(ROBOT, cables=cables))
+    assert said.startswith("robot.toml has all attachment_m in a frame that is turned"), said
+    assert "the frame of the platform" in remedy
+
+
 @pytest.mark.parametrize(
     ("off_m", "left_m", "named"),
     [
@@ -91,6 +108,7 @@ def test_what_is_left_by_the_right_reading(monkeypatch, off_m, left_m, named) ->
     monkeypatch.setattr(
         "freeswing.doctor.recordings_against_lengths._lengths_off", lambda *_: next(off)
     )
+    monkeypatch.setattr("freeswing.doctor.recordings_against_lengths._orders", lambda *_: iter(()))
     monkeypatch.setattr("freeswing.doctor.recordings_against_lengths.build_model", lambda _: None)
     still = Trajectory.from_poses(np.arange(9.0), np.zeros((9, 3)), np.tile(np.eye(3), (9, 1, 1)))
     assert bool(mistaken_recording(SwingRun("a", "identify", still), ROBOT)[0]) == named
