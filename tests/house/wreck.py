@@ -433,6 +433,7 @@ HELD = (
     Held("ident/bench/channels.py", ("LEAST_OVER_NOISE",), BENCH),
     Held("ident/bench/runs.py", ("STILL",), BENCH),
     Held("ident/bench/diagnose/taken_for_granted.py", ("SURE",), BENCH_DIAGNOSE),
+    Held("ident/bench/diagnose/document.py", ("LIKELY",), BENCH_DIAGNOSE),
     Held("ident/bench/diagnose/diagnose.py", ("LEAST_RUNS",), BENCH_DIAGNOSE),
     Held("ident/bench/noise.py", ("COLOURED", "SLOWEST_PARTS"), BENCH_DIAGNOSE),
     Held(

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from freeswing.cdpr.effects import catalogue
+from freeswing.cdpr.effects import catalogue, effect_named
 from freeswing.cdpr.robot import INERTIA_NAMES
-from freeswing.ident.bench.diagnose.causes import SAME, Cause
+from freeswing.ident.bench.diagnose.causes import ENDS, HOOKS, SAME, Cause
 from freeswing.ident.bench.diagnose.channels_only import ByChannels, channels_document
 from freeswing.ident.bench.diagnose.diagnose import BenchDiagnosis, CannotTell
 from freeswing.ident.bench.diagnose.entries import (
@@ -24,7 +24,7 @@ from freeswing.ident.bench.diagnose.entries import (
     told_entry,
     unscaled_document,
 )
-from freeswing.ident.bench.diagnose.search import Word
+from freeswing.ident.bench.diagnose.search import Round, Word
 from freeswing.ident.bench.diagnose.shown import Shown
 from freeswing.ident.bench.diagnose.unexplained import remaining
 from freeswing.ident.bench.fit_rounds import Solved
@@ -43,6 +43,12 @@ LEVEL = (
     "hold a plumb line beside the hooks, or a level on their frame; a constant force tilts a "
     "heavier load less, and a tilt does not"
 )
+LIKELY = 0.5  # probability: more so than all else that was tried, and nothing, together
+PULL_HOOKS = (
+    "pull each hook sideways by a spring balance with a few newtons and see by how much it gives "
+    "way; or record three runs with a known mass as heavy as the platform, at different places"
+)
+MORE_RUNS = "record more runs of each kind, and wider swings"
 ADVICE = (
     (frozenset({"gravity_tilt", "constant_force"}), LEVEL),
     (frozenset({"gravity_tilt", "anchor_offset"}), LEVEL),
@@ -65,7 +71,7 @@ def bench_document(found: BenchDiagnosis | ByChannels | CannotTell) -> dict[str,
     entries += mass_found(last)
     notes = [mass] if mass else []
     candidates = _candidates(found)
-    notes += [*_unshown(candidates), _basis(found)]
+    notes += [*most_likely(found.rounds), *_unshown(candidates), _basis(found)]
     return {
         "format": FORMAT,
         "before": before,
@@ -91,6 +97,35 @@ def _cannot_tell(found: CannotTell) -> dict[str, Any]:
     rows = [told_entry(n, "not_identifiable", found.reason) for n in catalogue()]
     notes = [f"cannot tell: {found.reason}", *contradictions(found.identified.solved)]
     return unscaled_document(rows, [], notes)
+
+
+def most_likely(rounds: Sequence[Round]) -> list[str]:
+    """What is the most probable where a search ended, and not accepted; with what would tell."""
+    probable = [
+        word for one in rounds if one.unborne for word in one.words if (word.chance or 0.0) > LIKELY
+    ]
+    return [
+        f"most likely (probability {word.chance:.2g} against all else that was tried, and "
+        f"nothing): {_plain(word.cause)}. It is not accepted: {word.reason}. What bodies would "
+        f"change by with it is in their deviations. To tell: {_tells(word.cause)}"
+        for word in probable
+    ]
+
+
+def _plain(cause: Cause) -> str:
+    """A cause in words: of which wire, or of all alike."""
+    name = cause.effect.replace("_", " ")
+    if cause.part:
+        return f"{name}, wire {cause.part}"
+    return f"{name}, all wires alike" if cause.effect in (HOOKS, *ENDS) else name
+
+
+def _tells(cause: Cause) -> str:
+    """The measurement that decides on one cause by itself."""
+    if cause.effect == HOOKS:
+        return PULL_HOOKS
+    named = effect_named(cause.effect).separated_by
+    return "; or ".join(one.advice for one in named) or MORE_RUNS
 
 
 def _unexplained(found: BenchDiagnosis) -> dict[str, Any]:

@@ -26,6 +26,7 @@ from freeswing.ident.bench.diagnose.document import (
     _with_sight,
     bench_document,
     experiment_of,
+    most_likely,
 )
 from freeswing.ident.bench.diagnose.entries import removed_entry
 from freeswing.ident.bench.diagnose.search import Ground
@@ -327,3 +328,28 @@ def test_hooks_yield_alike_or_one_by_one() -> None:
     assert [one.part for one in causes] == ["", "0", "1", "2"]
     np.testing.assert_array_equal(causes[0].directions @ [2.0], [2.0, 2.0, 2.0])
     np.testing.assert_array_equal(causes[2].directions @ [2.0], [0.0, 2.0, 0.0])
+
+
+@pytest.mark.parametrize(("chance", "said"), [(0.52, True), (0.48, False)])
+def test_what_is_most_likely_and_not_accepted_is_said_with_what_would_tell(chance, said) -> None:
+    hooks, bent = causes_of(trifilar(), ["yielding_clamp"])[0], causes_of(trifilar())[0]
+    failed = "3 of 7 left-out runs are predicted worse with it"
+    words = (
+        search.Word(hooks, "rejected", 0.0, chance, 0.0, (), failed),
+        search.Word(bent, "rejected", 0.0, 0.1, 0.0, (), ""),
+    )
+    fits: Any = ((None, None),)
+    notes = most_likely([search.Round(words, None, unborne=fits)])
+    assert [
+        ("all wires alike" in one, failed in one, "spring balance" in one) for one in notes
+    ] == [(True, True, True)] * said, notes
+    assert most_likely([search.Round(words, None)]) == []
+
+
+def test_what_would_tell_one_cause() -> None:
+    (tilt,) = causes_of(trifilar(), ["gravity_tilt"])
+    word = search.Word(tilt, "rejected", 0.0, 0.9, 0.0, (), "failed")
+    fits: Any = ((None, None),)
+    (note,) = most_likely([search.Round((word,), None, unborne=fits)])
+    assert "gravity tilt. It is not accepted: failed" in note, note
+    assert note.split("To tell: ")[1], note
