@@ -286,6 +286,10 @@ class Effect:
         """Where shape parameters may start on a residual, by name; others at their `start`."""
         return ()
 
+    def further_shapes(self) -> Sequence[dict[str, float]]:
+        """Shapes that a fit starts from besides, by name, where the first has not converged."""
+        return ()
+
 
 def each(robot: Robot, stem: str, unit: str, low: float, high: float, scale: float):
     """One parameter a cable, named stem_<cable>_unit."""

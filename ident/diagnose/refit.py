@@ -105,14 +105,27 @@ def refit(
     Raises:
         ValueError: when the start cannot be simulated, or no step from there lowers the cost.
     """
-    runs = len(current.samples)
-    model, unknowns = _joined(current.model, current.unknowns, candidate, values, runs)
-    swings = replace(current.swings, scales=noise_scales * np.sqrt(colour))
-    swings = swings.under(model, unknowns, RANKING_ACCURACY_M)
-    found = _ranked(swings, unknowns, current.cost)
+    found = _refitted(current, candidate, values, noise_scales * np.sqrt(colour))
+    for shape in effect_named(effect_of(candidate)).further_shapes():
+        if found.converged:
+            break
+        parameters = effect_named(effect_of(candidate)).parameters(current.model.robot)
+        other = [shape.get(p.name, v) for p, v in zip(parameters, values, strict=True)]
+        again = _refitted(current, candidate, np.array(other), noise_scales * np.sqrt(colour))
+        found = min(found, again, key=lambda one: one.cost)
     if _does_nothing(found, candidate):
         raise ValueError(f"{candidate}: no step from doing nothing lowers the cost")
     return rescored(found, noise_scales, colour)
+
+
+def _refitted(current: LikelihoodFit, key: str, values: Array, scales: Array) -> LikelihoodFit:
+    """A candidate fitted from where it does nothing, its samples counted by `scales`, (2,)."""
+    runs = len(current.samples)
+    model, unknowns = _joined(current.model, current.unknowns, key, values, runs)
+    swings = replace(current.swings, scales=scales).under(model, unknowns, RANKING_ACCURACY_M)
+    # What the current fit costs under these scales: its own may be the noise's, a thousandth.
+    cost = current.cost * float(np.mean(np.square(current.scales / scales)))
+    return _ranked(swings, unknowns, cost)
 
 
 def _does_nothing(found: LikelihoodFit, key: str) -> bool:

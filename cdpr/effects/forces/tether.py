@@ -11,6 +11,9 @@ from freeswing.cdpr.robot import Robot
 # Of the entries' spread: about where platforms hang below them, so that the pull told is one felt.
 DEPTH = 0.7
 SMALLEST_PULL_M_S2 = 1e-9
+# The smaller the share, the more linear the force about no pull: a first step that was of no use
+# from a half is of use from here.
+LESS_AT_REST = 0.3
 
 
 class Tether(Effect):
@@ -35,6 +38,10 @@ class Tether(Effect):
             Parameter(f"point_{axis}_m", -0.4, 0.4, 0.1, amplitude=False) for axis in "xyz"
         )
         return (stiffness, *pull, share, *point)
+
+    def further_shapes(self) -> tuple[dict[str, float], ...]:
+        """A softer line: at no pull the direction of the force is not defined for any other."""
+        return ({"rest_share": LESS_AT_REST},)
 
     def wrench(self, instant: Instant, values: Expression) -> Expression:
         """The spring's force at its point of the platform.

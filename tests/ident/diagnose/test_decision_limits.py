@@ -247,12 +247,12 @@ def test_the_nearest_is_not_the_cause_where_much_is_left(monkeypatch, excess, be
     assert bool(notes) != believed, notes
 
 
-def left(monkeypatch, power: float, colour: float) -> bool:
+def left(monkeypatch, power: float, colour: float, floor: float = 0.561) -> bool:
     """Whether residuals of this power and this low-frequency power are called unexplained."""
     white = np.full((100, 1), np.sqrt(power))
-    spectrum = np.concatenate([np.full(50, colour), np.full(50, 0.5)])
+    spectrum = np.concatenate([np.full(50, colour), np.full(150, floor)])
     monkeypatch.setattr(rest, "residuals", lambda *_: white)
-    monkeypatch.setattr(rest, "mean_log_spectrum", lambda *_: (np.linspace(0, 9.9, 100), spectrum))
+    monkeypatch.setattr(rest, "mean_log_spectrum", lambda *_: (np.linspace(0, 19.9, 200), spectrum))
     monkeypatch.setattr(rest, "too_small", lambda *_: False)
     monkeypatch.setattr(rest, "predicted", lambda *_: np.zeros((100, 6)))
     monkeypatch.setattr(rest, "_follows", lambda *_: {"time": 1.0})
@@ -271,6 +271,12 @@ def left(monkeypatch, power: float, colour: float) -> bool:
 )
 def test_a_residual_that_noise_does_not_leave(monkeypatch, power, colour, present) -> None:
     assert left(monkeypatch, power, colour) == present
+
+
+@pytest.mark.parametrize(("floor", "present"), [(0.36, False), (0.34, True), (5.0, False)])
+def test_noise_that_was_taken_for_larger_hides_no_colour(monkeypatch, floor, present) -> None:
+    """Power 1.0 at low frequencies, beside white noise of 0.56 where the noise is as told."""
+    assert left(monkeypatch, 2.0, 1.0, floor) == present
 
 
 @pytest.mark.parametrize(("share", "terms"), [(0.027, 1), (0.033, 2)])
