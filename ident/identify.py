@@ -179,7 +179,11 @@ def identify(
         best=best,
         free_coordinates=prepared.free,
         amplification=prepared.amplification,
-        notes=(*session_notes(model, prepared, failures), *filter(None, far)),
+        notes=(
+            *session_notes(model, prepared, failures),
+            *_unseen(prepared, best),
+            *filter(None, far),
+        ),
         prepared=prepared,
         fitted=fitted[best].motions if best in fitted else (),
     )
@@ -342,6 +346,14 @@ def _validated(
         return validate_run(model, run, estimate.values, full, settings.predict)
 
     return tuple(side_by_side(confronted, runs))
+
+
+def _unseen(prepared: PreparedRuns, best: str) -> list[str]:
+    """Why runs that were held out are not among those that the best estimate is shown on."""
+    if best.endswith("full"):
+        return []
+    runs = [run for run in prepared.runs if run.run.role == "validate" and run.free is None]
+    return [f"run {run.name} is held out, and not compared: {run.why_not_free}" for run in runs]
 
 
 def session_notes(model: Model, prepared: PreparedRuns, failures: dict[str, str]) -> list[str]:

@@ -70,13 +70,39 @@ def outdone(decision: Decision, tried: Mapping[str, Refit]) -> str:
         tried: what was fitted in it, by key.
     """
     chances = {one.effect: one.probability or 0.0 for one in decision.candidates}
-    refused = {effect_of(key): plausible(one, key) for key, one in tried.items()}
-    impossible = [n for n, said in refused.items() if said and n not in decision.group]
-    leader = max(impossible, key=lambda name: chances[name], default="")
+    leader, why = impossible(decision, tried)
     mine = sum(chances[name] for name in decision.group)
     if not leader or mine > RIVAL * (mine + chances[leader]):
         return ""
-    return (
-        f"the nearest, not the cause: {leader} with values that cannot be explains it better "
-        f"({'; '.join(refused[leader])})"
+    better = f"{leader} with values that cannot be explains it better ({why})"
+    return f"the nearest, not the cause: {better}"
+
+
+def impossible(decision: Decision, tried: Mapping[str, Refit]) -> tuple[str, str]:
+    """The likeliest effect of a round whose values no such effect can have, and why; or "", "".
+
+    Args:
+        decision: of the round.
+        tried: what was fitted in it, by key.
+    """
+    chances = {one.effect: one.probability or 0.0 for one in decision.candidates}
+    refused = {effect_of(key): plausible(one, key) for key, one in tried.items()}
+    names = [n for n, said in refused.items() if said and n not in decision.group]
+    leader = max(names, key=lambda name: chances[name], default="")
+    return leader, "; ".join(refused.get(leader, ()))
+
+
+def would_explain(decision: Decision, tried: Mapping[str, Refit]) -> str:
+    """What would be the cause where nothing won, if its values could be: a sentence, or "".
+
+    Args:
+        decision: of the round.
+        tried: what was fitted in it, by key.
+    """
+    leader, why = impossible(decision, tried)
+    chance = next(
+        (one.probability or 0.0 for one in decision.candidates if one.effect == leader), 0
     )
+    if chance < ACCEPTED:
+        return ""
+    return f"{leader} would explain it with values that cannot be ({why})"

@@ -256,6 +256,9 @@ def _told(
             rest = unexplained(last.fit, fitted, full, scales)
         begun = search.rounds[0].before if accepted else last
         first = _with_own_noise(begun.fit) if accepted else final
+    last_round = search.rounds[-1] if search.rounds else None
+    if rest.present and last_round and last_round.decision.winner is None and last_round.stand_in:
+        rest = suspected(rest, last_round.stand_in)
     rest = with_unmet(suspected(rest, check) if check else rest, rungs[-1].held_out)
     spreads = honest_covariance(first, begun), with_settled(spread, last) if held else spread
     return _Told(last, accepted, rest, rungs, first, final, spreads)

@@ -20,7 +20,12 @@ from freeswing.cdpr.effects import effect_named
 from freeswing.cdpr.robot import Array, Robot
 from freeswing.cdpr.system.lifeline import tie_to
 from freeswing.cdpr.system.progress import Progress
-from freeswing.ident.diagnose.backward_removal import is_no_worse, outdone, superfluous
+from freeswing.ident.diagnose.backward_removal import (
+    is_no_worse,
+    outdone,
+    superfluous,
+    would_explain,
+)
 from freeswing.ident.diagnose.decision import (
     LARGEST_EXCESS_LEFT,
     Decision,
@@ -57,7 +62,7 @@ class Round:
     """One round of the search: what stood before, what was decided, what was taken away again.
 
     Those that cable lengths decide, before any force, say so; those whose winner stands in for
-    something else say why (`outdone`).
+    something else say why (`outdone`), those without a winner what would be it (`would_explain`).
     """
 
     before: Refit
@@ -183,7 +188,7 @@ class Search:
             if not more or settles(decision, current, self.noise_scales):
                 break
         if decision.winner is None:
-            return Round(current, decision)
+            return Round(current, decision, stand_in=would_explain(decision, tried))
         # Ranking stopped early: the winner goes on to convergence.
         found, removed = self._freed(polished(decision.winner.fit, self.noise_scales)), []
         while name := superfluous(found, decision.group):

@@ -10,7 +10,7 @@ import pytest
 
 from freeswing.ident.diagnose import backward_removal
 from freeswing.ident.diagnose import search as module
-from freeswing.ident.diagnose.backward_removal import outdone
+from freeswing.ident.diagnose.backward_removal import outdone, would_explain
 from freeswing.ident.diagnose.decision import Candidate, Decision
 from freeswing.ident.diagnose.search import Round, Search
 
@@ -70,6 +70,18 @@ def test_what_impossible_values_explain_far_better_is_none_of_the_catalogue(
     assert bool(found) == stands_in
     assert not found or "quadratic_drag with values that cannot be" in found
     assert not outdone(won, {"harmonic_force": tried["harmonic_force"]})
+
+
+@pytest.mark.parametrize(("drag", "is_said"), [(0.97, True), (0.93, False)])
+def test_where_nothing_won_what_impossible_values_surely_explain_is_said(
+    monkeypatch, drag, is_said
+) -> None:
+    """The swings gain energy: a drag of less than nothing, and nobody was told."""
+    monkeypatch.setattr(backward_removal, "plausible", lambda *_: ["rate_1_s = -0.02: below 0"])
+    nobody: Any = Decision((word("translational_drag", drag),))
+    found = would_explain(nobody, {"translational_drag": nobody})
+    assert bool(found) == is_said
+    assert not found or found.startswith("translational_drag would explain it with values")
 
 
 @pytest.mark.parametrize(("which", "left"), [(1, 0), (0, 2)])
