@@ -30,6 +30,7 @@ from freeswing.ident.diagnose.answer.not_the_cause import (
     all_settled,
     before_forces,
     gravity_instead,
+    gravity_unasked,
     removing_little,
     suspected,
     unless_validated,
@@ -259,6 +260,7 @@ def _told(
     last_round = search.rounds[-1] if search.rounds else None
     if rest.present and last_round and last_round.decision.winner is None and last_round.stand_in:
         rest = suspected(rest, last_round.stand_in)
+    check = check or gravity_unasked(accepted, last, _follows_badly(last, rest), scales)
     rest = with_unmet(suspected(rest, check) if check else rest, rungs[-1].held_out)
     spreads = honest_covariance(first, begun), with_settled(spread, last) if held else spread
     return _Told(last, accepted, rest, rungs, first, final, spreads)

@@ -11,7 +11,12 @@ from freeswing.cdpr.robot import Array
 from freeswing.ident.diagnose.answer.taken_back import TakenBack
 from freeswing.ident.diagnose.answer.unmet_validation import share_removed, unmet
 from freeswing.ident.diagnose.backward_removal import is_no_worse
-from freeswing.ident.diagnose.decision import ACCEPTED, LEAST_SHARE_EXPLAINED, included
+from freeswing.ident.diagnose.decision import (
+    ACCEPTED,
+    LEAST_SHARE_EXPLAINED,
+    included,
+    left_out,
+)
 from freeswing.ident.diagnose.heldout import HeldOut
 from freeswing.ident.diagnose.refit import Refit, colour_of, polished, refit
 from freeswing.ident.diagnose.search import Round
@@ -84,23 +89,53 @@ def gravity_instead(
     if all_settled(accepted):
         return None
     before = before_forces(accepted)
+    found = _under_other_gravity(before, noise_scales)
+    if found is None or not is_no_worse(found, last, accepted[-1].decision.key, noise_scales):
+        return None
+    why = "cannot say more than gravity of another strength does"
+    return without_forces(accepted, why), _to_check(found)
+
+
+def gravity_unasked(
+    accepted: Sequence[Round], last: Refit, is_missing: bool, noise_scales: Array
+) -> str:
+    """What to check where no force was accepted and gravity of another strength says what is left.
+
+    Empty where nothing is missing, or where that surely helps but leaves more than a quarter of
+    what runs left out are off beyond their noise: it stands in for something else.
+
+    Args:
+        accepted: rounds of the search that count.
+        last: the last fit.
+        is_missing: whether something that follows the motion still is.
+        noise_scales: of metres and radians, (2,).
+    """
+    if not is_missing or not all_settled(accepted):
+        return ""
+    found = _under_other_gravity(last, noise_scales)
+    if found is None or left_out(last, noise_scales).share(found.score) < LEAST_SHARE_EXPLAINED:
+        return ""
+    return _to_check(found)
+
+
+def _under_other_gravity(before: Refit, noise_scales: Array) -> Refit | None:
+    """A fit again under gravity of another strength; None: it surely has no other."""
     try:
         colour = colour_of(before.fit, noise_scales)
         found = refit(before.fit, GRAVITY, np.zeros(1), noise_scales, colour)
     except ValueError:  # no gravity lowers the cost
         return None
     found = polished(found.fit, noise_scales)
-    if included(before, found, GRAVITY, noise_scales) < ACCEPTED:
-        return None
-    if not is_no_worse(found, last, accepted[-1].decision.key, noise_scales):
-        return None
+    return found if included(before, found, GRAVITY, noise_scales) >= ACCEPTED else None
+
+
+def _to_check(found: Refit) -> str:
     stronger = float(found.fit.values[found.values_of(GRAVITY)][0])
-    check = (
+    return (
         f"as if gravity were {100 * stronger:+.2f} % off what the robot's file says, or the "
         f"stamps' clock ran {abs(50 * stronger):.2f} % too {'slow' if stronger > 0 else 'fast'}: "
         "check the frame rate, the clock of the stamps, and gravity"
     )
-    return without_forces(accepted, "cannot say more than gravity of another strength does"), check
 
 
 def suspected(rest: Unexplained, check: str) -> Unexplained:
