@@ -192,6 +192,11 @@ def _filmed(name: str, answers: Answers, paper: str, console: Console) -> dict[s
 
     chosen = _chosen(answers, paper, ("left", "right"))
     runs = [(f"swing-{k + 1:02d}", role(k, FILMED_RUNS)) for k in range(FILMED_RUNS)]
+    if KINDS[answers.kind or USUAL_KIND].is_bench:
+        console.say(
+            "a bench needs no calibrated cameras: one phone above it does (--above), or what a "
+            "sensor recorded (--mocap FILE ..)"
+        )
     if len(chosen.cameras) == 1:
         console.say(
             "one camera: depth along its view is known several times worse than across; a second "

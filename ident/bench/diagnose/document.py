@@ -46,7 +46,8 @@ LEVEL = (
 LIKELY = 0.5  # probability: more so than all else that was tried, and nothing, together
 PULL_HOOKS = (
     "pull each hook sideways by a spring balance with a few newtons and see by how much it gives "
-    "way; or record three runs with a known mass as heavy as the platform, at different places"
+    "way; or record three runs with a known mass as heavy as the platform, at different places, or "
+    "all runs anew with twists three times as wide"
 )
 MORE_RUNS = "record more runs of each kind, and wider swings"
 ADVICE = (

@@ -312,3 +312,9 @@ def test_recordings_of_a_bench_hold_the_same_columns(tmp_path, capsys) -> None:
     files = [str(tmp_path / "a.csv"), str(tmp_path / "b.csv")]
     assert main(["new", str(tmp_path / "c"), "--kind", "trifilar", "--mocap", *files]) != 0
     assert "it holds x, and" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("kind", "said"), [("bifilar", True), ("cable-robot", False)])
+def test_a_bench_by_cameras_is_told_the_easier_ways(tmp_path, capsys, kind, said) -> None:
+    assert main(["new", str(tmp_path / "a"), "--kind", kind]) == 0
+    assert ("--above" in capsys.readouterr().out) == said
