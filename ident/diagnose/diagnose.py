@@ -260,7 +260,10 @@ def _told(
     last_round = search.rounds[-1] if search.rounds else None
     if rest.present and last_round and last_round.decision.winner is None and last_round.stand_in:
         rest = suspected(rest, last_round.stand_in)
-    check = check or gravity_unasked(accepted, last, _follows_badly(last, rest), scales)
+    # A force that won and was taken back stood in for something, however little is left.
+    won = not all_settled([one for one in search.rounds if one.decision.winner is not None])
+    is_missing = won or _follows_badly(last, rest)
+    check = check or gravity_unasked(accepted, last, is_missing, scales)
     rest = with_unmet(suspected(rest, check) if check else rest, rungs[-1].held_out)
     spreads = honest_covariance(first, begun), with_settled(spread, last) if held else spread
     return _Told(last, accepted, rest, rungs, first, final, spreads)
