@@ -37,16 +37,21 @@ class TrackedCamera:
         camera: with its clock, line time and pose as tracking found them.
         recording: its frames.
         pieces: its sightings.
+        lost: frames after which others were lost while the stamps were counted on, and the
+            seconds that these took.
     """
 
     camera: Camera
     recording: Recording
     pieces: tuple[Path, ...]
+    lost: tuple[tuple[float, float], ...] = ()
 
     def frames(self) -> Iterator[tuple[Piece, int]]:
-        """The piece and the row in it of every frame, in order."""
+        """The piece and the row in it of every frame, in order, with its true stamp."""
         for path in self.pieces:
             piece = load_piece(path)
+            later = sum((gap_s * (piece.numbers > after) for after, gap_s in self.lost), 0.0)
+            piece = replace(piece, stamps_s=piece.stamps_s + later)
             for row in range(len(piece.numbers)):
                 yield piece, row
 
@@ -105,11 +110,22 @@ def tracked_run(
     for camera, recording in recordings:
         folder = sightings_folder(results, run.name)
         paths = collect_sightings(folder, camera, watch, recording, frame_rate_hz)
-        own = as_found(camera, found.on(run.name, camera.name))
-        seen.append(TrackedCamera(own, recording, tuple(paths)))
+        findings = found.on(run.name, camera.name)
+        own = as_found(camera, findings)
+        seen.append(TrackedCamera(own, recording, tuple(paths), lost_by(findings)))
     if found.corners_platform_m is not None:
         watch = with_layout(watch, found.corners_platform_m)
     return TrackedRun(run.name, watch, read_trajectory(csv), tuple(seen))
+
+
+def lost_by(findings: Sequence[Finding]) -> tuple[tuple[float, float], ...]:
+    """After which frames of a camera others were lost, and the seconds that these took."""
+    told = [
+        {name: value for name, value, _ in finding.parameters}
+        for finding in findings
+        if finding.effect == "lost_frames"
+    ]
+    return tuple((one["after_frame"], one["gap_s"]) for one in told)
 
 
 def as_found(camera: Camera, findings: Sequence[Finding]) -> Camera:

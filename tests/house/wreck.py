@@ -808,6 +808,14 @@ HELD = (
     Held("vision/rig/correct_rig.py", ("_LEAST_KNOWN",), START),
     Held("vision/rig/lag_search.py", ("_LEAST_OVERLAP",), START),
     Held("vision/rig/rig_step.py", ("_KEEP_SCORE", "STRETCH_S", "LEAST_PARTS"), START),
+    Held(
+        "vision/rig/lost_frames.py",
+        (
+            "LEAST_FRAMES", "REGULAR", "MOSTLY", "STRAINED", "AROUND", "SURE", "FITS",
+            "MOST_LOST", "_LEAST_STRETCHES",
+        ),
+        "tests/vision/rig/test_lost_frames.py",
+    ),
     Held("vision/rig/stamp_jitter.py", ("LEAST_JITTER_S", "_LEAST_FRAMES", "_FLOOR_PX"), START),
     Held("vision/rig/untied_cameras.py", ("_LEAST_TAGS", "_LEAST_KNOWN"), START),
     Held("calib/rig/bundle_adjustment.py", ("_COMMON_FREEDOM", "_LEAST_FREEDOM"), RIG_START),

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.calib.camera.camera import Camera
-from freeswing.vision.look.follow import USED
+from freeswing.vision.look.follow import UNSTAMPED, USED
 from freeswing.vision.look.pieces import Piece, load_piece
 
 Array = NDArray[np.float64]
@@ -70,7 +70,7 @@ class CameraViews:
         camera: its lens, pose and clock as they stand.
         paths: the pieces.
         numbers: frame numbers over all pieces, (n_f,).
-        stamps_s: (n_f,).
+        stamps_s: as they are believed, NaN for frames that are left out, (n_f,).
         status: (n_f,).
         labels: things that replace those of the pieces, once markers have names, (n_o,) or None.
         shrinks: factors on the rays of labelled balls, (n_o,) or None.
@@ -122,6 +122,16 @@ class CameraViews:
         copy.growth_px = growth_px
         return copy
 
+    def restamped(self, stamps_s: Array) -> CameraViews:
+        """The same sightings by a camera whose frames were taken at other times, (n_f,).
+
+        Those without a time are left out.
+        """
+        copy = self.believed(self.camera)
+        copy.stamps_s = stamps_s
+        copy.status = np.where(np.isfinite(stamps_s), self.status, UNSTAMPED)
+        return copy
+
     def middle_times(self) -> Array:
         """Base time of each frame's middle row, (n_f,)."""
         camera = self.camera
@@ -155,7 +165,9 @@ class CameraViews:
 
     def _piece(self, index: int) -> Piece:
         if self._held is None or self._held[0] != index:
-            self._held = (index, load_piece(self.paths[index]))
+            own = slice(self._bounds[index], self._bounds[index + 1])
+            piece = replace(load_piece(self.paths[index]), stamps_s=self.stamps_s[own])
+            self._held = (index, piece)
         return self._held[1]
 
 

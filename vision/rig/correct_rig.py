@@ -26,6 +26,7 @@ from freeswing.vision.rig.gross_faults import moved_too_far, refuse_disagreement
 from freeswing.vision.rig.lag_accepted import Missed, aligned, later
 from freeswing.vision.rig.moved_cameras import moved_cameras, repose_by_base_tags
 from freeswing.vision.rig.real_effects import LEAST_CLOCK_S, LEAST_LINE_S, is_real
+from freeswing.vision.rig.recounted import recounted
 from freeswing.vision.rig.rig_kernels import CLOCK, LINE, PER_CAMERA, POSE
 from freeswing.vision.rig.rig_step import Finding, RigStep, frame_squares_px2, iterated, rig_step
 from freeswing.vision.rig.stamp_jitter import stamp_jitter_s, widened_poses, widened_step
@@ -76,7 +77,10 @@ def correct_rig(
         DataError: when a camera is not where it can have got by a knock, or the cameras do not
             agree after all corrections.
     """
-    calibrated, started = tuple(views), None
+    started, lost, counted = None, [], []
+    if look and watch.tags:
+        views, lost, counted = recounted(views)
+    calibrated = tuple(views)
     if look and watch.tags and len(views):
         started = aligned(
             _standing(views, watch, survey_std_m),
@@ -91,9 +95,9 @@ def correct_rig(
         views, start = label_markers(views, watch, instants)
     poses, before = fuse(views, watch, instants, start=start)
     if not look or int(poses.known.sum()) < _LEAST_KNOWN:
-        return Corrected(tuple(views), poses, before, before, ())
+        return Corrected(tuple(views), poses, before, before, tuple(lost), tuple(counted))
     lags = np.zeros(len(views)) if started is None else started.lags_s
-    remarks = () if started is None else started.remarks
+    remarks = (*counted, *(() if started is None else started.remarks))
     moved = moved_cameras(views, watch)
     current = list(views)
     for index in moved:
@@ -106,7 +110,7 @@ def correct_rig(
     if not (moved or clocks.any() or lines.any()):
         views, poses, after, doubt, said = _settled(views, watch, poses, before, survey_std_m)
         poses = widened_poses(poses, jitter)
-        return Corrected(views, poses, before, after, (), (*remarks, *said), doubt)
+        return Corrected(views, poses, before, after, tuple(lost), (*remarks, *said), doubt)
     final = [
         _decided(view, own, clock, line)
         for view, own, clock, line in zip(current, calibrated, clocks, lines, strict=True)
@@ -114,7 +118,7 @@ def correct_rig(
     _refuse_far(calibrated, final)
     poses, after = fuse(final, watch, instants_of(final), start=_restarted(final, watch, start))
     settled, poses, after, doubt, said = _settled(final, watch, poses, after, survey_std_m)
-    findings = _findings(calibrated, settled, moved, clocks, lines, last)
+    findings = (*lost, *_findings(calibrated, settled, moved, clocks, lines, last))
     poses = widened_poses(poses, jitter)
     return Corrected(settled, poses, before, after, findings, (*remarks, *said), doubt)
 

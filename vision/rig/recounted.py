@@ -1,0 +1,82 @@
+"""Cameras whose stamps were counted on over lost frames, with the stamps that these frames had."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from freeswing.cdpr.files.documents import DataError
+from freeswing.vision.fuse.run_views import CameraViews
+from freeswing.vision.rig.lag_accepted import own_track
+from freeswing.vision.rig.lost_frames import Loss, Lost, lost_frames
+from freeswing.vision.rig.rig_step import Finding
+
+
+def recounted(
+    views: Sequence[CameraViews],
+) -> tuple[list[CameraViews], list[Finding], list[str]]:
+    """Cameras with true stamps, what was found of each, and the same in words.
+
+    Raises:
+        DataError: naming the camera and the place, when frames were lost and it is not sure how
+            many.
+    """
+    now, findings, said = [], [], []
+    for view in views:
+        lost = lost_frames(own_track(view))
+        told, own, words = _put_right(view, lost)
+        now.append(told)
+        findings += own
+        said += words
+    return now, findings, said
+
+
+def _put_right(view: CameraViews, lost: Lost) -> tuple[CameraViews, list[Finding], list[str]]:
+    if not (lost.losses or lost.unclear):
+        return view, [], []
+    track = own_track(view)
+    frame_at = {float(time): k for k, time in enumerate(view.middle_times())}
+    frame_of = [frame_at[float(time)] for time in track.times_s]
+    name = view.camera.name
+    unsure = [loss for loss in lost.losses if len(loss.frames) != 1]
+    if unsure:
+        raise DataError(_unsure_text(view, [frame_of[loss.after] for loss in unsure], unsure))
+    stamps, findings, said = view.stamps_s.copy(), [], []
+    for loss in lost.losses:
+        after, count = frame_of[loss.after], loss.frames[0]
+        stamps[after + 1 :] += count * track.step_s
+        number = int(view.numbers[after])
+        numbers = (("after_frame", float(number), 0.0), ("frames", float(count), 0.0))
+        findings.append(
+            Finding("lost_frames", name, (*numbers, ("gap_s", count * track.step_s, 0.0)))
+        )
+        said.append(
+            f"{name}: {_frames(count)} lost after frame {number} ({view.stamps_s[after]:.2f} s) "
+            "while the stamps were counted on, as the platform's own motion tells: later stamps "
+            f"are put {count * track.step_s:.3f} s on"
+        )
+    if lost.unclear:
+        left = [frame_of[k] for k in lost.unclear]
+        stamps[left] = np.nan
+        said.append(
+            f"{name}: {len(left)} frames from frame {int(view.numbers[left[0]])} on may lie before "
+            "or after such a gap: left out"
+        )
+    return view.restamped(stamps), findings, said
+
+
+def _unsure_text(view: CameraViews, places: Sequence[int], unsure: Sequence[Loss]) -> str:
+    counts = unsure[0].frames
+    many = f" ({counts[0]} to {counts[-1]})" if counts else ""
+    more = f", and at {len(unsure) - 1} places more," if len(unsure) > 1 else ""
+    return (
+        f"camera {view.camera.name}: after frame {int(view.numbers[places[0]])} "
+        f"({view.stamps_s[places[0]]:.2f} s){more} frames were lost while the stamps were counted "
+        f"on, and the platform's motion does not tell how many{many}: put the frames' own times "
+        f"beside the video ({view.camera.name}.csv with frame,t_s), or film again"
+    )
+
+
+def _frames(count: int) -> str:
+    return f"{count} frames were" if count > 1 else "1 frame was"
