@@ -127,19 +127,36 @@ def check_times(path: Path | str, table: NumberTable, column: int, name: str) ->
         )
 
 
-def check_quaternions(path: Path | str, table: NumberTable, q: Array, order: str) -> None:
-    """Check that quaternions (n, 4) have length 1, NaN rows aside; `order` as the file has it.
+def known_quaternions(
+    path: Path | str, table: NumberTable, q: Array, order: str
+) -> tuple[Array, tuple[str, ...]]:
+    """Quaternions (n, 4) of length 1 or NaN, and what was taken for a gap, one sentence each.
+
+    0 0 0 0 is no turn: programs write it where the platform was not seen. `order` is the file's.
 
     Raises:
-        InputError: naming the line.
+        InputError: naming the line of one that has another length, or where all are zero.
+
+    Source:
+        Siciliano, Sciavicco, Villani, Oriolo 2009, Robotics, sec. 2.6: unit quaternions.
     """
-    norm = np.linalg.norm(q, axis=1)
+    zero = (q == 0.0).all(axis=1)
+    is_gap = zero & bool(np.isfinite(q[~zero]).all(axis=1).any())
+    result = np.where(is_gap[:, None], np.nan, q)
+    norm = np.linalg.norm(result, axis=1)
     wrong = np.flatnonzero(wrong_recorded(norm))
     if len(wrong):
         raise InputError(
             f"{path}: line {table.lines[wrong[0]]}: the quaternion's length is "
             f"{norm[wrong[0]]:.4g}, must be 1 (order {order})"
         )
+    if not is_gap.any():
+        return result, ()
+    first = table.lines[int(np.argmax(is_gap))]
+    samples = f"{int(is_gap.sum())} samples" if is_gap.sum() > 1 else "1 sample"
+    return result, (
+        f"the quaternion 0 0 0 0 is taken as a gap in {samples}, first in line {first}",
+    )
 
 
 def _of_right_number(

@@ -23,9 +23,9 @@ from freeswing.cdpr.files.noise_columns import (
 )
 from freeswing.cdpr.files.number_table import (
     NumberTable,
-    check_quaternions,
     check_times,
     check_width,
+    known_quaternions,
     read_lines,
     read_numbers,
 )
@@ -148,14 +148,15 @@ def _known(is_pose: bool) -> str:
 def _poses(path: Path | str, table: NumberTable, columns: dict[str, Array]) -> Trajectory:
     position = np.stack([columns[name] for name in POSE_COLUMNS[:3]], axis=1)
     quaternion = np.stack([columns[name] for name in QUATERNION], axis=1)
-    check_quaternions(path, table, quaternion, "qw, qx, qy, qz")
+    quaternion, notes = known_quaternions(path, table, quaternion, "qw, qx, qy, qz")
+    position = np.where(np.isfinite(quaternion).all(axis=1)[:, None], position, np.nan)
     angles = unwrapped(angles_from_matrix(matrix_from_quaternion(quaternion)))
     values = np.concatenate([position, angles], axis=1)
     is_known = np.asarray(np.isfinite(values).all(axis=1))
     covariances = read_noise(path, table, columns, POSE_NOISE, is_known)
-    return Trajectory(
-        columns["t_s"], POSE_COORDINATES, values, covariances, f"{Path(path).name}: measured poses"
-    )
+    provenance = f"{Path(path).name}: measured poses"
+    parts = columns["t_s"], POSE_COORDINATES, values, covariances, provenance
+    return Trajectory(*parts, notes=notes)
 
 
 def _plain_coordinates(

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from freeswing.cdpr.files.documents import replace_file
 from freeswing.cdpr.files.number_table import (
-    check_quaternions,
     check_times,
+    known_quaternions,
     read_lines,
     read_numbers,
 )
@@ -30,13 +31,15 @@ def read_tum(path: Path | str) -> Trajectory:
     table = read_numbers(path, rows, None, TUM_COLUMNS)
     check_times(path, table, 0, "t")
     quaternion = table.values[:, [7, 4, 5, 6]]
-    check_quaternions(path, table, quaternion, "qx qy qz qw")
-    return Trajectory.from_poses(
+    quaternion, notes = known_quaternions(path, table, quaternion, "qx qy qz qw")
+    is_gap = ~np.isfinite(quaternion).all(axis=1)
+    poses = Trajectory.from_poses(
         table.values[:, 0],
-        table.values[:, 1:4],
+        np.where(is_gap[:, None], np.nan, table.values[:, 1:4]),
         matrix_from_quaternion(quaternion),
         provenance=f"{Path(path).name}: measured poses",
     )
+    return replace(poses, notes=notes)
 
 
 def write_tum(path: Path | str, trajectory: Trajectory) -> None:

@@ -101,6 +101,13 @@ def origin_in_gaps(number: int, table: np.ndarray) -> np.ndarray:
     return table
 
 
+def zeros_in_gaps(number: int, table: np.ndarray) -> np.ndarray:
+    rng = np.random.default_rng(number)
+    for first in rng.choice(len(table) - 40, 4, replace=False):
+        table[first : first + rng.integers(6, 15), 1:] = 0.0
+    return table
+
+
 def times(factor: float) -> Change:
     return lambda _, table: table * np.array([factor] + [1.0] * 7)
 
@@ -194,6 +201,10 @@ USED: dict[str, tuple[tuple[Fault, ...], str]] = {
     "gaps as the origin, dropped": (
         (runs(origin_in_gaps), runs(dropped(0.05))),
         "it fills a gap and is left out",
+    ),
+    "gaps as zeros, dropped": (
+        (runs(zeros_in_gaps), runs(dropped(0.05))),
+        "the quaternion 0 0 0 0 is taken as a gap",
     ),
 }
 
