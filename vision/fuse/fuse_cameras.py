@@ -48,6 +48,7 @@ class Fit:
         rejected: {(camera, thing): (count, first frame, worst px)} of outliers.
         total: sum of the accepted squared whitened residuals, and their number.
         noise: of the corners, with which the poses were found.
+        contradicting: frames of which every sighting is an outlier, two or more, by camera.
     """
 
     floor_px: Array
@@ -57,6 +58,7 @@ class Fit:
     rejected: dict[tuple[int, int], tuple[int, int, float]]
     total: tuple[float, int]
     noise: Noise
+    contradicting: tuple[tuple[int, ...], ...] = ()
 
 
 def fuse(
@@ -180,6 +182,7 @@ class _Account:
         self.rejected: dict[tuple[int, int], tuple[int, int, float]] = {}
         self.total, self.count = 0.0, 0
         self.samples: list[list[Array]] = [[] for _ in range(cameras)]
+        self.contradicting: list[set[int]] = [set() for _ in range(cameras)]
 
     def add(
         self,
@@ -210,6 +213,7 @@ class _Account:
             mine = known & (scores >= 0.0) & (block.camera_of == camera)
             excess = (squares[mine] - noise[mine]) / two[mine]
             self.samples[camera].append(excess[:: max(1, len(excess) // 500)])
+            self.contradicting[camera] |= _whole_frames(block.frames[mine], good[mine])
         for o in np.flatnonzero(bad):
             key = (int(block.camera_of[o]), int(block.things[o]))
             count, first, worst = self.rejected.get(key, (0, int(block.frames[o]), 0.0))
@@ -245,4 +249,12 @@ class _Account:
             dict(sorted(self.rejected.items())),
             (self.total, self.count),
             self.used_noise,
+            tuple(tuple(sorted(frames)) for frames in self.contradicting),
         )
+
+
+def _whole_frames(frames: NDArray[np.int64], good: Mask) -> set[int]:
+    """Frames of a camera's sightings (n,) of which two or more are there and none is good."""
+    names, inverse, counts = np.unique(frames, return_inverse=True, return_counts=True)
+    agree = np.bincount(inverse, weights=good, minlength=len(names))
+    return set(names[(counts > 1) & (agree == 0)].tolist())

@@ -34,6 +34,9 @@ MOST_APART_M = 0.06
 MOST_FLOOR_PX = 1.0
 """Cameras of one rig leave 0.02 to 0.5 px beyond the pixels' noise; a wrong rig more."""
 MOST_REJECTED = 0.5  # of a camera's sightings: then it is the camera, not the tags
+MOST_CONTRADICTING = 2
+"""Frames on end of which a camera's every tag lies four deviations off: one that was stamped late
+passes by, a third is no chance."""
 _SAME_TURN_RAD = 0.05  # good calibrations turn cameras by thousandths
 _SIZE_RANGE = (0.3, 3.0)
 _SAME_SIZE = 0.03  # distances between cameras are known to one per cent or two
@@ -98,7 +101,8 @@ def refuse_disagreement(views: Sequence[CameraViews], fit: Fit) -> None:
     """Passes cameras that agree once the rig is corrected.
 
     Raises:
-        DataError: naming the camera that still does not see the platform where the others do.
+        DataError: naming the camera that still does not see the platform where the others do,
+            for good or in frames on end.
     """
     for index, view in enumerate(views):
         lost = sum(count for (camera, _), (count, _, _) in fit.rejected.items() if camera == index)
@@ -115,6 +119,31 @@ def refuse_disagreement(views: Sequence[CameraViews], fit: Fit) -> None:
                 "stamped when they were taken, or target.toml is wrong. Calibrate again; "
                 "freeswing check names what the files show"
             )
+    if len(views) > 1:
+        _refuse_contradicting(views, fit)
+
+
+def _refuse_contradicting(views: Sequence[CameraViews], fit: Fit) -> None:
+    """Passes cameras of which no frames on end contradict the others with all they show."""
+    for view, frames in zip(views, fit.contradicting, strict=False):
+        first, count = longest_on_end(frames)
+        if count > MOST_CONTRADICTING:
+            raise DataError(
+                f"camera {view.camera.name} contradicts the others from frame {first} on with all "
+                f"that it shows, {count} frames on end, and agrees elsewhere: frames of one camera "
+                "were lost there while its stamps were counted on, or are not stamped when they "
+                f"were taken. Put their own times beside the videos ({view.camera.name}.csv with "
+                "frame,t_s), or film again"
+            )
+
+
+def longest_on_end(frames: Sequence[int]) -> tuple[int, int]:
+    """First and number of the longest run of frame numbers one after another; (0, 0) for none."""
+    best, run = (0, 0), (0, 0)
+    for frame in frames:
+        run = (run[0], run[1] + 1) if frame == run[0] + run[1] else (frame, 1)
+        best = max(best, run, key=lambda one: one[1])
+    return best
 
 
 def _by_base_tags(views: Sequence[CameraViews], watch: Watch) -> list[Evidence]:

@@ -42,6 +42,8 @@ _MOST_BESIDE, _LEAST_BESIDE = 8, 4
 """Frames to each side that are looked at: three modes need seven numbers and more."""
 _MOST_TWICE = 3
 """At two neighbouring places: a recorder that falls behind by more does so at once."""
+_LEAST_CLUSTER, _MOST_CLUSTER = 5, 14
+"""Steps in a row that three losses strain; of more a second and a half thousand ways are left."""
 _LEAST_STRETCHES = 20
 """Six coordinates of so many stretches know the covariance of twenty numbers."""
 _READING = 0.05
@@ -111,6 +113,8 @@ def lost_frames(track: OwnTrack) -> Lost:
             if one is not None and one.margin >= SURE
         ]
         if not sure:
+            sure = _hidden(numbers, scaled, groups, settled)
+        if not sure:
             break
         best, group = max(sure, key=lambda one: one[0].margin)
         settled |= set(group)
@@ -132,6 +136,25 @@ def lost_frames(track: OwnTrack) -> Lost:
         else:
             losses.append(Loss(group[len(group) // 2]))
     return Lost(tuple(sorted(losses, key=lambda loss: loss.after)), tuple(sorted(unclear)))
+
+
+def _hidden(
+    numbers: Ints, values: Array, groups: list[list[int]], settled: set[int]
+) -> list[tuple[Told, list[int]]]:
+    """Steps that strain no quintic, as of a slow swing, at which frames surely were lost."""
+    near = {k for one in groups for k in range(one[0] - _MOST_BESIDE, one[-1] + _MOST_BESIDE + 1)}
+    broken = np.array([step for one in groups for step in one], dtype=np.int64)
+    for step in range(_MOST_BESIDE - 1, len(numbers) - _MOST_BESIDE):
+        if step in near or step in settled:
+            continue
+        frames = np.arange(step - _MOST_BESIDE + 1, step + _MOST_BESIDE + 1)
+        ways: list[Steps] = [(), ((step, 1),), ((step, 2),)]
+        told = likeliest(numbers, values, frames, ways, broken)
+        if told is not None and told.steps and told.margin >= SURE:
+            told = _judged(numbers, values, [step], sorted([*groups, [step]]))
+            if told is not None and told.steps and told.margin >= SURE:
+                return [(told, [step])]
+    return []
 
 
 def counted(times_s: Array) -> Ints | None:
@@ -305,11 +328,14 @@ def likeliest(
 
 
 def ways_to_lose(group: list[int]) -> Iterator[Steps]:
-    """Every way to lose frames at one step of a group, or a few at two."""
+    """Every way to lose frames at one step of a group, a few at two, or one each at three."""
     yield ()
     for step in group:
         for count in range(1, MOST_LOST + 1):
             yield ((step, count),)
+    if _LEAST_CLUSTER <= len(group) <= _MOST_CLUSTER:
+        for three in combinations(group, 3):
+            yield tuple((step, 1) for step in three)
     for one, other in combinations(group, 2):
         for counts in product(range(1, _MOST_TWICE + 1), repeat=2):
             yield ((one, counts[0]), (other, counts[1]))

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
+from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.rotation import exp_rotation
 from freeswing.vision.rig import lost_frames as module
+from freeswing.vision.rig.gross_faults import refuse_disagreement
 from freeswing.vision.rig.lag_search import OwnTrack
 from freeswing.vision.rig.lost_frames import (
     Loss,
@@ -51,6 +56,21 @@ def test_frames_lost_at_one_place_are_counted(count) -> None:
 def test_frames_lost_at_several_places() -> None:
     found = lost_frames(without(30, 64, 65, 95))
     assert found.losses == (Loss(29, (1,)), Loss(62, (2,)), Loss(91, (1,)))
+
+
+def test_frames_lost_close_together() -> None:
+    found = lost_frames(without(60, 64, 69))
+    assert found.losses == (Loss(59, (1,)), Loss(62, (1,)), Loss(66, (1,)))
+
+
+@pytest.mark.parametrize(("frames", "refused"), [((7, 8, 20, 21), False), ((6, 8, 9, 10), True)])
+def test_frames_on_end_that_contradict(frames, refused) -> None:
+    fit = SimpleNamespace(rejected={}, floor_px=[0.0, 0.0], used=[100, 100])
+    fit.contradicting = ((), frames)
+    views = [SimpleNamespace(camera=SimpleNamespace(name=name)) for name in ("left", "right")]
+    said = "right contradicts the others from frame 8 on .* 3 frames"
+    with pytest.raises(DataError, match=said) if refused else nullcontext():
+        refuse_disagreement(views, fit)
 
 
 def test_a_gap_in_the_stamps_is_none() -> None:
