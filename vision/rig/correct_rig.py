@@ -22,7 +22,12 @@ from freeswing.vision.fuse.run_views import CameraViews, instants_of
 from freeswing.vision.fuse.tag_growth import growth_of
 from freeswing.vision.look.marker_names import label_markers
 from freeswing.vision.look.watched_target import Watch
-from freeswing.vision.rig.gross_faults import moved_too_far, refuse_disagreement, refuse_gross
+from freeswing.vision.rig.gross_faults import (
+    moved_too_far,
+    refuse_contradicting,
+    refuse_disagreement,
+    refuse_gross,
+)
 from freeswing.vision.rig.lag_accepted import Missed, aligned, later
 from freeswing.vision.rig.moved_cameras import moved_cameras, repose_by_base_tags
 from freeswing.vision.rig.real_effects import LEAST_CLOCK_S, LEAST_LINE_S, is_real
@@ -108,6 +113,7 @@ def correct_rig(
     clocks = clocks + lags
     remarks += _motion_sentences(views, poses, jitter)
     if not (moved or clocks.any() or lines.any()):
+        _refuse_contradicting(views, before, jitter)
         views, poses, after, doubt, said = _settled(views, watch, poses, before, survey_std_m)
         poses = widened_poses(poses, jitter)
         return Corrected(views, poses, before, after, tuple(lost), (*remarks, *said), doubt)
@@ -117,10 +123,18 @@ def correct_rig(
     ]
     _refuse_far(calibrated, final)
     poses, after = fuse(final, watch, instants_of(final), start=_restarted(final, watch, start))
+    _refuse_contradicting(final, after, jitter)
     settled, poses, after, doubt, said = _settled(final, watch, poses, after, survey_std_m)
     findings = (*lost, *_findings(calibrated, settled, moved, clocks, lines, last))
     poses = widened_poses(poses, jitter)
     return Corrected(settled, poses, before, after, findings, (*remarks, *said), doubt)
+
+
+def _refuse_contradicting(views: Sequence[CameraViews], fit: Fit, jitter_s: Array) -> None:
+    """Passes cameras that contradict each other nowhere on end, but by stamps that jitter."""
+    refuse_disagreement(views, fit)
+    if len(views) > 1 and not jitter_s.any():
+        refuse_contradicting(views, fit)
 
 
 def _standing(
@@ -203,8 +217,11 @@ def _missed(views: Sequence[CameraViews], watch: Watch, survey_std_m: float) -> 
     free[:, LINE] = True
     free[:, CLOCK] = np.arange(len(views)) != _reference(current)
     total = np.zeros_like(free, dtype=float)
-    iterated(current, watch, poses, fit, free, total, survey_std_m, told=False, plain=True)
-    poses, fit = fuse(current, watch, instants, start=poses, passes=2, rough=True, plain=True)
+    try:
+        iterated(current, watch, poses, fit, free, total, survey_std_m, told=False, plain=True)
+        poses, fit = fuse(current, watch, instants, start=poses, passes=2, rough=True, plain=True)
+    except np.linalg.LinAlgError:  # the rig ran away: no motion has such poses, no start is there
+        return Missed(float("inf"), {})
     squares = frame_squares_px2(current, watch, poses)
     clocks = [view.camera.clock_offset_s for view in current]
     return Missed(float(fit.floor_px[-1]), squares, clocks[-1] - clocks[0])

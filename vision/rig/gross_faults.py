@@ -101,8 +101,7 @@ def refuse_disagreement(views: Sequence[CameraViews], fit: Fit) -> None:
     """Passes cameras that agree once the rig is corrected.
 
     Raises:
-        DataError: naming the camera that still does not see the platform where the others do,
-            for good or in frames on end.
+        DataError: naming the camera that still does not see the platform where the others do.
     """
     for index, view in enumerate(views):
         lost = sum(count for (camera, _), (count, _, _) in fit.rejected.items() if camera == index)
@@ -119,12 +118,14 @@ def refuse_disagreement(views: Sequence[CameraViews], fit: Fit) -> None:
                 "stamped when they were taken, or target.toml is wrong. Calibrate again; "
                 "freeswing check names what the files show"
             )
-    if len(views) > 1:
-        _refuse_contradicting(views, fit)
 
 
-def _refuse_contradicting(views: Sequence[CameraViews], fit: Fit) -> None:
-    """Passes cameras of which no frames on end contradict the others with all they show."""
+def refuse_contradicting(views: Sequence[CameraViews], fit: Fit) -> None:
+    """Passes cameras of which no frames on end contradict the others with all they show.
+
+    Raises:
+        DataError: naming the camera and the first of these frames.
+    """
     for view, frames in zip(views, fit.contradicting, strict=False):
         first, count = longest_on_end(frames)
         if count > MOST_CONTRADICTING:
