@@ -32,10 +32,10 @@ def read_tum(path: Path | str) -> Trajectory:
     check_times(path, table, 0, "t")
     quaternion = table.values[:, [7, 4, 5, 6]]
     quaternion, notes = known_quaternions(path, table, quaternion, "qx qy qz qw")
-    is_gap = ~np.isfinite(quaternion).all(axis=1)
+    is_turned = np.isfinite(quaternion).all(axis=1, keepdims=True)
     poses = Trajectory.from_poses(
         table.values[:, 0],
-        np.where(is_gap[:, None], np.nan, table.values[:, 1:4]),
+        np.where(is_turned, table.values[:, 1:4], np.nan),
         matrix_from_quaternion(quaternion),
         provenance=f"{Path(path).name}: measured poses",
     )

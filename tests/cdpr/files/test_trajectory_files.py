@@ -14,7 +14,6 @@ from freeswing.cdpr.files.trajectory_files import (
     write_trc,
     write_tum,
 )
-from freeswing.cdpr.files.trajectory_tum import read_tum
 from freeswing.cdpr.measured.marker_recording import (
     MarkerRecording,
     marker_position,
@@ -129,23 +128,3 @@ def test_recorded_runs_load_fast_and_fit_to_their_noise():
         assert std < 1e-3, (path, std)
     assert len(seconds) == 36
     assert np.median(list(seconds.values())) < 0.3, seconds
-
-
-@pytest.mark.parametrize("suffix", ["csv", "tum"])
-def test_a_quaternion_of_zeros_is_a_gap_and_all_of_them_an_error(tmp_path, suffix) -> None:
-    sep = "," if suffix == "csv" else " "
-    head = ["t_s,x_m,y_m,z_m,qw,qx,qy,qz"] if suffix == "csv" else []
-    seen = ["1", "0", "0", "0"] if suffix == "csv" else ["0", "0", "0", "1"]
-    rows = [[f"0.{k}", "1", "2", "3", *(seen if k != 2 else "0000")] for k in range(5)]
-    path = tmp_path / f"run.{suffix}"
-    load = read_trajectory if suffix == "csv" else read_tum
-    path.write_text("\n".join([*head, *(sep.join(row) for row in rows)]))
-    found = load(path)
-    assert found.is_known.tolist() == [True, True, False, True, True]
-    assert np.isnan(found.values[2]).all()
-    line = 4 if suffix == "csv" else 3
-    said = f"the quaternion 0 0 0 0 is taken as a gap in 1 sample, first in line {line}"
-    assert found.notes == (said,)
-    path.write_text("\n".join([*head, *(sep.join([*row[:4], *"0000"]) for row in rows)]))
-    with pytest.raises(InputError, match="length is 0, must be 1"):
-        load(path)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from contextlib import nullcontext
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -25,6 +26,10 @@ from freeswing.vision.rig.lost_frames import (
 
 RATE_HZ = 20.0
 NOISE = np.array([1e-4, 1e-4, 5e-4, 2e-3, 2e-3, 5e-4])
+
+
+def stub(**attributes: Any) -> Any:
+    return SimpleNamespace(**attributes)
 
 
 def swing(frames: np.ndarray, seed: int = 3) -> OwnTrack:
@@ -65,9 +70,8 @@ def test_frames_lost_close_together() -> None:
 
 @pytest.mark.parametrize(("frames", "refused"), [((7, 8, 20, 21), False), ((6, 8, 9, 10), True)])
 def test_frames_on_end_that_contradict(frames, refused) -> None:
-    fit = SimpleNamespace(rejected={}, floor_px=[0.0, 0.0], used=[100, 100])
-    fit.contradicting = ((), frames)
-    views = [SimpleNamespace(camera=SimpleNamespace(name=name)) for name in ("left", "right")]
+    fit = stub(contradicting=((), frames))
+    views = [stub(camera=stub(name=name)) for name in ("left", "right")]
     said = "right contradicts the others from frame 8 on .* 3 frames"
     with pytest.raises(DataError, match=said) if refused else nullcontext():
         refuse_contradicting(views, fit)
