@@ -282,11 +282,23 @@ def _judged(numbers: Ints, values: Array, group: list[int], groups: list[list[in
     for beside in range(most, _LEAST_BESIDE - 1, -1):
         frames = np.arange(first - beside + 1, last + beside + 1)
         found = likeliest(numbers, values, frames, ways_to_lose(steps), broken)
-        if found is not None and (told is None or found.margin > told.margin):
-            told = found
+        if found is not None and _is_far_from_ends(found, len(numbers)):
+            told = found if told is None or found.margin > told.margin else told
         if told is not None and told.margin >= SURE:
             break
     return told
+
+
+def _is_far_from_ends(told: Told, count: int) -> bool:
+    """Whether as many frames as two stretches hold lie to both sides of a long gap.
+
+    A release, or what else begins a recording, is held against its swing by few of its frames.
+    """
+    ends = 2 * _MOST_BESIDE
+    return all(
+        lost <= _MOST_TWICE or (ends <= step < count - ends and lost < MOST_LOST)
+        for step, lost in told.steps
+    )
 
 
 def likeliest(
