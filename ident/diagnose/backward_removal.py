@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from freeswing.ident.diagnose.decision import (
     included,
     left_out,
 )
-from freeswing.ident.diagnose.refit import Refit, plausible
+from freeswing.ident.diagnose.refit import Refit, impossible_values, plausible
 from freeswing.ident.diagnose.variants import effect_of
 
 # Of the BIC without an effect to second order, below which leaving it out is worth a fit: beyond,
@@ -69,27 +69,12 @@ def outdone(decision: Decision, tried: Mapping[str, Refit]) -> str:
         decision: of the round.
         tried: what was fitted in it, by key.
     """
-    chances = {one.effect: one.probability or 0.0 for one in decision.candidates}
-    leader, why = impossible(decision, tried)
+    chances, leader, why = _likeliest_refused(decision, tried, plausible)
     mine = sum(chances[name] for name in decision.group)
     if not leader or mine > RIVAL * (mine + chances[leader]):
         return ""
     better = f"{leader} with values that cannot be explains it better ({why})"
     return f"the nearest, not the cause: {better}"
-
-
-def impossible(decision: Decision, tried: Mapping[str, Refit]) -> tuple[str, str]:
-    """The likeliest effect of a round whose values no such effect can have, and why; or "", "".
-
-    Args:
-        decision: of the round.
-        tried: what was fitted in it, by key.
-    """
-    chances = {one.effect: one.probability or 0.0 for one in decision.candidates}
-    refused = {effect_of(key): plausible(one, key) for key, one in tried.items()}
-    names = [n for n, said in refused.items() if said and n not in decision.group]
-    leader = max(names, key=lambda name: chances[name], default="")
-    return leader, "; ".join(refused.get(leader, ()))
 
 
 def would_explain(decision: Decision, tried: Mapping[str, Refit]) -> str:
@@ -99,10 +84,20 @@ def would_explain(decision: Decision, tried: Mapping[str, Refit]) -> str:
         decision: of the round.
         tried: what was fitted in it, by key.
     """
-    leader, why = impossible(decision, tried)
-    chance = next(
-        (one.probability or 0.0 for one in decision.candidates if one.effect == leader), 0
-    )
-    if chance < ACCEPTED:
+    chances, leader, why = _likeliest_refused(decision, tried, impossible_values)
+    if not leader or chances[leader] < ACCEPTED:
         return ""
     return f"{leader} would explain it with values that cannot be ({why})"
+
+
+def _likeliest_refused(
+    decision: Decision,
+    tried: Mapping[str, Refit],
+    complaints: Callable[[Refit, str], list[str]],
+) -> tuple[dict[str, float], str, str]:
+    """Probabilities of a round; the likeliest effect that is complained of, and what is said."""
+    chances = {one.effect: one.probability or 0.0 for one in decision.candidates}
+    refused = {effect_of(key): complaints(one, key) for key, one in tried.items()}
+    names = [n for n, said in refused.items() if said and n not in decision.group]
+    leader = max(names, key=lambda name: chances[name], default="")
+    return chances, leader, "; ".join(refused.get(leader, ()))

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from freeswing.cdpr.effects import effect_named
+from freeswing.cdpr.effects import Parameter, effect_named
 from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.model.known_values import with_effects, with_known, without_effect
 from freeswing.cdpr.robot import Array
@@ -255,13 +255,23 @@ def _ranked(swings: Swings, unknowns: Unknowns, cost: float) -> LikelihoodFit:
 
 def plausible(refitted: Refit, key: str) -> list[str]:
     """What is not plausible about a candidate's values: a sentence each."""
-    name = effect_of(key)
-    where = refitted.values_of(name)
-    chosen = np.flatnonzero(inside(refitted.fit.model.robot, key))
-    parameters = [refitted.fit.model.parameters[where][k] for k in chosen]
-    stds = refitted.fit.std(name)[chosen]
-    values = refitted.fit.values[where][chosen]
+    complaints = impossible_values(refitted, key)
+    parameters, values, _ = _estimated(refitted, key)
+    sizes = np.array([p.scale for p in parameters])
+    shares = np.abs(values - [p.start for p in parameters]) / sizes
+    geometry = effect_named(effect_of(key)).stage == "kinematics"
+    if geometry and shares.max(initial=0.0) < NEGLIGIBLE:
+        complaints.append(
+            f"all its values are below {NEGLIGIBLE:g} of a typical size ({sizes.max():g}): "
+            "neither a declared geometry nor a calibration is known better"
+        )
+    return complaints
+
+
+def impossible_values(refitted: Refit, key: str) -> list[str]:
+    """Which of a candidate's values no such effect can have: a sentence each."""
     complaints = []
+    parameters, values, stds = _estimated(refitted, key)
     for parameter, value, std in zip(parameters, values, stds, strict=True):
         slack = min(3.0 * std, 0.1 * (parameter.high - parameter.low))
         if parameter.amplitude and not parameter.low - slack <= value <= parameter.high + slack:
@@ -273,11 +283,14 @@ def plausible(refitted: Refit, key: str) -> list[str]:
     if amounts and all(p.low == p.start and value < p.low for p, value in amounts):
         told = ", ".join(f"{p.name} = {value:.4g}" for p, value in amounts)
         complaints.append(f"{told}: below {amounts[0][0].low:g}, which no such effect can have")
-    sizes = np.array([p.scale for p in parameters])
-    shares = np.abs(values - [p.start for p in parameters]) / sizes
-    if effect_named(name).stage == "kinematics" and shares.max(initial=0.0) < NEGLIGIBLE:
-        complaints.append(
-            f"all its values are below {NEGLIGIBLE:g} of a typical size ({sizes.max():g}): "
-            "neither a declared geometry nor a calibration is known better"
-        )
     return complaints
+
+
+def _estimated(refitted: Refit, key: str) -> tuple[list[Parameter], Array, Array]:
+    """A candidate's parameters, (k,), their values and standard deviations."""
+    name = effect_of(key)
+    where = refitted.values_of(name)
+    chosen = np.flatnonzero(inside(refitted.fit.model.robot, key))
+    parameters = [refitted.fit.model.parameters[where][k] for k in chosen]
+    values, stds = refitted.fit.values[where], refitted.fit.std(name)
+    return parameters, values[chosen], stds[chosen]

@@ -47,3 +47,16 @@ def test_another_shape_is_tried_where_the_first_did_not_converge(monkeypatch, co
     found: Any = module.refit(current, "tether", start, np.ones(2), 1.0)
     assert began == ([0.5] if converged else [0.5, 0.3])
     assert found.cost == min(began)
+
+
+@pytest.mark.parametrize(("metres", "refused"), [(2e-5, True), (2e-3, False)])
+def test_a_displacement_of_nothing_is_refused_but_not_impossible(metres, refused) -> None:
+    names = effect_named("anchor_offset").parameters(ROBOT)
+    fit = SimpleNamespace(
+        model=SimpleNamespace(robot=ROBOT, parameters=names),
+        values=np.full(len(names), metres),
+        std=lambda _: np.full(len(names), 1e-6),
+    )
+    one: Any = SimpleNamespace(fit=fit, values_of=lambda _: slice(0, len(names)))
+    assert bool(module.plausible(one, "anchor_offset")) == refused
+    assert module.impossible_values(one, "anchor_offset") == []

@@ -77,7 +77,8 @@ def test_where_nothing_won_what_impossible_values_surely_explain_is_said(
     monkeypatch, drag, is_said
 ) -> None:
     """The swings gain energy: a drag of less than nothing, and nobody was told."""
-    monkeypatch.setattr(backward_removal, "plausible", lambda *_: ["rate_1_s = -0.02: below 0"])
+    said = ["rate_1_s = -0.02: below 0"]
+    monkeypatch.setattr(backward_removal, "impossible_values", lambda *_: said)
     nobody: Any = Decision((word("translational_drag", drag),))
     found = would_explain(nobody, {"translational_drag": nobody})
     assert bool(found) == is_said
