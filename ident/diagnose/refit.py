@@ -105,14 +105,22 @@ def refit(
     Raises:
         ValueError: when the start cannot be simulated, or no step from there lowers the cost.
     """
-    found = _refitted(current, candidate, values, noise_scales * np.sqrt(colour))
-    for shape in effect_named(effect_of(candidate)).further_shapes():
-        if found.converged:
+    effect = effect_named(effect_of(candidate))
+    names = [one.name for one in effect.parameters(current.model.robot)]
+    starts = [values]
+    for shape in effect.further_shapes():
+        starts.append(np.array([shape.get(n, v) for n, v in zip(names, values, strict=True)]))
+    fits: list[LikelihoodFit] = []
+    for k, start in enumerate(starts):
+        try:
+            fits.append(_refitted(current, candidate, start, noise_scales * np.sqrt(colour)))
+        except ValueError:  # the last start may say so, if none could be followed
+            if k == len(starts) - 1 and not fits:
+                raise
+            continue
+        if fits[-1].converged:
             break
-        parameters = effect_named(effect_of(candidate)).parameters(current.model.robot)
-        other = [shape.get(p.name, v) for p, v in zip(parameters, values, strict=True)]
-        again = _refitted(current, candidate, np.array(other), noise_scales * np.sqrt(colour))
-        found = min(found, again, key=lambda one: one.cost)
+    found = min(fits, key=lambda one: one.cost)
     if _does_nothing(found, candidate):
         raise ValueError(f"{candidate}: no step from doing nothing lowers the cost")
     return rescored(found, noise_scales, colour)

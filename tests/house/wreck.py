@@ -768,6 +768,7 @@ HELD = (
     Held("ident/judge/prediction.py", ("_ASTRAY", "PREDICTED_HZ"), BAND_LIMITS),
     Held("cdpr/driven/drive.py", ("LEAST_DRIVEN",), CDPR),
     Held("cdpr/effects/forces/tether.py", ("DEPTH",), CDPR),
+    Held("cdpr/effects/forces/tether.py", ("LESS_AT_REST",), "tests/ident/diagnose/test_refit.py"),
     Held("cdpr/files/drive_file.py", ("COULOMB_WIDTH_RAD_S",), CDPR),
     Held("cdpr/mesh/nominal_inertia.py", ("LARGEST_PLATFORM_M",), CDPR),
     Held("cdpr/mesh/separate_bodies.py", ("_INSIDE",), CDPR),

@@ -49,6 +49,25 @@ def test_another_shape_is_tried_where_the_first_did_not_converge(monkeypatch, co
     assert found.cost == min(began)
 
 
+@pytest.mark.parametrize("lost", [0.5, 0.3])
+def test_a_start_that_cannot_be_followed_takes_no_other_away(monkeypatch, lost) -> None:
+    parameters = effect_named("tether").parameters(ROBOT)
+    share = [one.name for one in parameters].index("rest_share")
+
+    def fitted(_, __, values, ___):
+        if values[share] == lost:
+            raise ValueError("no pose")
+        return SimpleNamespace(converged=False, cost=values[share])
+
+    monkeypatch.setattr(module, "_refitted", fitted)
+    monkeypatch.setattr(module, "_does_nothing", lambda *_: False)
+    monkeypatch.setattr(module, "rescored", lambda found, *_: found)
+    current: Any = SimpleNamespace(model=SimpleNamespace(robot=ROBOT))
+    start = np.array([one.start for one in parameters])
+    found: Any = module.refit(current, "tether", start, np.ones(2), 1.0)
+    assert found.cost == (0.3 if lost == 0.5 else 0.5)
+
+
 @pytest.mark.parametrize(("metres", "refused"), [(2e-5, True), (2e-3, False)])
 def test_a_displacement_of_nothing_is_refused_but_not_impossible(metres, refused) -> None:
     names = effect_named("anchor_offset").parameters(ROBOT)
