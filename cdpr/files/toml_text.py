@@ -43,10 +43,11 @@ def _is_table_array(value: object) -> TypeGuard[Sequence[Mapping[str, object]]]:
 
 
 def _key(key: str) -> str:
-    return key if BARE_KEY.fullmatch(key) else _string(key)
+    return key if BARE_KEY.fullmatch(key) else toml_string(key)
 
 
-def _string(text: str) -> str:
+def toml_string(text: str) -> str:
+    """A text in quotes, as TOML reads it."""
     # JSON's escapes are TOML's, but for DEL, which TOML wants escaped too.
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
@@ -63,7 +64,7 @@ def _value(value: object, path: tuple[str, ...]) -> str:
             raise ValueError(f"{'.'.join(path)}: {value} is not finite and cannot be written")
         return repr(value)
     if isinstance(value, str):
-        return _string(value)
+        return toml_string(value)
     if isinstance(value, list | tuple):
         return f"[{', '.join(_value(entry, path) for entry in value)}]"
     if isinstance(value, Mapping):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from freeswing.cdpr.files.toml_text import toml_string
 from freeswing.starter.filmed import FAMILY, Filmed, opening_lines
 from freeswing.starter.kinds import MISSING
 
@@ -52,7 +53,7 @@ def _run(name: str, camera: str, lengths: str) -> list[str]:
     return [
         "",
         "[[runs]]",
-        f'name = "{name}"',
+        f"name = {toml_string(name)}",
         'role = "identify"',
         f'video = "runs/{name}"      # {camera}.mp4 in that folder',
         f"{lengths}   # hanging loaded, from bend to bend",

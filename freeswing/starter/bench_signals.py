@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,12 +10,18 @@ from pathlib import Path
 import numpy as np
 
 from freeswing.cdpr.files.documents import InputError
-from freeswing.cdpr.files.signal_csv import coordinates_in, header_of, read_signals
+from freeswing.cdpr.files.noise_columns import POSE_NOISE, QUATERNION, correlation_names
+from freeswing.cdpr.files.signal_csv import SignalTable, coordinates_in, header_of, read_signals
+from freeswing.cdpr.files.toml_text import toml_string
+from freeswing.cdpr.files.trajectory_csv import column_name
 from freeswing.cdpr.files.trajectory_files import holds_markers
 from freeswing.cdpr.robot import POSE_COORDINATES
 from freeswing.starter.kinds import MISSING
 
 TIME = "t_s"
+SPOKEN = {"roll": "phi", "pitch": "theta", "yaw": "chi"}
+DEGREES = frozenset({"deg", "degree", "degrees"})
+UNITS = frozenset({"m", "mm", "cm", "rad", "mrad", *DEGREES})
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,25 +45,45 @@ class Signals:
         """What was recorded."""
         return ", ".join((*self.coordinates, *self.channels))
 
+    @property
+    def taken_for(self) -> list[str]:
+        """What each column is taken for, a sentence a kind."""
+        pose = ", ".join(map(column_name, self.coordinates))
+        others = ", ".join(self.channels)
+        told = [f"{pose}: taken for the pose, in m and rad"] if pose else []
+        if others:
+            told.append(
+                f"{others}: taken for the motion's signals of unknown scale ([[channels]]); leave "
+                "out of the files what is none"
+            )
+        return told
+
 
 def are_signals(files: Sequence[Path]) -> bool:
-    """Whether all are tables of time and numbers, neither markers nor whole poses."""
-    return all(
-        path.suffix.lower() == ".csv"
-        and not holds_markers(path)
-        and TIME in header_of(path)
-        and coordinates_in(header_of(path)) != POSE_COORDINATES
-        for path in files
+    """Whether any is a table of time and numbers that is neither of markers nor of whole poses."""
+    return any(
+        _is_table(path) and coordinates_in(header_of(path)) != POSE_COORDINATES for path in files
     )
+
+
+def _is_table(path: Path) -> bool:
+    return path.suffix.lower() == ".csv" and not holds_markers(path) and TIME in header_of(path)
 
 
 def look_over_signals(files: Sequence[Path]) -> Signals:
     """Read a bench's recordings.
 
     Raises:
-        InputError: a file that is no such table, or that holds other columns than the first.
+        InputError: a file that is no such table, that holds other columns than the first, or one
+            sample; a column that is a pose's in other words or units, or counts.
     """
     ordered = tuple(sorted(files, key=lambda path: path.name))
+    for path in ordered:
+        if not _is_table(path):
+            raise InputError(
+                f"{path}: it is no table with a column {TIME}, and others are: begin a session "
+                "with recordings of one kind"
+            )
     held = [_columns(path) for path in ordered]
     for path, columns in zip(ordered, held, strict=True):
         if columns != held[0]:
@@ -66,22 +93,53 @@ def look_over_signals(files: Sequence[Path]) -> Signals:
                 "columns, and add the others to session.toml"
             )
     coordinates, channels = held[0]
+    for channel in channels:
+        _question_name(ordered[0], channel)
     tables = [read_signals(path, channels) for path in ordered]
+    for path, table in zip(ordered, tables, strict=True):
+        _question_values(path, table, channels)
     rate = round(1.0 / float(np.median(np.diff(tables[0].times_s))), 3)
     return Signals(ordered, coordinates, channels, rate)
 
 
 def _columns(path: Path) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """The coordinates that a file holds, and its other columns."""
+    """The coordinates that a file holds, and its other columns by name."""
     header = header_of(path)
     coordinates = coordinates_in(header)
-    known = {TIME, *(f"{name}_{_unit(name)}" for name in coordinates)}
-    others = tuple(name for name in header if name not in known and not name.startswith("std_"))
-    return coordinates, others
+    noise = POSE_NOISE if QUATERNION[0] in header else coordinates
+    known = {TIME, *QUATERNION, *map(column_name, coordinates), *correlation_names(noise)}
+    others = (name for name in header if name not in known and not name.startswith("std_"))
+    return coordinates, tuple(sorted(others))
 
 
-def _unit(coordinate: str) -> str:
-    return "m" if POSE_COORDINATES.index(coordinate) < 3 else "rad"
+def _question_name(path: Path, column: str) -> None:
+    """A part of the pose in other words or units is no signal of unknown scale."""
+    first, *units = [word for word in re.split(r"[^a-z]+", column.lower()) if word]
+    coordinate = SPOKEN.get(first, first)
+    is_pose = coordinate in POSE_COORDINATES and UNITS.issuperset(units)
+    if is_pose or DEGREES.intersection(units):
+        wanted = column_name(coordinate) if is_pose else "phi_rad, theta_rad or chi_rad"
+        raise InputError(
+            f"{path}: column {column!r}: is it a part of the pose? Write it as {wanted} (metres; "
+            "radians, which are degrees x 0.0174533). If its scale is not known, name it "
+            "otherwise, as dot_px"
+        )
+
+
+def _question_values(path: Path, table: SignalTable, channels: Sequence[str]) -> None:
+    """One sample has no rate, and what rises from row to row swings with nothing."""
+    if len(table.times_s) < 2:
+        raise InputError(
+            f"{path}: it holds one sample, of which neither a rate nor a swing can be told: "
+            "record again, or leave it out"
+        )
+    for channel in channels:
+        steps = np.diff(table.values[channel])
+        if len(steps) > 1 and (steps > 0.0).all():
+            raise InputError(
+                f"{path}: column {channel!r} rises from each row to the next, as a counter or a "
+                "clock does and no swing: leave it out"
+            )
 
 
 def signals_session(name: str, found: Signals, cables: int) -> str:
@@ -89,7 +147,7 @@ def signals_session(name: str, found: Signals, cables: int) -> str:
     lengths = ", ".join([MISSING] * cables)
     lines = [
         'format = "freeswing-session/1"',
-        f'name = "{name}"',
+        f"name = {toml_string(name)}",
         'robot = "robot.toml"',
         f"frame_rate_hz = {found.rate_hz:g}",
     ]
@@ -97,8 +155,8 @@ def signals_session(name: str, found: Signals, cables: int) -> str:
         lines += [
             "",
             "[[channels]]       # an uncalibrated signal of the platform's motion",
-            f'name = "{channel}"',
-            f'column = "{channel}"',
+            f"name = {toml_string(channel)}",
+            f"column = {toml_string(channel)}",
             'coordinates = ["chi", "x", "y"]   # what moves it',
             "order = 3          # a dot on a flat wall is a curved map of yaw",
         ]
@@ -118,9 +176,9 @@ def signals_session(name: str, found: Signals, cables: int) -> str:
         lines += [
             "",
             "[[runs]]",
-            f'name = "{path.stem}"',
+            f"name = {toml_string(path.stem)}",
             'role = "identify"      # or validate: never fitted',
-            f'trajectory = "runs/{path.name}"',
+            f"trajectory = {toml_string(f'runs/{path.name}')}",
             f"cable_lengths_m = [{lengths}]   # hanging loaded, from bend to bend",
             "cable_lengths_std_m = 0.001",
             "# payload = { mass_kg = 0.5, position_m = [0.1, 0.0, 0.0] }",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from freeswing.cdpr.files.toml_text import toml_string
 from freeswing.starter.markers import Recorded, role
 
 
@@ -14,7 +15,7 @@ def marker_target(found: Recorded) -> str:
     ]
     for name, place in zip(found.names, found.positions_m, strict=True):
         at = ", ".join(f"{value:.6f}" for value in place + 0.0)
-        lines += ["", "[[markers]]", f'name = "{name}"', f"position_m = [{at}]"]
+        lines += ["", "[[markers]]", f"name = {toml_string(name)}", f"position_m = [{at}]"]
     return "\n".join([*lines, ""])
 
 
@@ -22,7 +23,7 @@ def recorded_session(name: str, found: Recorded) -> str:
     """session.toml of recordings: a run a swing, a third of them kept apart."""
     lines = [
         'format = "freeswing-session/1"',
-        f'name = "{name}"',
+        f"name = {toml_string(name)}",
         'robot = "robot.toml"',
         *(['target = "target.toml"'] if found.names else []),
         f"frame_rate_hz = {found.rate_hz:g}",
@@ -34,7 +35,7 @@ def recorded_session(name: str, found: Recorded) -> str:
         lines += [
             "",
             "[[runs]]",
-            f'name = "{run.name}"',
+            f"name = {toml_string(run.name)}",
             f'role = "{role(k, len(found.runs))}"      # identify, or validate: never fitted',
             f'trajectory = "runs/{run.file.name}"',
         ]

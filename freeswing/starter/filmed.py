@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from freeswing.cdpr.files.toml_text import toml_string
 from freeswing.printing.pages import PAPERS_MM, Page, Placed, label_of, page_room_mm
 from freeswing.printing.sheet import Sheet
 
@@ -92,7 +93,7 @@ def opening_lines(name: str, rate_hz: float) -> list[str]:
     """How session.toml of any session with cameras begins."""
     return [
         'format = "freeswing-session/1"',
-        f'name = "{name}"',
+        f"name = {toml_string(name)}",
         'robot = "robot.toml"',
         'target = "target.toml"',
         f"frame_rate_hz = {rate_hz:g}",
@@ -121,7 +122,7 @@ def filmed_session(name: str, filmed: Filmed, runs: Sequence[tuple[str, str]]) -
         *_base_tag(BASE_IDS[1], filmed.base_tag_m, "[nan, nan, nan]"),
     ]
     for run, kind in runs:
-        lines += ["", "[[runs]]", f'name = "{run}"', f'role = "{kind}"']
+        lines += ["", "[[runs]]", f"name = {toml_string(run)}", f'role = "{kind}"']
         lines.append(f'video = "runs/{run}"      # {files} in that folder')
         lines.append("# window_s = [2.0, 12.0]   # the free motion; absent: it is found")
     return "\n".join([*lines, ""])

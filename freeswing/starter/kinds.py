@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from freeswing.cdpr.files.toml_text import toml_string
+
 MISSING = "nan"  # a number that robot.toml does not take: nothing runs before it was measured
 
 
@@ -57,7 +59,7 @@ def robot_toml(name: str, kind: Kind, cables: int, mass_kg: float | None) -> str
         mass += "\n# mass_std_kg = 0.001   # how well; else as payload runs leave it open"
     lines = [
         'format = "freeswing-robot/1"',
-        f'name = "{name}"',
+        f"name = {toml_string(name)}",
         f"# {kind.says}. Every `nan` below has to be measured: docs/formats.md says what each is.",
         *(BENCH_FRAMES if kind.is_bench else [FRAMES]),
         "gravity_m_s2 = [0.0, 0.0, -9.80665]   # z up; another vertical axis: put -9.80665 there",

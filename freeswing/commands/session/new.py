@@ -245,6 +245,8 @@ def _signals(name: str, answers: Answers, paper: str, console: Console) -> dict[
         raise InputError("--mocap: two recordings have the same name; rename one")
     found = look_over_signals(answers.recordings)
     console.say(f"{len(found.files)} recordings of {found.words} at {found.rate_hz:g} Hz")
+    for sentence in found.taken_for:
+        console.say(sentence)
     cables = KINDS[answers.kind or USUAL_KIND].cables if answers.cables is None else answers.cables
     texts = {"session.toml": signals_session(name, found, cables).encode("utf-8")}
     return texts | {f"runs/{file.name}": file.read_bytes() for file in found.files}

@@ -314,6 +314,60 @@ def test_recordings_of_a_bench_hold_the_same_columns(tmp_path, capsys) -> None:
     assert "it holds x, and" in capsys.readouterr().err
 
 
+REFUSED = {
+    "one-sample": ({"a": "t_s,chi_rad\n0,0\n"}, "a.csv: it holds one sample"),
+    "mixture": (
+        {"pose": "t_s,x_m,y_m,z_m,phi_rad,theta_rad,chi_rad\n0,0,0,0,0,0,0\n1,0,0,0,0,0,0\n"}
+        | {"yaw": "t_s,chi_rad\n0,0\n1,0.1\n"},
+        "yaw.csv: it holds chi, and",
+    ),
+    "mixture-of-kinds": (
+        {"a": "t,x\n0,0\n1,0\n", "yaw": "t_s,chi_rad\n0,0\n1,0.1\n"},
+        "a.csv: it is no table with a column t_s",
+    ),
+    "degrees": ({"a": "t_s,yaw_deg\n0,0\n1,5\n"}, "'yaw_deg': is it a part of the pose? Write"),
+    "other-degrees": ({"a": "t_s,encoder_deg\n0,0\n1,5\n"}, "phi_rad, theta_rad or chi_rad"),
+    "no-unit": ({"a": "t_s,x\n0,0\n1,5\n"}, "Write it as x_m"),
+    "counter": (
+        {"a": "t_s,dot_px,frame\n0,0,1\n1,5,2\n2,3,4\n"},
+        "column 'frame' rises from each row to the next",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_no_bench_session_can_begin_from_is_named(tmp_path, capsys, case) -> None:
+    tables, said = REFUSED[case]
+    for name, text in tables.items():
+        (tmp_path / f"{name}.csv").write_text(text)
+    files = [str(tmp_path / f"{name}.csv") for name in tables]
+    assert main(["new", str(tmp_path / "c"), "--kind", "bifilar", "--mocap", *files]) == 2
+    error = capsys.readouterr().err
+    assert said in error, error
+    assert not (tmp_path / "c").exists()
+
+
+def test_columns_are_said_and_quoted_and_their_order_is_nothing(tmp_path, capsys) -> None:
+    """Quotes in names of columns and folder; rows of a dot that rises but for one are its swing."""
+    (tmp_path / "a.csv").write_text('t_s,sp"ot,x_px\n0,0,1\n0.1,1,3\n0.2,2,2\n')
+    (tmp_path / "b.csv").write_text('t_s,x_px,sp"ot\n0,0,1\n0.1,1,2\n0.2,1,2\n')
+    files = [str(path) for path in tmp_path.glob("*.csv")]
+    folder = tmp_path / 'of "two"'
+    begun = ["new", str(folder), "--kind", "bifilar", "--mocap", *files]
+    assert main(begun) == 2
+    assert "'sp\"ot' rises" in capsys.readouterr().err
+    (tmp_path / "a.csv").write_text('t_s,sp"ot,x_px\n0,0,1\n0.1,1,3\n0.2,1,2\n')
+    assert main(begun) == 0
+    told = capsys.readouterr().out
+    assert "sp\"ot, x_px: taken for the motion's signals of unknown scale" in told, told
+    session = folder / "session.toml"
+    text = session.read_text(encoding="utf-8").replace("nan", "0.9")
+    session.write_text(text.replace("# loads =", "loads =", 1), encoding="utf-8")
+    read = read_session(folder)
+    assert [one.column for one in read.channels] == ['sp"ot', "x_px"]
+    assert [run.name for run in read.runs] == ["a", "b"]
+
+
 @pytest.mark.parametrize(("kind", "said"), [("bifilar", True), ("cable-robot", False)])
 def test_a_bench_by_cameras_is_told_the_easier_ways(tmp_path, capsys, kind, said) -> None:
     assert main(["new", str(tmp_path / "a"), "--kind", kind]) == 0
