@@ -793,7 +793,7 @@ HELD = (
     Held(
         "freeswing/doctor/robot_file/mistaken_cables.py",
         ("LEAST_CHANGE", "LEFT_OVER", "LEAST_RUNS", "LEAST_MEANS"),
-        "tests/freeswing/doctor/test_mistaken_cables.py",
+        "tests/freeswing/doctor/robot_file/test_mistaken_cables.py",
     ),
     Held(
         "freeswing/doctor/recordings_against_lengths.py",
