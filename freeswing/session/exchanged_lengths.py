@@ -47,19 +47,21 @@ def refuse_exchanged_lengths(
     Raises:
         DataError: naming the runs, the cables and by how much.
     """
-    found, order, remedy = [], None, "put each cable's length in its place"
+    found, order, without_poses = [], None, False
     for swing in swings:
         lengths = pose_lengths(swing, robot)
         if lengths is None:
             order, told = exchanged_at_rest(swing, robot, order)
-            # Without poses ends of other cables make it rest elsewhere as well.
-            remedy += ", or each cable's ends in robot.toml" * (bool(told) and not found)
+            without_poses |= bool(told)
         else:
             told = exchanged_sentence(swing, robot, lengths, least_m)
         if told:
             found.append(f"run {swing.name}: {told}")
     if found:
         more = f" and {len(found) - 3} more runs" if len(found) > 3 else ""
+        remedy = "put each cable's length in its place"
+        # Without poses ends of other cables make it rest elsewhere as well.
+        remedy += ", or each cable's ends in robot.toml" * without_poses
         raise DataError(f"{'; '.join(found[:3])}{more}: {remedy}")
 
 

@@ -20,6 +20,7 @@ from freeswing.doctor.exchanged_by_lean import exchanged_by_lean, leans_shown
 from freeswing.ident.bench.runs import Bench, BenchRun, Signal
 from freeswing.ident.runs import SwingRun
 from freeswing.main import main
+from freeswing.session import exchanged_lengths
 from freeswing.session.exchanged_lengths import (
     BENCH_DIFFERENCE_M,
     exchanged_at_rest,
@@ -162,6 +163,25 @@ def test_lengths_as_they_are_rest_where_they_were_measured(free_alone: Path) -> 
     refuse_exchanged_lengths(wrong, robot)  # merely wrong: another matter
     unknown = replace(robot, platform=replace(robot.platform, com_m=None))
     refuse_exchanged_lengths(swings, unknown)
+
+
+@pytest.mark.parametrize("without", [(False, True), (True, False), (True, True), (False, False)])
+def test_the_remedy_is_the_same_whichever_run_comes_first(without, monkeypatch) -> None:
+    """Of runs without poses it may be the ends; where one run has none, that is said too."""
+    names = [f"{k} {'free' if one else 'posed'}" for k, one in enumerate(without)]
+    motion = Trajectory(np.arange(2.0), ("x",), np.zeros((2, 1)))
+    runs = [SwingRun(name, "identify", motion, OWN[[1, 0, 2, 3]]) for name in names]
+    monkeypatch.setattr(
+        exchanged_lengths, "pose_lengths", lambda run, _: OWN if "posed" in run.name else None
+    )
+    monkeypatch.setattr(
+        exchanged_lengths, "exchanged_at_rest", lambda *_: (None, "these are exchanged")
+    )
+    with pytest.raises(DataError) as told:
+        refuse_exchanged_lengths(runs, ROBOT)
+    assert "put each cable's length in its place" in str(told.value)
+    said = str(told.value).count("or each cable's ends in robot.toml")
+    assert said == any(without), str(told.value)
 
 
 @pytest.mark.parametrize(("apart_m", "named"), [(0.0045, False), (0.0055, True)])
