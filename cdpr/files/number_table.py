@@ -127,12 +127,16 @@ def check_times(path: Path | str, table: NumberTable, column: int, name: str) ->
         )
 
 
-def known_quaternions(
-    path: Path | str, table: NumberTable, q: Array, order: str
-) -> tuple[Array, tuple[str, ...]]:
-    """Quaternions (n, 4) of length 1 or NaN, and what was taken for a gap, one sentence each.
+def known_poses(
+    path: Path | str, table: NumberTable, positions: Array, q: Array, order: str
+) -> tuple[Array, Array, tuple[str, ...]]:
+    """Poses whose turn is known, NaN elsewhere, and what was taken for a gap, one sentence each.
 
-    0 0 0 0 is no turn: programs write it where the platform was not seen. `order` is the file's.
+    0 0 0 0 is no turn: programs write it where the platform was not seen. Its position is none
+    either. `order` is the file's.
+
+    Returns:
+        Positions (n, 3), quaternions (n, 4) of length 1, and the sentences.
 
     Raises:
         InputError: naming the line of one that has another length, or where all are zero.
@@ -150,12 +154,15 @@ def known_quaternions(
             f"{path}: line {table.lines[wrong[0]]}: the quaternion's length is "
             f"{norm[wrong[0]]:.4g}, must be 1 (order {order})"
         )
+    positions = np.where(np.isfinite(norm)[:, None], positions, np.nan)
     if not is_gap.any():
-        return result, ()
+        return positions, result, ()
     first = table.lines[int(np.argmax(is_gap))]
     samples = f"{int(is_gap.sum())} samples" if is_gap.sum() > 1 else "1 sample"
-    return result, (
-        f"the quaternion 0 0 0 0 is taken as a gap in {samples}, first in line {first}",
+    return (
+        positions,
+        result,
+        (f"the quaternion 0 0 0 0 is taken as a gap in {samples}, first in line {first}",),
     )
 
 

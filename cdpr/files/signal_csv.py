@@ -16,7 +16,14 @@ from freeswing.cdpr.files.noise_columns import (
     correlation_names,
     noise_names,
 )
-from freeswing.cdpr.files.number_table import check_times, check_width, read_lines, read_numbers
+from freeswing.cdpr.files.number_table import (
+    NumberTable,
+    check_times,
+    check_width,
+    known_poses,
+    read_lines,
+    read_numbers,
+)
 from freeswing.cdpr.files.trajectory_csv import column_name, lines_of, question_unit
 from freeswing.cdpr.measured.trajectory import unwrapped
 from freeswing.cdpr.robot import POSE_COORDINATES, Array
@@ -33,11 +40,13 @@ class SignalTable:
         times_s: (n,), increasing.
         values: by coordinate (x .. chi) or channel column, (n,) each, NaN where empty.
         stds: of those that have a `std_` column, (n,) each.
+        notes: what was taken for a gap, one sentence each.
     """
 
     times_s: Array
     values: dict[str, Array]
     stds: dict[str, Array]
+    notes: tuple[str, ...] = ()
 
 
 def header_of(path: Path | str) -> tuple[str, ...]:
@@ -83,14 +92,14 @@ def read_signals(path: Path | str, channels: tuple[str, ...] = ()) -> SignalTabl
     check_times(path, table, header.index("t_s"), "t_s")
     columns = {name: table.values[:, place] for place, name in enumerate(header)}
     if QUATERNION[0] in header:
-        values = _of_poses(columns)
+        values, notes = _of_poses(path, table, columns)
         stds = {
             c: columns[n]
             for c, n in zip(values, noise_names(POSE_NOISE), strict=True)
             if n in columns
         }
     else:
-        values = {name: columns[column_name(name)] for name in coordinates}
+        values, notes = {name: columns[column_name(name)] for name in coordinates}, ()
         stds = {
             name: columns[f"std_{column_name(name)}"]
             for name in coordinates
@@ -105,7 +114,7 @@ def read_signals(path: Path | str, channels: tuple[str, ...] = ()) -> SignalTabl
         known = np.isfinite(values[name])
         if not (std[known] > 0.0).all():
             raise InputError(f"{path}: std of {name}: every one must be > 0; or leave it out")
-    return SignalTable(columns["t_s"], values, stds)
+    return SignalTable(columns["t_s"], values, stds, notes)
 
 
 def signal_pieces(table: SignalTable) -> Iterator[bytes]:
@@ -120,11 +129,14 @@ def signal_pieces(table: SignalTable) -> Iterator[bytes]:
     return lines_of(header, np.column_stack(parts))
 
 
-def _of_poses(columns: dict[str, Array]) -> dict[str, Array]:
+def _of_poses(
+    path: Path | str, table: NumberTable, columns: dict[str, Array]
+) -> tuple[dict[str, Array], tuple[str, ...]]:
+    place = np.stack([columns[name] for name in _PLACE], axis=1)
     quaternion = np.stack([columns[name] for name in QUATERNION], axis=1)
+    place, quaternion, notes = known_poses(path, table, place, quaternion, ", ".join(QUATERNION))
     angles = unwrapped(angles_from_matrix(matrix_from_quaternion(quaternion)))
-    parts = [*(columns[name] for name in _PLACE), *angles.T]
-    return dict(zip(POSE_COORDINATES, parts, strict=True))
+    return dict(zip(POSE_COORDINATES, [*place.T, *angles.T], strict=True)), notes
 
 
 def _check_header(

@@ -25,7 +25,7 @@ from freeswing.cdpr.files.number_table import (
     NumberTable,
     check_times,
     check_width,
-    known_quaternions,
+    known_poses,
     read_lines,
     read_numbers,
 )
@@ -148,9 +148,9 @@ def _known(is_pose: bool) -> str:
 def _poses(path: Path | str, table: NumberTable, columns: dict[str, Array]) -> Trajectory:
     position = np.stack([columns[name] for name in POSE_COLUMNS[:3]], axis=1)
     quaternion = np.stack([columns[name] for name in QUATERNION], axis=1)
-    quaternion, notes = known_quaternions(path, table, quaternion, "qw, qx, qy, qz")
-    is_turned = np.isfinite(quaternion).all(axis=1, keepdims=True)
-    position = np.where(is_turned, position, np.nan)
+    position, quaternion, notes = known_poses(
+        path, table, position, quaternion, ", ".join(QUATERNION)
+    )
     angles = unwrapped(angles_from_matrix(matrix_from_quaternion(quaternion)))
     values = np.concatenate([position, angles], axis=1)
     is_known = np.asarray(np.isfinite(values).all(axis=1))

@@ -10,7 +10,7 @@ import numpy as np
 from freeswing.cdpr.files.documents import replace_file
 from freeswing.cdpr.files.number_table import (
     check_times,
-    known_quaternions,
+    known_poses,
     read_lines,
     read_numbers,
 )
@@ -30,12 +30,12 @@ def read_tum(path: Path | str) -> Trajectory:
     rows = ((number, line) for number, line in lines if not line.lstrip().startswith("#"))
     table = read_numbers(path, rows, None, TUM_COLUMNS)
     check_times(path, table, 0, "t")
-    quaternion = table.values[:, [7, 4, 5, 6]]
-    quaternion, notes = known_quaternions(path, table, quaternion, "qx qy qz qw")
-    is_turned = np.isfinite(quaternion).all(axis=1, keepdims=True)
+    position, quaternion, notes = known_poses(
+        path, table, table.values[:, 1:4], table.values[:, [7, 4, 5, 6]], "qx qy qz qw"
+    )
     poses = Trajectory.from_poses(
         table.values[:, 0],
-        np.where(is_turned, table.values[:, 1:4], np.nan),
+        position,
         matrix_from_quaternion(quaternion),
         provenance=f"{Path(path).name}: measured poses",
     )

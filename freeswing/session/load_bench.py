@@ -85,7 +85,9 @@ def _as_swing(run: BenchRun) -> SwingRun | None:
     if not run.coordinates:
         return None
     values = np.stack([columns[name] for name in run.coordinates], axis=1)
-    trajectory = Trajectory(run.times_s, run.coordinates, values, provenance=run.name)
+    trajectory = Trajectory(
+        run.times_s, run.coordinates, values, provenance=run.name, notes=run.notes
+    )
     return SwingRun(run.name, run.role, trajectory, run.lengths_m, run.lengths_std_m, run.window_s)
 
 
@@ -118,7 +120,7 @@ def _load_run(
     path = trajectory_path(session, run)
     if path.suffix.lower() == ".csv" and path.is_file():
         table = read_signals(path, columns)
-        times = table.times_s
+        times, notes = table.times_s, table.notes
         signals = tuple(
             Signal(
                 name, values, table.stds.get(name), place_m if name in POSE_COORDINATES else None
@@ -127,7 +129,7 @@ def _load_run(
         )
     else:
         trajectory = load_trajectory(session, run, robot, target, read_marker_runs(session, target))
-        times, noise = trajectory.times_s, None
+        times, noise, notes = trajectory.times_s, None, trajectory.notes
         if trajectory.covariances is not None:
             turned = angle_noise(trajectory.coordinates, trajectory.values, trajectory.covariances)
             noise = np.sqrt(np.diagonal(turned, axis1=1, axis2=2))
@@ -147,6 +149,7 @@ def _load_run(
         payloads=run.payloads,
         loads=run.loads,
         level_std_rad=run.level_std_rad,
+        notes=notes,
     )
 
 

@@ -141,6 +141,7 @@ def identify_bench(bench: Bench, robot: Robot, ends: GeometryPriors | None = Non
     sway = any({"x", "y"} & set(run.coordinates) for run in fitted)
     leaning = leaning_sentence(classic, sway)
     notes = [*([leaning] if leaning else []), *_notes(found, bench, robot), *rolled]
+    notes += [f"run {run.name}: {note}" for run in bench.runs for note in run.notes]
     return BenchResult(found, bench, classic, validation, tuple(notes), envelopes(found), ends)
 
 

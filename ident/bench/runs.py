@@ -102,6 +102,7 @@ class BenchRun:
         payloads: known bodies on the platform.
         loads: objects to be measured on it.
         level_std_rad: how well it was seen to hang level at rest, on two wires, or None.
+        notes: what its recording's reader left out, one sentence each.
     """
 
     name: str
@@ -114,6 +115,7 @@ class BenchRun:
     payloads: tuple[KnownBody, ...] = ()
     loads: tuple[Placed, ...] = ()
     level_std_rad: float | None = None
+    notes: tuple[str, ...] = ()
 
     @property
     def coordinates(self) -> tuple[str, ...]:

@@ -122,6 +122,25 @@ def test_a_load_twice_in_a_run_is_refused(tmp_path: Path) -> None:
         read_session(make(tmp_path, twice))
 
 
+def test_gaps_of_a_benchs_poses_are_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    make(tmp_path)
+    times, turns = np.arange(200) / 50.0, 0.05 * np.cos(0.1 * np.arange(200))
+    rows = [
+        f"{t:.3f},{0.01 * c:.6f},0,0,{np.cos(c):.9f},0,0,{np.sin(c):.9f}"
+        for t, c in zip(times, turns, strict=True)
+    ]
+    rows[50] = "1.000,0,0,0,0,0,0,0"
+    (tmp_path / "tare.csv").write_text("\n".join(["t_s,x_m,y_m,z_m,qw,qx,qy,qz", *rows]))
+    said = "the quaternion 0 0 0 0 is taken as a gap in 1 sample, first in line 52"
+    bench = loaded(tmp_path)
+    assert bench.runs[0].notes == (said,)
+    assert np.isnan([one.values[50] for one in bench.runs[0].signals]).all()
+    main(["check", str(tmp_path)])
+    assert f"run tare: {said}" in capsys.readouterr().out
+
+
 def test_a_partial_run_without_lengths_names_itself(
     tmp_path: Path, capsys: pytest.CaptureFixture
 ) -> None:
