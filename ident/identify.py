@@ -25,8 +25,7 @@ from freeswing.ident.judge.validate import ValidatedRun, validate_run
 from freeswing.ident.judge.wrong_geometry import (
     WrongGeometry,
     geometry_of,
-    with_wrong_geometry,
-    wrong_geometry,
+    with_doubts,
 )
 from freeswing.ident.likelihood.cable_ends import GeometryPriors, corrected
 from freeswing.ident.likelihood.calibration_modes import freed
@@ -238,7 +237,10 @@ def _estimated(
         if served >= {run.name for run in taut.runs}:
             break
     if size := max((one.wrong.size for one in fitted.values()), default=0.0):
-        told = replace(how[0], wrong=geometry_of(robot), wrong_size=size), *how[1:]
+        told = (
+            replace(how[0], wrong=geometry_of(robot, settings.geometry), wrong_size=size),
+            *how[1:],
+        )
         taut, by_fidim, failures = fidim_estimates(model, prepared, *told)
     return taut, by_fidim, fitted, {**failures, **more}, lawless
 
@@ -277,9 +279,10 @@ def _likelihood_estimates(
             failures[name] = str(error)
             lawless = isinstance(error, LawlessError)
             continue
-        starts, wrong = [entry.values, *starts], wrong_geometry(fit)
+        starts = [entry.values, *starts]
+        told, wrong = with_doubts(entry, fit)
         truer, motions = corrected(robot, fit.model, fit.values), fitted_motions(fit)
-        found[name] = Fitted(with_wrong_geometry(entry, wrong), truer, motions, wrong)
+        found[name] = Fitted(told, truer, motions, wrong)
     return found, failures, lawless
 
 

@@ -43,6 +43,10 @@ from freeswing.ident.signals.usable_runs import (
 )
 
 Weighting = Literal["published", "covariance"]
+NOT_HELD = (
+    "standard deviations hold nothing of the errors of robot.toml that residuals of the motions "
+    "ask for: its cables cannot be moved so far"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,6 +151,11 @@ def _with_deviations(
     std = np.sqrt(np.diag(scatter))
     uneven = noisy if weighted is None else []
     shares = _shares(model, runs, stack, full, how, uneven, std)
+    if how.wrong is not None:
+        try:
+            shares.append(geometry_share(how.wrong, how.wrong_size, runs, full, stack))
+        except (ValueError, np.linalg.LinAlgError) as error:
+            notes.append(f"{NOT_HELD} ({error})")
     if said := shares_sentence(shares, std):
         notes.append(said)
     entry = fidim_entry(raw, (), tuple(notes), weighted, shares, scatter)
@@ -180,8 +189,6 @@ def _shares(
     found = [calibration_share(model, runs, full, stack)]
     if how.ends is not None:
         found.append(ends_share(how.ends, runs, full, stack))
-    if how.wrong is not None:
-        found.append(geometry_share(how.wrong, how.wrong_size, runs, full, stack))
     if how.settings is not None:
         found.append(None if full else length_share(model, runs, stack))
         uneven = noise_bias(noisy, stack) if noisy else None
@@ -253,6 +260,7 @@ def _mass(
         except (ValueError, np.linalg.LinAlgError) as error:
             notes.append(f"payload of {payload.mass_kg:g} kg not used: {error}")
             continue
+        notes += [f"payload of {payload.mass_kg:g} kg: {n}" for n in entry.notes if NOT_HELD in n]
         loaded.append(LoadedCentre(payload, one.values[:3], entry.covariance[:3, :3]))
     if not loaded:
         return None, notes

@@ -9,7 +9,7 @@ likeliest. What errors of that size do to the inertia belongs to its deviations.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.special import chdtri
@@ -25,6 +25,7 @@ from freeswing.cdpr.system.threads import side_by_side
 from freeswing.ident.estimate import Estimate
 from freeswing.ident.fidim.essential_parameters import WELL_IDENTIFIED_PERCENT, near_zero
 from freeswing.ident.likelihood.blocks import MODES, columns_of, state_of
+from freeswing.ident.likelihood.cable_ends import GeometryPriors
 from freeswing.ident.likelihood.calibration_modes import amplitudes_of, motion_shifts
 from freeswing.ident.likelihood.fit_swings import LikelihoodFit
 from freeswing.ident.likelihood.joint_problem import PAYLOADS, Problem, State
@@ -32,6 +33,7 @@ from freeswing.ident.likelihood.run_residuals import Samples, reduce_run
 
 # What robot.toml says of a cable, each with a tolerance (`cdpr.tolerances`).
 OF_CABLES = ("anchor_offset", "attachment_offset", "pulley_radius", "pulley_axis")
+ENDS = {"anchor_offset": "entry points", "attachment_offset": "attachment points"}
 # Errors of no size are likeliest in every second session without any, and by chance others are a
 # little likelier: in one of a thousand by so much.
 CHANCE = 1e-3
@@ -47,12 +49,15 @@ class WrongGeometry:
     """Errors of the cables' geometry, as large as residuals ask for.
 
     Attributes:
-        size: in tolerances; zero where residuals need none.
+        size: in tolerances, of cable ends in the deviations that are stated where they are; zero
+            where residuals need none.
         covariance: what errors of that size do to the inertia, (9, 9).
+        stated: those deviations, by effect.
     """
 
     size: float
     covariance: Array
+    stated: dict[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         freeze(self, "covariance")
@@ -81,7 +86,7 @@ def wrong_geometry(found: LikelihoodFit) -> WrongGeometry:
     change = np.linalg.lstsq(triangle[:first, :first], triangle[:first, first:last], rcond=None)[0]
     moved = np.zeros((9, len(errors)))
     moved[unknown[unknown < 9]] = (change / scale[:, None])[unknown < 9]
-    return WrongGeometry(size, size**2 * moved @ moved.T)
+    return WrongGeometry(size, size**2 * moved @ moved.T, _stated(found.model))
 
 
 def likely_size(answers: Array, seen: Array, colour: float) -> float:
@@ -105,12 +110,18 @@ def likely_size(answers: Array, seen: Array, colour: float) -> float:
     return float(SIZES[best]) if sure else 0.0
 
 
-def geometry_of(robot: Robot) -> Model:
-    """The robot with its cables' geometry as values known to their tolerances."""
+def geometry_of(robot: Robot, priors: GeometryPriors) -> Model:
+    """The robot with its cables' geometry as values known as the size of errors is counted.
+
+    Args:
+        robot: as declared.
+        priors: how well cable ends are known where that is stated; the rest by its tolerances.
+    """
     model = build_model(robot, _shown(robot))
-    spread = [_tolerance(robot, name) for name in model.effects for _ in columns_of(model, name)]
+    stds = {name: priors.stds.get(name, _tolerance(robot, name)) for name in model.effects}
+    spread = [stds[name] for name in model.effects for _ in columns_of(model, name)]
     parameters = tuple(
-        one.known(0.0, std, "tolerances of the robot file")
+        one.known(0.0, std, "as stated, or tolerances of the robot file")
         for one, std in zip(model.parameters, spread, strict=True)
     )
     return replace(model, parameters=parameters)
@@ -128,19 +139,34 @@ def with_wrong_geometry(entry: Estimate, wrong: WrongGeometry) -> Estimate:
         entry,
         covariance=covariance,
         essential=~(weak & near_zero(entry.values)),
-        notes=(*(note for note in entry.notes if note != before), _sentence(wrong.size, wider)),
+        notes=(*(note for note in entry.notes if note != before), _sentence(wrong, wider)),
         extra={**entry.extra, "geometry_std": np.sqrt(np.diag(wrong.covariance)).tolist()},
     )
     said = told.consistency.sentence()
     return replace(told, notes=(*told.notes, said)) if said else told
 
 
-def _sentence(size: float, wider: float) -> str:
+def with_doubts(entry: Estimate, found: LikelihoodFit) -> tuple[Estimate, WrongGeometry]:
+    """A fit's estimate with what a wrong robot file does, or the word that it cannot be told."""
+    try:
+        wrong = wrong_geometry(found)
+    except (ValueError, np.linalg.LinAlgError) as error:
+        note = (
+            "standard deviations hold nothing of what errors of robot.toml do to the inertia: the "
+            f"residuals could not be asked for them ({error})"
+        )
+        return replace(entry, notes=(*entry.notes, note)), WrongGeometry(0.0, np.zeros((9, 9)))
+    return with_wrong_geometry(entry, wrong), wrong
+
+
+def _sentence(wrong: WrongGeometry, wider: float) -> str:
+    told = ", ".join(f"{1e3 * std:.3g} mm of {ENDS[name]}" for name, std in wrong.stated.items())
+    unit = f" (as such count {told}, as stated)" if told else ""
     return (
-        f"the residuals are as if cable ends and pulleys of robot.toml were off by {size:.2g} "
-        f"times their tolerances: standard deviations hold what errors of that size do to the "
-        f"inertia, and are up to {wider:.1f} times as large for it; see what freeswing check and "
-        "freeswing diagnose say"
+        "the residuals are as if cable ends and pulleys of robot.toml were off by "
+        f"{wrong.size:.2g} times their tolerances{unit}: standard deviations hold what errors of "
+        f"that size do to the inertia, and are up to {wider:.1f} times as large for it; see what "
+        "freeswing check and freeswing diagnose say"
     )
 
 
@@ -175,6 +201,13 @@ def _equations(found: LikelihoodFit) -> tuple[Array, np.ndarray, np.ndarray]:
     errors = _error_columns(rows, model, found, len(parts[-1]))
     places = rows.shape[1] - 1 + np.arange(errors.shape[1])
     return np.hstack([rows[:, :-1], errors, rows[:, -1:]]), estimated, places
+
+
+def _stated(model: Model) -> dict[str, float]:
+    """The deviations of cable ends that a fit's priors state, by effect."""
+    places = {name: columns_of(model, name) for name in ENDS if name in model.effects}
+    stds = {name: model.parameters[where[0] - 9].prior_std for name, where in places.items()}
+    return {name: std for name, std in stds.items() if std is not None}
 
 
 def _shown(robot: Robot) -> tuple[str, ...]:

@@ -12,9 +12,13 @@ import numpy as np
 import pytest
 
 from freeswing.cdpr.model.equations import build_model
-from freeswing.cdpr.robot import POSE_COORDINATES
+from freeswing.cdpr.robot import POSE_COORDINATES, Robot
+from freeswing.ident import identify as whole
+from freeswing.ident.fidim import fidim_stage
 from freeswing.ident.identify import Identification, IdentifySettings, identify
+from freeswing.ident.judge import wrong_geometry as room
 from freeswing.ident.judge.wrong_geometry import WrongGeometry, likely_size, with_wrong_geometry
+from freeswing.ident.likelihood.cable_ends import GeometryPriors
 from freeswing.ident.runs import SwingRun
 from freeswing.main import main
 from tests.ident.swings import (
@@ -52,16 +56,22 @@ def test_chance_makes_errors_likelier_in_one_session_of_a_thousand(times, sure):
 @cache
 def identified(radius: float) -> Identification:
     """Three swings of the paper's robot; its pulleys given so many times their radius."""
-    generator = np.random.default_rng(5)
-    runs: list[SwingRun] = []
-    for k in (2, 5, 7):
-        motion = tilted_release(build_model(ROBOT), PAPER_LENGTHS_M[k], 0.08, 3.0)
+    return identify(swings(2, 5, 7), with_radii(radius), IdentifySettings(predict=False))
+
+
+def swings(*places: int, duration_s: float = 3.0) -> list[SwingRun]:
+    """At 0.1 mm of noise, without lengths."""
+    generator, runs = np.random.default_rng(5), []
+    for k in places:
+        motion = tilted_release(build_model(ROBOT), PAPER_LENGTHS_M[k], 0.08, duration_s)
         run = recorded(motion, f"swing-{k}", generator, 1e-4, POSE_COORDINATES, "identify")
         runs.append(replace(run, lengths_m=None, lengths_std_m=None))
-    cables = tuple(
-        replace(one, pulley_radius_m=radius * one.pulley_radius_m) for one in ROBOT.cables
-    )
-    return identify(runs, replace(ROBOT, cables=cables), IdentifySettings(predict=False))
+    return runs
+
+
+def with_radii(factor: float) -> Robot:
+    cables = (replace(one, pulley_radius_m=factor * one.pulley_radius_m) for one in ROBOT.cables)
+    return replace(ROBOT, cables=tuple(cables))
 
 
 def test_deviations_hold_diameters_given_for_radii():
@@ -94,6 +104,82 @@ def test_what_is_told_beside_the_values_follows_the_wider_deviations():
     assert wide.notes[-1] == wide.consistency.sentence()
     assert wide.extra["geometry_std"] == pytest.approx([0.1] * 9)
     assert not wide.essential[6:].any(), "products of inertia, not known any more"
+
+
+@pytest.mark.parametrize("std_m", [1e-4, 0.02])
+def test_fidim_counts_the_size_in_what_it_was_found_in(std_m: float, monkeypatch) -> None:
+    """Stated by an option or by robot.toml, which makes it the tolerance: one and the same."""
+    off = whole.Fitted(
+        identified(1.0).estimates["ml_full"], ROBOT, (), WrongGeometry(0.5, np.eye(9))
+    )
+    monkeypatch.setattr(whole, "_likelihood_estimates", lambda *_: ({"ml_full": off}, {}, False))
+    runs, tolerances = swings(2, 5, duration_s=2.4), ROBOT.tolerances
+    stated = replace(tolerances, entry_m=std_m, declared=("entry_m",))
+    option = IdentifySettings(predict=False, geometry=GeometryPriors(std_m))
+    by_option = identify(runs, ROBOT, option).estimates
+    without = IdentifySettings(predict=False)
+    by_file = identify(runs, replace(ROBOT, tolerances=stated), without).estimates
+    for name in ("fidim_full", "fidim_free"):
+        told, same = (one[name].extra["geometry_std"] for one in (by_option, by_file))
+        assert told == pytest.approx(same, rel=1e-9), name
+
+
+def test_the_sentence_says_what_is_counted_as_a_tolerance() -> None:
+    exact = identified(1.0).estimates["ml_full"]
+    stated = room._stated(GeometryPriors(0.02).model(ROBOT))
+    assert stated == {"anchor_offset": 0.02}
+    told = with_wrong_geometry(exact, WrongGeometry(5.0, np.eye(9), stated))
+    words = "off by 5 times their tolerances (as such count 20 mm of entry points, as stated):"
+    assert any(words in note for note in told.notes)
+    assert room._stated(build_model(ROBOT)) == {}
+
+
+def test_errors_are_as_wide_as_stated_and_else_as_their_tolerances() -> None:
+    model = room.geometry_of(ROBOT, GeometryPriors(0.02))
+    stds = {
+        name.split(".")[0]: one.prior_std
+        for name, one in zip(model.names, model.parameters, strict=True)
+    }
+    usual = ROBOT.tolerances
+    assert stds["anchor_offset"] == 0.02
+    assert stds["attachment_offset"] == usual.attachment_m
+    assert stds["pulley_radius"] == usual.pulley_radius_m
+    assert stds["pulley_axis"] == usual.swivel_rad
+
+
+@pytest.mark.parametrize("kind", [ValueError, np.linalg.LinAlgError])
+def test_a_question_that_fails_ends_no_result(kind, monkeypatch) -> None:
+    def fails(_: object) -> WrongGeometry:
+        raise kind("did not converge")
+
+    monkeypatch.setattr(room, "wrong_geometry", fails)
+    runs = swings(2, 5, duration_s=2.4)
+    found = identify(runs, ROBOT, IdentifySettings(predict=False)).estimates
+    for name in ("ml_full", "ml_free"):
+        said = [note for note in found[name].notes if "(did not converge)" in note]
+        assert said, name
+        assert "deviations hold nothing of what errors of robot.toml" in said[0]
+
+
+def test_geometry_that_cannot_be_moved_leaves_fidim_there(monkeypatch) -> None:
+    """What the first pass had is the second's, with the word that its deviations lack a part."""
+
+    def fails(*_: object) -> None:
+        raise ValueError("no pose fits at sample 3")
+
+    runs = swings(2, 5, duration_s=2.4)
+    monkeypatch.setattr(fidim_stage, "geometry_share", fails)
+    found = identify(runs, with_radii(2.0), IdentifySettings(predict=False))
+    before = identify(
+        runs, with_radii(2.0), IdentifySettings(predict=False, maximum_likelihood=False)
+    )
+    for name in ("fidim_full", "fidim_free"):
+        one = found.estimates[name]
+        assert (one.values == before.estimates[name].values).all()
+        assert (one.std == before.estimates[name].std).all()
+        assert "geometry_std" not in one.extra
+        assert any(f"{fidim_stage.NOT_HELD} (no pose fits at" in note for note in one.notes)
+        assert not any(fidim_stage.NOT_HELD in note for note in before.estimates[name].notes)
 
 
 @pytest.mark.slow
