@@ -75,7 +75,8 @@ class MassVerdict:
         By what runs leave open and by what a scale is usually not shown: normal densities multiply.
 
         Source:
-            JCGM 100:2008, sec. 4.3.8: an input of which little is known.
+            JCGM 100:2008, sec. 4.3.1: a deviation by general knowledge; Rasmussen, Williams 2006,
+            Gaussian Processes for Machine Learning, eq. A.7: the product of normal densities.
         """
         if self.stated or self.contradicted:
             return 0.0
@@ -132,7 +133,7 @@ def mass_left_free(unknowns: Unknowns, mass: MassVerdict) -> Unknowns:
     """The unknowns with the platform's mass to be found, and next to nothing believed of it.
 
     Source:
-        JCGM 100:2008, sec. 4.3.8: an input of which little is known.
+        JCGM 100:2008, sec. 4.3.1: a deviation by judgement of what is known.
     """
     block = unknowns.block("platform")
     wide, mean = np.full(block.size, np.inf), np.array(block.value)

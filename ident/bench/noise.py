@@ -30,8 +30,8 @@ class Left:
     Attributes:
         name: of the coordinate.
         colour: power near the swing over that of its white noise.
-        rms: in mm or mrad.
-        unit: which of the two.
+        rms: in m or rad.
+        unit: "mm" or "mrad", in which it is said.
         strongest_hz: where most of it is.
     """
 
