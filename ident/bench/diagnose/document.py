@@ -6,14 +6,17 @@ from collections.abc import Sequence
 from typing import Any
 
 from freeswing.cdpr.effects import catalogue, effect_named
+from freeswing.cdpr.effects.base import EQUILIBRIA, LONG_RUN
 from freeswing.cdpr.robot import INERTIA_NAMES
-from freeswing.ident.bench.diagnose.causes import ENDS, HOOKS, SAME, Cause
+from freeswing.ident.bench.diagnose.causes import ALL_WIRES, ENDS, HOOKS, LENGTHS, SAME, Cause
 from freeswing.ident.bench.diagnose.channels_only import ByChannels, channels_document
 from freeswing.ident.bench.diagnose.diagnose import BenchDiagnosis, CannotTell
 from freeswing.ident.bench.diagnose.entries import (
     CLAMPS,
     EXCHANGE,
     FORMAT,
+    MASS,
+    WEIGH,
     WIRES_GROUP,
     found_entry,
     granted_entry,
@@ -50,10 +53,23 @@ PULL_HOOKS = (
     "all runs anew with twists three times as wide"
 )
 MORE_RUNS = "record more runs of each kind, and wider swings"
+OF_CABLE_ROBOTS = (EQUILIBRIA, LONG_RUN)  # a bench has one equilibrium, and no winches
+TELLS = {
+    HOOKS: PULL_HOOKS,
+    LENGTHS: CLAMPS,
+    "gravity_tilt": LEVEL,
+    **dict.fromkeys(ENDS, EXCHANGE),
+}
+CLAMPED_AT = (
+    "measure where the wires are clamped from the marks that the recorded frame rests on: no run "
+    "tells the two apart"
+)
 ADVICE = (
     (frozenset({"gravity_tilt", "constant_force"}), LEVEL),
     (frozenset({"gravity_tilt", "anchor_offset"}), LEVEL),
     (frozenset({"attachment_offset", "anchor_offset"}), EXCHANGE),
+    (frozenset({"attachment_offset", "marker_offset"}), CLAMPED_AT),
+    (frozenset({"torsion_spring", MASS}), WEIGH),
 )
 
 
@@ -116,17 +132,18 @@ def most_likely(rounds: Sequence[Round]) -> list[str]:
 def _plain(cause: Cause) -> str:
     """A cause in words: of which wire, or of all alike."""
     name = cause.effect.replace("_", " ")
-    if cause.part:
+    if cause.part not in ("", ALL_WIRES):
         return f"{name}, wire {cause.part}"
-    return f"{name}, all wires alike" if cause.effect in (HOOKS, *ENDS) else name
+    alike = cause.part == ALL_WIRES or cause.effect in (HOOKS, *ENDS)
+    return f"{name}, all wires alike" if alike else name
 
 
 def _tells(cause: Cause) -> str:
     """The measurement that decides on one cause by itself."""
-    if cause.effect == HOOKS:
-        return PULL_HOOKS
+    if cause.effect in TELLS:
+        return TELLS[cause.effect]
     named = effect_named(cause.effect).separated_by
-    return "; or ".join(one.advice for one in named) or MORE_RUNS
+    return "; or ".join(one.advice for one in named if one not in OF_CABLE_ROBOTS) or MORE_RUNS
 
 
 def _unexplained(found: BenchDiagnosis) -> dict[str, Any]:
@@ -230,7 +247,8 @@ def experiment_of(names: Sequence[str]) -> str:
     for pair, advice in ADVICE:
         if pair <= set(names):
             return advice
-    return separating_experiment(tuple(name for name in names if name in catalogue()))
+    known = tuple(name for name in names if name in catalogue())
+    return separating_experiment(known, without=OF_CABLE_ROBOTS, otherwise=MORE_RUNS)
 
 
 def _word(word: Word) -> dict[str, Any]:

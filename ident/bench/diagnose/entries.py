@@ -27,7 +27,8 @@ EXCHANGE = (
     "platform its end or the measured frame, what stays above the hook"
 )
 CLAMPS = (
-    "measure the wires from bend to bend, film a clock, and push the hooks: a clamp that yields"
+    "measure the wires from bend to bend, film a clock, and push each hook sideways: one that "
+    "gives way under a few newtons is a clamp that yields"
 )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import combinations
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -22,6 +23,9 @@ from freeswing.ident.bench.diagnose.causes import (
     wanting,
 )
 from freeswing.ident.bench.diagnose.document import (
+    _others,
+    _plain,
+    _tells,
     _unshown,
     _with_sight,
     bench_document,
@@ -171,7 +175,8 @@ def test_what_remains_stands_out_of_white_noise(power: float, present: bool) -> 
     fit: Any = SimpleNamespace(swings=[swing], solution=SimpleNamespace(residuals=[part]))
     told = remaining(fit)
     assert told["present"] == present, told
-    assert ("chi is off by" in told["signature"]) == present
+    said = f"chi is off by {1e3 * np.sqrt(np.mean(part**2)):.2g} mrad rms"
+    assert (said in told["signature"]) == present, told
 
 
 @pytest.mark.parametrize("kind", [ModalSwing, BenchSwing])
@@ -344,6 +349,26 @@ def test_what_is_most_likely_and_not_accepted_is_said_with_what_would_tell(chanc
         ("all wires alike" in one, failed in one, "spring balance" in one) for one in notes
     ] == [(True, True, True)] * said, notes
     assert most_likely([search.Round(words, None)]) == []
+
+
+def test_advice_on_every_cause_and_group_is_of_benches() -> None:
+    """Nothing of workspaces, equilibria or winches; a wire is named where it is one wire."""
+    causes = causes_of(trifilar())
+    names = sorted({cause.effect for cause in causes})
+    told = {one.block: f"{_plain(one)}: {_tells(one)}" for one in causes}
+    told |= {f"{one.block}..": experiment_of((one.effect, *_others(one, ()))) for one in causes}
+    told |= {" ".join(pair): experiment_of(pair) for pair in combinations(names, 2)}
+    odd = {
+        name: text
+        for name, text in told.items()
+        if any(word in text for word in ("workspace", "quilibri", "winch", "wire all"))
+    }
+    assert odd == {}
+    assert told[COMMON].startswith("cable length bias, all wires alike: measure the wires from")
+    assert told["missing.anchor_offset:1"].startswith("anchor offset, wire 1: exchange the wires")
+    assert told["missing.attachment_offset"].startswith("attachment offset, all wires alike")
+    assert "clamped" in experiment_of(["attachment_offset", "marker_offset"])
+    assert "weigh the platform" in experiment_of(["torsion_spring", "platform_mass"])
 
 
 def test_what_would_tell_one_cause() -> None:
