@@ -7,7 +7,9 @@ from typing import Any
 from freeswing.report.bench_words import HALF_WIDTH_95, changed_objects, classic_why, untold
 from freeswing.report.material import Material
 from freeswing.report.words import number, parameter_row
-from freeswing.results.identification import BodyParameter, ChannelGain, ClassicRow
+from freeswing.results.identification import Body, BodyParameter, Budget, ChannelGain, ClassicRow
+
+PLATFORM = "platform"
 
 
 class BenchPanel:
@@ -21,7 +23,10 @@ class BenchPanel:
         found = material.identification
         if found is None or not found.objects or not found.classic:
             return None
+        # What was asked for leads: the object, then the platform that carried it.
+        bodies = sorted(found.objects, key=_carries)
         changed = changed_objects(material.diagnosis) if material.diagnosis else []
+        changed.sort(key=lambda one: one[0] == PLATFORM)
         return {
             "changed": [{"body": name, "without, with": text} for name, text in changed],
             "objects": [
@@ -30,7 +35,7 @@ class BenchPanel:
                     "rows": [_row(row) for row in one.parameters if row.value is not None],
                     "untold": ", ".join(untold(one.parameters)),
                 }
-                for one in found.objects
+                for one in bodies
             ],
             "channels": [
                 {
@@ -49,10 +54,14 @@ class BenchPanel:
                         for share in one.shares
                     ],
                 }
-                for one in found.budgets or ()
+                for one in sorted(found.budgets or (), key=_carries)
             ],
             "classic": [_classic(row) for row in found.classic],
         }
+
+
+def _carries(body: Body | Budget) -> bool:
+    return body.name == PLATFORM
 
 
 def _row(row: BodyParameter) -> dict[str, str]:

@@ -29,7 +29,8 @@ WIRE_ENDS = "where the wires' ends are"  # of a budget
 ENDS_COUNTED = "where wires are hung up and clamped as far as that is stated, "
 ENDS_EXACT = (
     "where wires are hung up and clamped (entries and attachments of robot.toml; how far they may "
-    "be off counts with --entry-std-m and --attachment-std-m), "
+    "be off counts with --entry-std-m and --attachment-std-m, yet only where a run measures a part "
+    "of the pose: channels alone cannot count it), "
 )
 
 

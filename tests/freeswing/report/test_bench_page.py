@@ -2,16 +2,26 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from typing import Any
 
+from freeswing.ident.bench.told import budget
 from freeswing.report.bench_words import bench_lines
 from freeswing.report.material import Material
 from freeswing.report.page import render_page
+from freeswing.report.panels import sure
 from freeswing.report.panels.advice import steps
 from freeswing.report.panels.sure import exact
-from freeswing.results.identification import Budget, BudgetShare, Identification
+from freeswing.results.identification import (
+    Body,
+    BodyParameter,
+    Budget,
+    BudgetShare,
+    Identification,
+)
 
+SAMPLES = BudgetShare(what="noise of the samples", std_kg_m2=1e-4)
 NOTE = "the platform: no run shows its centre of mass"
 
 
@@ -105,13 +115,30 @@ def test_the_next_steps_are_commands_that_run() -> None:
     assert "freeswing export kth --urdf --mass-kg 0.875" in commands
 
 
+def test_the_object_that_was_asked_for_stands_before_the_platform() -> None:
+    material = _material()
+    assert material.identification is not None
+    objects = (*(material.identification.objects or ()), *_of("cube"))
+    budgets = [Budget(name=name, shares=(SAMPLES,)) for name in ("platform", "cube")]
+    document = replace(material.identification, objects=objects, budgets=tuple(budgets))
+    page = render_page(replace(material, identification=document))
+    titles = re.findall(r"<h3>(cube|platform|Where the deviation of (?:cube|platform))", page)
+    bodies = ["cube", "platform"]
+    assert titles == [*bodies, *(f"Where the deviation of {name}" for name in bodies)], titles
+
+
+def _of(name: str) -> tuple[Body, ...]:
+    izz = BodyParameter(name="Izz_kg_m2", value=0.012, std=1e-4, identifiable=True)
+    return (Body(name=name, parameters=(izz,)),)
+
+
 def test_whether_the_wires_ends_are_counted_is_said() -> None:
     material = _material()
+    assert sure.WIRE_ENDS == budget.WIRE_ENDS
     assert "clamped (entries and attachments" in " ".join(exact(material)), exact(material)
+    assert "channels alone cannot count it" in exact(material)[1], exact(material)
     assert material.identification is not None
-    counted = Budget(
-        name="platform", shares=(BudgetShare(what="where the wires' ends are", std_kg_m2=1e-4),)
-    )
+    counted = Budget(name="platform", shares=(BudgetShare(what=budget.WIRE_ENDS, std_kg_m2=1e-4),))
     document = replace(material.identification, budgets=(counted,))
     told, taken = exact(replace(material, identification=document))
     assert "clamped as far as that is stated" in told, told
