@@ -20,8 +20,10 @@ from freeswing.report.space import in_space
 from freeswing.report.words import ESTIMATES, parameter_row, plain, unit_of
 from freeswing.results.common import Parameter
 from freeswing.results.diagnosis import Diagnosis
+from freeswing.results.identification import Body
 
 NOTHING_MISSING = "The model explains the held-out runs; no effect that they would show is missing."
+IZZ_ABOUT = {"Izz_kg_m2": "about its own centre", "Izz_P_kg_m2": "about P"}
 
 
 class Answer:
@@ -45,6 +47,7 @@ class Answer:
         return {
             "source": source,
             "verdict": verdict(material.diagnosis),
+            "objects": objects_told(material),
             "mass": mass_sentence(material, mass_kg),
             "parameters": _shown([parameter_row(one) for one in told(parameters)]),
             "untold": untold(parameters),
@@ -53,6 +56,27 @@ class Answer:
             "drawing": "" if body is None else hanging(body, material.robot, swings, entries),
             "space": in_space(material.robot, swings, motions),
         }
+
+
+def objects_told(material: Material) -> list[str]:
+    """Izz of each object of a bench, with the effects that were found."""
+    found, diagnosis = material.identification, material.diagnosis
+    bodies = () if found is None else found.objects or ()
+    if diagnosis is not None and diagnosis.accepted and diagnosis.objects_after:
+        bodies = diagnosis.objects_after
+    return [f"{one.name}: {_izz(one)}" for one in bodies if one.name != "platform"]
+
+
+def _izz(body: Body) -> str:
+    """What runs tell of it before what was given, about the object's own centre before about P."""
+    rows = {row.name: row for row in body.parameters if row.value is not None}
+    known = [(rows[name], where) for name, where in IZZ_ABOUT.items() if name in rows]
+    if not known:
+        return "Izz is not told by these runs."
+    row, where = min(known, key=lambda one: not one[0].identifiable)
+    shown = parameter_row(row)
+    weak = "" if row.identifiable else " (as given: the runs tell no more)"
+    return f"Izz {where} {shown['value']} ± {shown['half_width']} {shown['unit']}, 95 %{weak}."
 
 
 def told(parameters: Sequence[Parameter]) -> list[Parameter]:

@@ -12,7 +12,10 @@ from freeswing.report.material import Material
 from freeswing.report.page import render_page
 from freeswing.report.panels import sure
 from freeswing.report.panels.advice import steps
+from freeswing.report.panels.answer import objects_told
 from freeswing.report.panels.sure import exact
+from freeswing.results.common import FoundEffect
+from freeswing.results.diagnosis import Diagnosis
 from freeswing.results.identification import (
     Body,
     BodyParameter,
@@ -124,7 +127,34 @@ def test_the_object_that_was_asked_for_stands_before_the_platform() -> None:
     page = render_page(replace(material, identification=document))
     titles = re.findall(r"<h3>(cube|platform|Where the deviation of (?:cube|platform))", page)
     bodies = ["cube", "platform"]
+    first = "cube: Izz about its own centre 12.00 ± 0.20 10⁻³ kg m², 95 %."
+    assert page.index(first) < page.index("<h3>The platform</h3>") < page.index("Mass 0.875 kg")
+    assert "<h3>The platform</h3>" not in render_page(material)
     assert titles == [*bodies, *(f"Where the deviation of {name}" for name in bodies)], titles
+
+
+def test_of_an_object_that_is_not_told_nothing_is_said() -> None:
+    """Held by what was given, or with no number at all; what a diagnosis found goes before."""
+    material = _material()
+    found = material.identification
+    assert found is not None
+    izz = BodyParameter(name="Izz_kg_m2", value=0.012, std=1e-4, identifiable=False)
+    held, none = Body(name="held", parameters=(izz,)), Body(name="none", parameters=())
+    objects = (*(found.objects or ()), held, none)
+    material = replace(material, identification=replace(found, objects=objects))
+    assert [one.split(": ", 1)[0] for one in objects_told(material)] == ["held", "none"]
+    assert "as given: the runs tell no more" in objects_told(material)[0]
+    assert objects_told(material)[1] == "none: Izz is not told by these runs."
+    about_p = Body(
+        name="held", parameters=(izz, replace(_of("")[0].parameters[0], name="Izz_P_kg_m2"))
+    )
+    objects = (about_p, Body(name="laid", parameters=about_p.parameters[1:]))
+    by_yaw = replace(material, identification=replace(found, objects=objects))
+    said = "Izz about P 12.00 ± 0.20 10⁻³ kg m², 95 %."
+    assert objects_told(by_yaw) == [f"held: {said}", f"laid: {said}"]
+    spring = FoundEffect(effect="torsion_spring")
+    diagnosis = Diagnosis(accepted=(spring,), objects_after=_of("cube"))
+    assert objects_told(replace(material, diagnosis=diagnosis))[0].startswith("cube: Izz about")
 
 
 def _of(name: str) -> tuple[Body, ...]:
