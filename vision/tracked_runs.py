@@ -47,7 +47,11 @@ class TrackedCamera:
     lost: tuple[tuple[float, float], ...] = ()
 
     def frames(self) -> Iterator[tuple[Piece, int]]:
-        """The piece and the row in it of every frame, in order, with its true stamp."""
+        """The piece and the row in it of every frame, in order, with its stamp put right.
+
+        Tracking leaves out frames that may lie on either side of lost ones; here they keep the
+        stamp that they have by the likeliest place, which may be off by what was lost.
+        """
         for path in self.pieces:
             piece = load_piece(path)
             later = sum((gap_s * (piece.numbers > after) for after, gap_s in self.lost), 0.0)
