@@ -817,11 +817,17 @@ HELD = (
     Held(
         "vision/rig/lost_frames.py",
         (
-            "LEAST_FRAMES", "REGULAR", "MOSTLY", "STRAINED", "AROUND", "SURE", "FITS",
-            "MOST_LOST", "_LEAST_STRETCHES",
+            "LEAST_FRAMES", "REGULAR", "MOSTLY", "SURE", "MOST_LOST", "_MOST_TWICE",
+            "_MOST_BESIDE", "_LEAST_CLUSTER", "_MOST_CLUSTER",
         ),
         "tests/vision/rig/test_lost_frames.py",
     ),
+    Held(
+        "vision/rig/usual_stretches.py",
+        ("STRAINED", "AROUND", "FITS", "LEAST_STRETCHES", "_MOST_STRETCHES"),
+        "tests/vision/rig/test_lost_frames.py",
+    ),
+    Held("vision/rig/kinks.py", ("MEETS",), "tests/vision/rig/test_lost_frames.py"),
     Held("vision/rig/stamp_jitter.py", ("LEAST_JITTER_S", "_LEAST_FRAMES", "_FLOOR_PX"), START),
     Held("vision/rig/untied_cameras.py", ("_LEAST_TAGS", "_LEAST_KNOWN"), START),
     Held("calib/rig/bundle_adjustment.py", ("_COMMON_FREEDOM", "_LEAST_FREEDOM"), RIG_START),

@@ -7,15 +7,18 @@ and with frames left out on purpose, tells whether a step is one, and over how m
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
+from functools import partial
 from itertools import combinations, product
 
 import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.cdpr.rotation import log_rotation
+from freeswing.vision.rig.kinks import is_kink, kink_unlikeliness
 from freeswing.vision.rig.lag_search import OwnTrack
+from freeswing.vision.rig.usual_stretches import FITS, NO_STEPS, Stretches, in_noise, strained_steps
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -26,33 +29,21 @@ REGULAR = 0.07
 """Of a step: stamps farther from whole steps are no counter's; whole ms at 60 Hz are 0.06 off."""
 MOSTLY = 0.9
 """Of all steps: the others may be gaps that ended between two counts."""
-STRAINED = 6.5
-"""Mean square of what eight frames leave of a quintic, in what they usually leave: of 850
-stretches of samples/filmed 6.4 at most, with one frame lost inside 11 and more."""
-AROUND = 2.0
-"""All stretches about a gap leave so much, those beside it do not: one in twenty does by chance."""
 SURE = 16.0
 """Twice the logarithm of how much likelier a gap is than any other: with eight frames to each side
 the truth was never this far behind, in 5,600 trials on samples/filmed."""
-FITS = 3.0
-"""Mean square of a stretch in the usual ones' covariance; 2.4 at most where nothing was lost."""
 MOST_LOST = 20
 """A second of a slow camera: what is lost of more than a swing's period is told by no motion."""
-_MOST_BESIDE, _LEAST_BESIDE = 8, 4
+_MOST_BESIDE = 8
 """Frames to each side that are looked at: three modes need seven numbers and more."""
+_LEAST_BESIDE = 4
+"""The same beside another such place, or near an end."""
 _MOST_TWICE = 3
 """At two neighbouring places: a recorder that falls behind by more does so at once."""
-_LEAST_CLUSTER, _MOST_CLUSTER = 5, 14
-"""Steps in a row that three losses strain; of more a second and a half thousand ways are left."""
-_LEAST_STRETCHES = 20
-"""Six coordinates of so many stretches know the covariance of twenty numbers."""
-_READING = 0.05
-"""Of the noise's variance: few stretches make some combinations seem to vanish."""
-_TOGETHER = 8
-"""Frames that a quintic is held against: two numbers are left of each coordinate."""
-_LONGEST = 12
-"""Eight frames among which more are missing by the stamps are no smooth piece of a swing."""
-_NORMAL_BY_MAD = 1.4826
+_LEAST_CLUSTER = 5
+"""Steps in a row that three losses strain: fewer are strained by two."""
+_MOST_CLUSTER = 14
+"""Of so many steps fifteen hundred ways are left, of more they take seconds."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,10 +67,13 @@ class Lost:
     Attributes:
         losses: in order of time.
         unclear: indices of frames of which the motion does not tell on which side of one they are.
+        kinks: indices of frames after which speeds change as after a knock or a release, or over
+            lost frames that no motion counts: what came before meets what comes after.
     """
 
     losses: tuple[Loss, ...] = ()
     unclear: tuple[int, ...] = ()
+    kinks: tuple[int, ...] = ()
 
 
 Steps = tuple[tuple[int, int], ...]
@@ -100,61 +94,114 @@ def lost_frames(track: OwnTrack) -> Lost:
         return Lost()
     middle = track.rotations[len(track.rotations) // 2]
     values = np.hstack([track.positions_m, log_rotation(track.rotations @ middle.T)])
-    found: list[Loss] = []
+    stamped = Stretches(numbers.copy(), in_noise(numbers, values), NO_STEPS)
+    accepted: list[tuple[Told, list[int]]] = []
     settled: set[int] = set()
-    unclear: set[int] = set()
     while True:
-        scaled = _in_noise(numbers, values)
+        scaled = in_noise(numbers, values)
         groups = _groups(strained_steps(numbers, scaled) - settled)
-        told = [_judged(numbers, scaled, group, groups) for group in groups]
-        sure = [
-            (one, group)
-            for one, group in zip(told, groups, strict=True)
-            if one is not None and one.margin >= SURE
-        ]
-        if not sure:
-            sure = _hidden(numbers, scaled, groups, settled)
+        stretches = Stretches(numbers, scaled, _steps_of(groups))
+        told = [_judged(stretches, group, groups) for group in groups]
+        pairs = list(zip(told, groups, strict=True))
+        sure = [(one, group) for one, group in pairs if one is not None and one.margin >= SURE]
+        sure = sure or _hidden(numbers, scaled, groups, settled)
         if not sure:
             break
-        best, group = max(sure, key=lambda one: one[0].margin)
-        settled |= set(group)
-        unclear |= best.unclear
-        for step, count in best.steps:
-            found.append(Loss(step, (count,)))
+        accepted.append(max(sure, key=lambda one: one[0].margin))
+        settled |= set(accepted[-1][1])
+        for step, count in accepted[-1][0].steps:
             numbers[step + 1 :] += count
-    losses = [loss if _holds(numbers, scaled, loss) else Loss(loss.after) for loss in found]
-    pairs = list(zip(groups, told, strict=True))
-    losses += [
-        Loss(t.steps[0][0], t.counts) for _, t in pairs if t is not None and 0 not in t.counts
-    ]
-    untold = [group for group, t in pairs if t is None or 0 in t.counts]
+    broken = _steps_of([*groups, *(group for _, group in accepted)])
+    kinked = partial(is_kink, Stretches(stamped.numbers, stamped.values, broken))
+    held = _held(Stretches(numbers, scaled, NO_STEPS), [told for told, _ in accepted])
+    return _with_untold(held, pairs, len(numbers), kinked)
+
+
+def _held(closed: Stretches, accepted: list[Told]) -> Lost:
+    """What was sure at its turn; without a count where it is not, now that all gaps are closed."""
+    found = [Loss(step, (count,)) for told in accepted for step, count in told.steps]
+    losses = [loss if _holds(closed, loss) else Loss(loss.after) for loss in found]
+    unclear = {frame for told in accepted for frame in told.unclear}
+    return Lost(tuple(losses), tuple(unclear))
+
+
+def _with_untold(
+    held: Lost,
+    pairs: list[tuple[Told | None, list[int]]],
+    count: int,
+    kinked: Callable[[list[int]], bool],
+) -> Lost:
+    """The same with the places that strain the motion and of which nothing is sure."""
+    losses, unclear, kinks = list(held.losses), set(held.unclear), []
+    for told, group in pairs:
+        if told is not None and 0 not in told.counts:
+            if kinked(group):
+                kinks.append(told.steps[0][0])
+            else:
+                losses.append(Loss(told.steps[0][0], told.counts))
+    untold = [group for told, group in pairs if told is None or 0 in told.counts]
     for group in untold if losses else ():  # of one that lost frames, more is likely
         if group[0] < _LEAST_BESIDE:
             unclear |= set(range(group[-1] + 1))
-        elif group[-1] >= len(numbers) - 1 - _LEAST_BESIDE:
-            unclear |= set(range(group[0] + 1, len(numbers)))
+        elif group[-1] >= count - 1 - _LEAST_BESIDE:
+            unclear |= set(range(group[0] + 1, count))
+        elif kinked(group):
+            kinks.append(group[len(group) // 2])
         else:
             losses.append(Loss(group[len(group) // 2]))
-    return Lost(tuple(sorted(losses, key=lambda loss: loss.after)), tuple(sorted(unclear)))
+    losses.sort(key=lambda loss: loss.after)
+    return Lost(tuple(losses), tuple(sorted(unclear)), tuple(sorted(kinks)))
+
+
+def _steps_of(groups: list[list[int]]) -> Ints:
+    return np.array([step for one in groups for step in one], dtype=np.int64)
 
 
 def _hidden(
     numbers: Ints, values: Array, groups: list[list[int]], settled: set[int]
 ) -> list[tuple[Told, list[int]]]:
     """Steps that strain no quintic, as of a slow swing, at which frames surely were lost."""
-    near = {k for one in groups for k in range(one[0] - _MOST_BESIDE, one[-1] + _MOST_BESIDE + 1)}
-    broken = np.array([step for one in groups for step in one], dtype=np.int64)
-    for step in range(_MOST_BESIDE - 1, len(numbers) - _MOST_BESIDE):
-        if step in near or step in settled:
-            continue
-        frames = np.arange(step - _MOST_BESIDE + 1, step + _MOST_BESIDE + 1)
-        ways: list[Steps] = [(), ((step, 1),), ((step, 2),)]
-        told = likeliest(numbers, values, frames, ways, broken)
+    reach = np.arange(-_MOST_BESIDE, _MOST_BESIDE + 1)
+    broken = _steps_of(groups)
+    steps = np.arange(_MOST_BESIDE - 1, len(numbers) - _MOST_BESIDE)
+    steps = np.setdiff1d(steps, np.append((broken[:, None] + reach).ravel(), sorted(settled)))
+    if not len(steps):
+        return []
+    stretches = Stretches(numbers, values, broken)
+    for step in steps[_may_hide(stretches, steps)].tolist():
+        own = sorted([*groups, [step]])
+        whole = Stretches(numbers, values, np.append(broken, step))
+        told = _judged(whole, [step], own)
         if told is not None and told.steps and told.margin >= SURE:
-            told = _judged(numbers, values, [step], sorted([*groups, [step]]))
-            if told is not None and told.steps and told.margin >= SURE:
-                return [(told, [step])]
+            return [(told, [step])]
     return []
+
+
+def _may_hide(stretches: Stretches, steps: Ints) -> NDArray[np.bool_]:
+    """Of steps (n,), those at which one or two lost frames are surely likelier than none.
+
+    Source:
+        Bishop 2006, Pattern Recognition and Machine Learning, sec. 3.4: odds of models.
+    """
+    rows = steps[:, None] + np.arange(-_MOST_BESIDE + 1, _MOST_BESIDE + 1)
+    patterns = stretches.numbers[rows] - stretches.numbers[rows[:, :1]]
+    count = stretches.values.shape[1]
+    scores = np.full((3, len(steps)), np.inf)
+    fits = np.full((3, len(steps)), np.inf)
+    kinds, which = np.unique(patterns, axis=0, return_inverse=True)
+    for kind, pattern in enumerate(kinds):
+        own = np.flatnonzero(which.reshape(-1) == kind)
+        for lost in range(3):
+            usual = stretches.usual(pattern + lost * (np.arange(2 * _MOST_BESIDE) >= _MOST_BESIDE))
+            if usual is not None:
+                squares = usual.squares(stretches.values[rows[own]])
+                scores[lost, own] = squares + count * usual.scale + 4.0 * np.log(max(lost, 1))
+                fits[lost, own] = squares / (count * (rows.shape[1] - 1))
+    best = scores.argmin(axis=0)
+    own, fit = (np.take_along_axis(one, best[None], axis=0)[0] for one in (scores, fits))
+    np.put_along_axis(scores, best[None], np.inf, axis=0)
+    others = scores.min(axis=0)
+    return (best > 0) & (fit <= FITS) & np.isfinite(others) & (others - own >= SURE)
 
 
 def counted(times_s: Array) -> Ints | None:
@@ -172,74 +219,13 @@ def counted(times_s: Array) -> Ints | None:
     return np.concatenate([[0.0], np.cumsum(whole)]).astype(np.int64)
 
 
-def _holds(numbers: Ints, values: Array, loss: Loss) -> bool:
+def _holds(stretches: Stretches, loss: Loss) -> bool:
     """Whether a gap fits once all are closed, and no other count does as well."""
     first = max(loss.after - _MOST_BESIDE + 1, 0)
-    frames = np.arange(first, min(loss.after + _MOST_BESIDE + 1, len(numbers)))
+    frames = np.arange(first, min(loss.after + _MOST_BESIDE + 1, len(stretches.numbers)))
     others = [((loss.after, count),) for count in range(-loss.frames[0], MOST_LOST) if count]
-    told = likeliest(numbers, values, frames, [(), *others], np.zeros(0, dtype=np.int64))
+    told = likeliest(stretches, frames, [(), *others])
     return told is not None and told.steps == () and told.margin >= SURE
-
-
-def _in_noise(numbers: Ints, values: Array) -> Array:
-    """Coordinates (n, 6) about their mean, in what cubics through six frames leave of them."""
-    pattern = np.arange(6)
-    left = np.einsum("cp,bpx->bcx", _contrasts(pattern, 3), values[_stretches(numbers, pattern)])
-    noise = _NORMAL_BY_MAD * np.median(np.abs(left), axis=(0, 1))
-    return np.asarray((values - values.mean(axis=0)) / np.maximum(noise, 1e-12))
-
-
-def _contrasts(pattern: Ints, degree: int) -> Array:
-    """Unit combinations of samples at these times that polynomials leave alone, (c, n)."""
-    x = 2.0 * (pattern - pattern[0]) / (pattern[-1] - pattern[0]) - 1.0
-    q, _ = np.linalg.qr(np.vander(x, degree + 1), mode="complete")
-    return np.asarray(q[:, degree + 1 :].T)
-
-
-def _stretches(numbers: Ints, pattern: Ints) -> Ints:
-    """Indices of frames that lie to each other as the pattern does, (stretches, len(pattern))."""
-    place = np.full(int(numbers[-1]) + int(pattern[-1]) + 1, -1, dtype=np.int64)
-    place[numbers] = np.arange(len(numbers))
-    found = place[numbers[:, None] + pattern]
-    return found[(found >= 0).all(axis=1)]
-
-
-def strained_steps(numbers: Ints, values: Array) -> set[int]:
-    """Frames after which every stretch over the step is strained.
-
-    Args:
-        numbers: of the frames, as far as is known, rising, (n,).
-        values: of all coordinates, (n, m).
-
-    Source:
-        Rousseeuw, Croux 1993, Alternatives to the median absolute deviation, for the scale.
-    """
-    least, most = np.full(len(values), np.inf), np.zeros(len(values))
-    rows = np.arange(len(numbers) - _TOGETHER + 1)[:, None] + np.arange(_TOGETHER)
-    patterns = numbers[rows] - numbers[rows[:, :1]]
-    for pattern in np.unique(patterns, axis=0):
-        alike = _stretches(numbers, pattern)
-        if pattern[-1] > _LONGEST or len(alike) < _LEAST_STRETCHES:
-            continue
-        contrasts = _contrasts(pattern, 5)
-        left = np.einsum("cp,bpx->bcx", contrasts, values[alike])
-        usual = np.maximum(_NORMAL_BY_MAD * np.median(np.abs(left), axis=0), 1e-12)
-        own = rows[(patterns == pattern).all(axis=1)]
-        scaled = np.einsum("cp,bpx->bcx", contrasts, values[own]) / usual
-        strain = np.mean(scaled**2, axis=(1, 2))
-        for place in range(1, _TOGETHER - 2):  # two frames at least to each side of the step
-            np.minimum.at(least, own[:, place], strain)
-            np.maximum.at(most, own[:, place], strain)
-    return set(np.flatnonzero(is_strained(least, most)).tolist())
-
-
-def is_strained(least: Array, most: Array) -> NDArray[np.bool_]:
-    """Steps by the least and the most that stretches over them leave, (n,).
-
-    Source:
-        Press et al. 2007, Numerical Recipes, sec. 15.1: mean squares in their usual size.
-    """
-    return (most > STRAINED) & (least > AROUND) & np.isfinite(least)
 
 
 def _groups(steps: set[int]) -> list[list[int]]:
@@ -262,34 +248,46 @@ class Told:
         counts: frames lost in all that are nearly as likely.
         margin: by how much likelier that number is than any other, twice the logarithm.
         unclear: frames that may be on either side of a loss.
+        score: minus twice the logarithm of how likely that is.
     """
 
     steps: Steps
     counts: tuple[int, ...]
     margin: float
     unclear: frozenset[int]
+    score: float
 
 
-def _judged(numbers: Ints, values: Array, group: list[int], groups: list[list[int]]) -> Told | None:
+def _judged(stretches: Stretches, group: list[int], groups: list[list[int]]) -> Told | None:
     """What was likeliest lost at a group's steps, by as many frames as tell; None where none do."""
-    first, last = max(group[0] - 1, 0), min(group[-1] + 1, len(numbers) - 2)
+    count = len(stretches.numbers)
+    first, last = max(group[0] - 1, 0), min(group[-1] + 1, count - 2)
     ends = [0, *(g[-1] + 1 for g in groups if g[-1] < group[0])]
-    starts = [*(g[0] for g in groups if g[0] > group[-1]), len(numbers) - 1]
+    starts = [*(g[0] for g in groups if g[0] > group[-1]), count - 1]
     most = min(_MOST_BESIDE, first - max(ends) + 1, min(starts) - last)
-    broken = np.array([step for one in groups for step in one])
     steps = list(range(first, last + 1))  # one beside a turn may strain the next one more
     told = None
     for beside in range(most, _LEAST_BESIDE - 1, -1):
         frames = np.arange(first - beside + 1, last + beside + 1)
-        found = likeliest(numbers, values, frames, ways_to_lose(steps), broken)
-        if found is not None and _is_far_from_ends(found, len(numbers)):
+        found = likeliest(stretches, frames, ways_to_lose(steps))
+        found = found and _beside_kinks(stretches, frames, found)
+        if found is not None and is_far_from_ends(found, count):
             told = found if told is None or found.margin > told.margin else told
         if told is not None and told.margin >= SURE:
             break
     return told
 
 
-def _is_far_from_ends(told: Told, count: int) -> bool:
+def _beside_kinks(stretches: Stretches, frames: Ints, told: Told) -> Told:
+    """The same, no surer than that frames were lost at one place and the platform not knocked."""
+    if len(told.steps) != 1 or told.margin < SURE:
+        return told
+    margin = min(told.margin, kink_unlikeliness(stretches, frames) - told.score)
+    counts = told.counts if margin >= SURE else (0, *told.counts)
+    return replace(told, margin=margin, counts=counts)
+
+
+def is_far_from_ends(told: Told, count: int) -> bool:
     """Whether as many frames as two stretches hold lie to both sides of a long gap.
 
     A release, or what else begins a recording, is held against its swing by few of its frames.
@@ -301,26 +299,23 @@ def _is_far_from_ends(told: Told, count: int) -> bool:
     )
 
 
-def likeliest(
-    numbers: Ints, values: Array, frames: Ints, ways: Iterable[Steps], broken: Ints
-) -> Told | None:
+def likeliest(stretches: Stretches, frames: Ints, ways: Iterable[Steps]) -> Told | None:
     """What was likeliest lost of some ways to lose frames; None where none that can be held fits.
 
     Args:
-        numbers: of all frames, as far as is known, (n,).
-        values: of all coordinates, (n, m).
+        stretches: of the recording, without a broken step.
         frames: indices of those that are held against others.
         ways: to lose frames.
-        broken: steps that no other stretch may hold.
 
     Source:
         Bishop 2006, Pattern Recognition and Machine Learning, sec. 3.4: odds of models.
     """
+    numbers = stretches.numbers
     scores: dict[Steps, float] = {}
     fits: dict[Steps, float] = {}
     for steps in ways:
         pattern = numbers[frames] - numbers[frames[0]] + _shift(frames, steps)
-        told = unlikeliness(numbers, values, frames, pattern, broken)
+        told = stretches.unlikeliness(frames, pattern)
         if told is not None:
             rare = sum(4.0 * np.log(max(abs(count), 1)) for _, count in steps)
             scores[steps], fits[steps] = told[0] + rare, told[1]
@@ -336,7 +331,7 @@ def likeliest(
     shifts = np.array([_shift(frames, steps) for steps in near if _total(steps) == own])
     unclear = frozenset(frames[np.ptp(shifts, axis=0) > 0].tolist())
     counts = tuple(sorted({_total(steps) for steps in near}))
-    return Told(best, counts, float(margin), unclear)
+    return Told(best, counts, float(margin), unclear, float(scores[best]))
 
 
 def ways_to_lose(group: list[int]) -> Iterator[Steps]:
@@ -360,29 +355,3 @@ def _total(steps: Steps) -> int:
 def _shift(frames: Ints, steps: Steps) -> Ints:
     """By how many frames the numbers of frames are too small."""
     return sum((count * (frames > step) for step, count in steps), np.zeros_like(frames))
-
-
-def unlikeliness(
-    numbers: Ints, values: Array, frames: Ints, pattern: Ints, broken: Ints
-) -> tuple[float, float] | None:
-    """Minus twice the log likelihood of frames that lie to each other so, and mean square a number.
-
-    None where too few stretches without a broken step have that pattern.
-
-    Source:
-        Bishop 2006, Pattern Recognition and Machine Learning, sec. 2.3: a Gaussian's likelihood.
-    """
-    rows = _stretches(numbers, pattern)
-    if len(broken):
-        inside = (rows[:, :1] <= broken) & (broken < rows[:, -1:])
-        rows = rows[~inside.any(axis=1)]
-    if len(rows) < _LEAST_STRETCHES:
-        return None
-    base = _contrasts(np.arange(len(pattern)), 0)  # where the platform hangs tells nothing
-    seen = np.einsum("cp,bpx->bcx", base, values[rows])
-    covariance = np.einsum("bcx,bdx->cd", seen, seen) / (len(rows) * values.shape[1])
-    covariance += _READING * np.eye(len(base))
-    own = base @ values[frames]
-    square = float(np.sum(own * np.linalg.solve(covariance, own)))
-    scale = float(np.linalg.slogdet(covariance)[1])
-    return square + values.shape[1] * scale, square / own.size

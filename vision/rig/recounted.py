@@ -33,7 +33,7 @@ def recounted(
 
 
 def _put_right(view: CameraViews, lost: Lost) -> tuple[CameraViews, list[Finding], list[str]]:
-    if not (lost.losses or lost.unclear):
+    if not (lost.losses or lost.unclear or lost.kinks):
         return view, [], []
     track = own_track(view)
     frame_at = {float(time): k for k, time in enumerate(view.middle_times())}
@@ -42,7 +42,8 @@ def _put_right(view: CameraViews, lost: Lost) -> tuple[CameraViews, list[Finding
     unsure = [loss for loss in lost.losses if len(loss.frames) != 1]
     if unsure:
         raise DataError(_unsure_text(view, [frame_of[loss.after] for loss in unsure], unsure))
-    stamps, findings, said = view.stamps_s.copy(), [], []
+    stamps, findings = view.stamps_s.copy(), []
+    said = [_kink_text(view, frame_of[k]) for k in lost.kinks]
     for loss in lost.losses:
         after, count = frame_of[loss.after], loss.frames[0]
         stamps[after + 1 :] += count * track.step_s
@@ -64,6 +65,14 @@ def _put_right(view: CameraViews, lost: Lost) -> tuple[CameraViews, list[Finding
             "or after such a gap: left out"
         )
     return view.restamped(stamps), findings, said
+
+
+def _kink_text(view: CameraViews, after: int) -> str:
+    return (
+        f"{view.camera.name}: after frame {int(view.numbers[after])} ({view.stamps_s[after]:.2f} "
+        "s) the platform goes on from where it was at another speed, as when it is knocked or let "
+        "go: stamps are left as they are"
+    )
 
 
 def _unsure_text(view: CameraViews, places: Sequence[int], unsure: Sequence[Loss]) -> str:

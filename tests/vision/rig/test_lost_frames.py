@@ -11,18 +11,19 @@ import pytest
 
 from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.rotation import exp_rotation
-from freeswing.vision.rig import lost_frames as module
+from freeswing.vision.rig import kinks
 from freeswing.vision.rig.gross_faults import refuse_contradicting
 from freeswing.vision.rig.lag_search import OwnTrack
 from freeswing.vision.rig.lost_frames import (
     Loss,
+    Told,
     counted,
-    is_strained,
+    is_far_from_ends,
     likeliest,
     lost_frames,
-    unlikeliness,
     ways_to_lose,
 )
+from freeswing.vision.rig.usual_stretches import Stretches, is_strained
 
 RATE_HZ = 20.0
 NOISE = np.array([1e-4, 1e-4, 5e-4, 2e-3, 2e-3, 5e-4])
@@ -99,6 +100,41 @@ def test_what_hangs_at_rest_before_its_release_lost_nothing() -> None:
     assert not lost_frames(OwnTrack(track.times_s, turns, places)).losses
 
 
+def nothing_lost(seed: int, happens: str) -> OwnTrack:
+    """A swing to which something happens between two frames: let go, kicked, or held in a hand."""
+    rng = np.random.default_rng(seed)
+    since = np.arange(120) / RATE_HZ - rng.uniform(1.2, 4.5)
+    free = np.maximum(since, 0.0)[:, None]
+    turns = 2 * np.pi * np.array([0.8, 1.3, 1.45])
+    shapes = 0.1 * rng.normal(size=(3, 6)) + 0.05
+    if happens == "kick":
+        values = np.cos(since[:, None] * turns + turns) @ shapes
+        values += np.sin(free * turns) @ rng.normal(scale=rng.choice([0.1, 0.03]), size=(3, 6))
+    else:
+        values = np.cos(free * turns + rng.choice([0.0, 1.0])) @ shapes
+    if happens == "hand":
+        tremors = np.sin(2 * np.pi * np.minimum(since, 0.0)[:, None] * rng.uniform(1, 6, size=5))
+        values += tremors @ rng.normal(size=(5, 6)) * 4.0 * NOISE
+    values += NOISE * rng.normal(size=values.shape)
+    times = np.arange(120) / RATE_HZ
+    return OwnTrack(times, exp_rotation(values[:, 3:]), values[:, :3] + [0.0, 0.0, 2.0])
+
+
+@pytest.mark.parametrize("happens", ["release", "kick"])
+@pytest.mark.parametrize("seed", range(10))
+def test_what_is_let_go_or_knocked_lost_nothing(seed, happens) -> None:
+    found = lost_frames(nothing_lost(seed, happens))
+    assert (found.losses, found.unclear) == ((), ())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("happens", ["release", "kick", "hand"])
+@pytest.mark.parametrize("seed", range(60))
+def test_what_is_let_go_or_knocked_anywhere_lost_nothing(seed, happens) -> None:
+    found = lost_frames(nothing_lost(seed, happens))
+    assert (found.losses, found.unclear) == ((), ())
+
+
 @pytest.mark.parametrize(("frames", "enough"), [(42, True), (39, False)])
 def test_few_frames_tell_nothing(frames, enough) -> None:
     assert (counted(np.arange(frames) / RATE_HZ) is not None) == enough
@@ -132,9 +168,9 @@ def test_a_step_strains_all_stretches_about_it(least, most, strained) -> None:
 )
 def test_how_sure_a_count_is(monkeypatch, margin, fit, counts) -> None:
     told = {0: (margin, 1.0), 1: (0.0, fit)}
-    monkeypatch.setattr(module, "unlikeliness", lambda n, v, f, pattern, b: told[pattern[-1] - 7])
-    ways = [(), ((3, 1),)]
-    found = likeliest(np.arange(8), np.zeros((8, 6)), np.arange(8), ways, np.zeros(0, dtype=int))
+    monkeypatch.setattr(Stretches, "unlikeliness", lambda s, f, pattern: told[pattern[-1] - 7])
+    stretches = Stretches(np.arange(8), np.zeros((8, 6)), np.zeros(0, dtype=int))
+    found = likeliest(stretches, np.arange(8), [(), ((3, 1),)])
     assert (None if found is None else found.counts) == counts
 
 
@@ -145,6 +181,54 @@ def test_more_than_twenty_are_not_asked_for() -> None:
 @pytest.mark.parametrize(("frames", "told"), [(36, True), (34, False)])
 def test_a_covariance_needs_stretches(frames, told) -> None:
     values = np.random.default_rng(0).normal(size=(frames, 6))
-    numbers, none = np.arange(frames), np.zeros(0, dtype=int)
-    found = unlikeliness(numbers, values, np.arange(16), np.arange(16), none)
+    stretches = Stretches(np.arange(frames), values, np.zeros(0, dtype=int))
+    found = stretches.unlikeliness(np.arange(16), np.arange(16))
     assert (found is not None) == told
+
+
+@pytest.mark.parametrize(
+    ("after", "count", "far"),
+    [(5, 3, True), (5, 4, False), (15, 4, False), (16, 4, True), (103, 4, True), (104, 4, False),
+     (60, 19, True), (60, 20, False)],
+)  # fmt: skip
+def test_more_than_three_need_frames_to_both_sides(after, count, far) -> None:
+    told = Told(((after, count),), (count,), 99.0, frozenset(), 0.0)
+    assert is_far_from_ends(told, 120) == far
+
+
+def test_three_at_each_of_two_places_and_no_more() -> None:
+    ways = [one for one in ways_to_lose([5, 6]) if len(one) == 2]
+    assert max(ways) == ((5, 3), (6, 3))
+
+
+@pytest.mark.parametrize(("steps", "three"), [(4, False), (5, True), (14, True), (15, False)])
+def test_three_places_are_told_apart_within_fourteen_steps(steps, three) -> None:
+    assert any(len(one) == 3 for one in ways_to_lose(list(range(steps)))) == three
+
+
+def test_covariances_of_a_film_do_not_grow_with_it(monkeypatch) -> None:
+    made = []
+    usual = Stretches._made
+    monkeypatch.setattr(Stretches, "_made", lambda s, p: made.append(tuple(p)) or usual(s, p))
+    numbers = []
+    for frames in (120, 1200):
+        made.clear()
+        assert not lost_frames(swing(np.arange(frames))).losses
+        numbers.append(len(made))
+    assert numbers[0] == numbers[1] <= 6, numbers
+
+
+@pytest.mark.parametrize(("frames", "most"), [(1010, 995), (1030, 508)])
+def test_a_covariance_is_made_of_a_thousand_stretches_at_most(frames, most) -> None:
+    values = np.random.default_rng(0).normal(size=(frames, 6))
+    stretches = Stretches(np.arange(frames), values, np.zeros(0, dtype=int))
+    assert len(stretches.compared(np.arange(16))) == most
+
+
+@pytest.mark.parametrize(("apart", "kink"), [(3.9, True), (4.1, False)])
+def test_motions_that_meet_are_a_kink(monkeypatch, apart, kink) -> None:
+    found = (np.full((1, 6), np.sqrt(apart)), np.ones(1))
+    monkeypatch.setattr(kinks, "_apart", lambda stretches, before, after: found)
+    monkeypatch.setattr(Stretches, "unlikeliness", lambda s, f, pattern: (0.0, 1.0))
+    stretches = Stretches(np.arange(40), np.zeros((40, 6)), np.zeros(0, dtype=int))
+    assert kinks.is_kink(stretches, [20]) == kink
