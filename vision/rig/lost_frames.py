@@ -201,7 +201,8 @@ def _may_hide(stretches: Stretches, steps: Ints) -> NDArray[np.bool_]:
     own, fit = (np.take_along_axis(one, best[None], axis=0)[0] for one in (scores, fits))
     np.put_along_axis(scores, best[None], np.inf, axis=0)
     others = scores.min(axis=0)
-    return (best > 0) & (fit <= FITS) & np.isfinite(others) & (others - own >= SURE)
+    margin = np.subtract(others, own, out=np.zeros(len(steps)), where=np.isfinite(others))
+    return (best > 0) & (fit <= FITS) & (margin >= SURE)
 
 
 def counted(times_s: Array) -> Ints | None:

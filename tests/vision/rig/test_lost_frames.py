@@ -84,6 +84,14 @@ def test_a_gap_in_the_stamps_is_none() -> None:
     assert not lost_frames(OwnTrack(times, track.rotations, track.positions_m)).losses
 
 
+def test_of_stretches_that_are_all_of_their_own_nothing_is_told() -> None:
+    """A gap in the stamps every few frames: none lies to its neighbours as twenty others do."""
+    kept = np.cumsum(np.random.default_rng(2).choice([1, 1, 1, 1, 2], size=90))
+    track = swing(kept)
+    found = lost_frames(OwnTrack(kept / RATE_HZ, track.rotations, track.positions_m))
+    assert not found.losses
+
+
 def test_a_wrong_pose_and_a_knock_are_none() -> None:
     track = without()
     places = track.positions_m.copy()
