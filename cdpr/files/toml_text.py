@@ -8,8 +8,6 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TypeGuard
 
-import numpy as np
-
 BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
 
@@ -53,8 +51,8 @@ def toml_string(text: str) -> str:
 
 
 def _value(value: object, path: tuple[str, ...]) -> str:
-    if isinstance(value, (np.ndarray, np.generic)):
-        value = value.tolist()
+    # NumPy's arrays and scalars, without NumPy: `freeswing --help` imports nothing heavy.
+    value = getattr(value, "tolist", lambda: value)()
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, int):
