@@ -60,8 +60,12 @@ def test_two_phones_started_by_hand_give_the_centre_of_mass(phones) -> None:
             entry = told[f"com_{axis}_m"]
             z = (entry["value"] - true) / entry["std"]
             assert abs(z) < 3.0, f"{name} com_{axis}: {z:.2f} of {1e3 * entry['std']:.4f} mm"
-    best = {p["name"]: p["std"] for p in found["estimates"]["ml_full"]["parameters"]}
-    assert best["com_y_m"] < 3e-5, "deviations that hold anything"
+    best = found["estimates"]["ml_full"]
+    told = {p["name"]: p["std"] for p in best["parameters"]}
+    # What poses of squeezed film leave looks like a robot file that is wrong: that share is apart.
+    own = told["com_y_m"] ** 2 - (best.get("geometry_std") or [0.0] * 9)[1] ** 2
+    assert own < (3e-5) ** 2, "deviations that hold anything"
+    assert told["com_y_m"] < 2e-4, "a geometry that holds anything"
 
 
 @pytest.mark.slow
