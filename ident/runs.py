@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 
+from freeswing.cdpr.files.problems import DataError
 from freeswing.cdpr.measured.pose_errors import PoseErrors
 from freeswing.cdpr.measured.trajectory import Trajectory
 from freeswing.cdpr.robot import Array, frozen_array
@@ -69,6 +70,22 @@ class SwingRun:
             raise ValueError(
                 f"run {self.name}: window_s is {list(self.window_s)}, its end must follow its start"
             )
+
+    def inside(self) -> Trajectory:
+        """Samples inside the window; all where none is given.
+
+        Raises:
+            DataError: when it holds none.
+        """
+        return self.trajectory.window(*self.window_s) if self.window_s else self.trajectory
+
+    def known_poses(self) -> Trajectory | None:
+        """Those of them that are known full poses; None where there are none."""
+        try:
+            part = self.inside()
+        except DataError:  # an empty window is said where the run is prepared
+            return None
+        return part.take(part.is_known) if part.is_pose and part.is_known.any() else None
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,17 +17,13 @@ from freeswing.cdpr.files.noise_columns import (
     noise_names,
 )
 from freeswing.cdpr.files.number_table import (
-    NumberTable,
     check_times,
     check_width,
-    known_poses,
     read_lines,
     read_numbers,
 )
-from freeswing.cdpr.files.trajectory_csv import column_name, lines_of, question_unit
-from freeswing.cdpr.measured.trajectory import unwrapped
+from freeswing.cdpr.files.trajectory_csv import column_name, lines_of, pose_values, question_unit
 from freeswing.cdpr.robot import POSE_COORDINATES, Array
-from freeswing.cdpr.rotation import angles_from_matrix, matrix_from_quaternion
 
 _PLACE = ("x_m", "y_m", "z_m")
 
@@ -92,7 +88,8 @@ def read_signals(path: Path | str, channels: tuple[str, ...] = ()) -> SignalTabl
     check_times(path, table, header.index("t_s"), "t_s")
     columns = {name: table.values[:, place] for place, name in enumerate(header)}
     if QUATERNION[0] in header:
-        values, notes = _of_poses(path, table, columns)
+        poses, notes = pose_values(path, table, columns)
+        values: dict[str, Array] = {c: poses[:, k] for k, c in enumerate(POSE_COORDINATES)}
         stds = {
             c: columns[n]
             for c, n in zip(values, noise_names(POSE_NOISE), strict=True)
@@ -127,16 +124,6 @@ def signal_pieces(table: SignalTable) -> Iterator[bytes]:
         header.append(f"std_{name}")
         parts.append(std)
     return lines_of(header, np.column_stack(parts))
-
-
-def _of_poses(
-    path: Path | str, table: NumberTable, columns: dict[str, Array]
-) -> tuple[dict[str, Array], tuple[str, ...]]:
-    place = np.stack([columns[name] for name in _PLACE], axis=1)
-    quaternion = np.stack([columns[name] for name in QUATERNION], axis=1)
-    place, quaternion, notes = known_poses(path, table, place, quaternion, ", ".join(QUATERNION))
-    angles = unwrapped(angles_from_matrix(matrix_from_quaternion(quaternion)))
-    return dict(zip(POSE_COORDINATES, [*place.T, *angles.T], strict=True)), notes
 
 
 def _check_header(

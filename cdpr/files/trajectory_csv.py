@@ -145,14 +145,25 @@ def _known(is_pose: bool) -> str:
     return ", ".join(("t_s", *(POSE_COLUMNS if is_pose else free), "std_x_m ..."))
 
 
-def _poses(path: Path | str, table: NumberTable, columns: dict[str, Array]) -> Trajectory:
+def pose_values(
+    path: Path | str, table: NumberTable, columns: dict[str, Array]
+) -> tuple[Array, tuple[str, ...]]:
+    """The coordinates x .. chi of pose columns, (n, 6), and what was taken for a gap.
+
+    Raises:
+        InputError: naming the line of a quaternion that is none.
+    """
     position = np.stack([columns[name] for name in POSE_COLUMNS[:3]], axis=1)
     quaternion = np.stack([columns[name] for name in QUATERNION], axis=1)
     position, quaternion, notes = known_poses(
         path, table, position, quaternion, ", ".join(QUATERNION)
     )
     angles = unwrapped(angles_from_matrix(matrix_from_quaternion(quaternion)))
-    values = np.concatenate([position, angles], axis=1)
+    return np.concatenate([position, angles], axis=1), notes
+
+
+def _poses(path: Path | str, table: NumberTable, columns: dict[str, Array]) -> Trajectory:
+    values, notes = pose_values(path, table, columns)
     is_known = np.asarray(np.isfinite(values).all(axis=1))
     covariances = read_noise(path, table, columns, POSE_NOISE, is_known)
     provenance = f"{Path(path).name}: measured poses"

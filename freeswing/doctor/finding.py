@@ -1,7 +1,8 @@
-"""One line that the doctor says about a session."""
+"""One line that the doctor says about a session, and how runs are named in it."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -41,3 +42,9 @@ class Finding:
             "text": self.text,
             "remedy": self.remedy,
         }
+
+
+def named_runs(names: Sequence[str]) -> str:
+    """The first by name, and how many more there are."""
+    more = f" (and {len(names) - 1} more runs)" if len(names) > 1 else ""
+    return f"run {names[0]}{more}"

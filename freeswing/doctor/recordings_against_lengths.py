@@ -22,7 +22,7 @@ from freeswing.cdpr.model.batch import evaluate
 from freeswing.cdpr.model.equations import Model, build_model
 from freeswing.cdpr.robot import Array, Robot
 from freeswing.cdpr.rotation import matrix_from_quaternion, quaternion_from_matrix, transform
-from freeswing.doctor.named_runs import named_runs
+from freeswing.doctor.finding import named_runs
 from freeswing.ident.runs import SwingRun
 
 # Geometry known to a centimetre moves lengths by some mm along a swing: more is another matter,
@@ -71,11 +71,7 @@ def mistaken_recording(run: SwingRun, robot: Robot) -> tuple[str, str]:
         Murray, Li, Sastry 1994, A Mathematical Introduction to Robotic Manipulation, ch. 2: unit
         quaternions, their order and conjugate.
     """
-    try:
-        part = run.trajectory.window(*run.window_s) if run.window_s else run.trajectory
-    except DataError:  # an empty window is said where the run is prepared
-        return "", ""
-    part = part.take(part.is_known) if part.is_pose and part.is_known.any() else None
+    part = run.known_poses()
     if part is None:
         return "", ""
     model = build_model(robot)

@@ -39,7 +39,7 @@ def run_findings(
         yield Finding("warning", subject, note)
     yield from stamp_findings(subject, run.trajectory, frame_rate_hz, measured=measured)
     try:
-        part = run.trajectory.window(*run.window_s) if run.window_s else run.trajectory
+        part = run.inside()
     except DataError as failure:
         yield Finding("error", subject, str(failure))
         return

@@ -9,8 +9,7 @@ import numpy as np
 from freeswing.cdpr.files.problems import DataError
 from freeswing.cdpr.measured.lost_rows import lost_rows
 from freeswing.cdpr.measured.trajectory import Trajectory
-from freeswing.doctor.finding import Finding
-from freeswing.doctor.named_runs import named_runs
+from freeswing.doctor.finding import Finding, named_runs
 from freeswing.ident.runs import SwingRun
 
 # Cameras keep their rate to 0.01 %; 29.97 called 30 is 0.1 % and changes an inertia by 0.2 %.

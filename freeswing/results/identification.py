@@ -152,6 +152,10 @@ class BodyParameter(Entry):
     identifiable: bool = True
 
 
+PLATFORM = "platform"
+"""The body of this name carries the others."""
+
+
 @entry
 class Body(Entry):
     """The platform or a load: inertia in kg m2 about its own centre of mass."""

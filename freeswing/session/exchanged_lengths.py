@@ -67,15 +67,11 @@ def refuse_exchanged_lengths(
 
 def pose_lengths(swing: SwingRun, robot: Robot) -> Array | None:
     """Mean cable lengths by the run's poses inside its window, (n,); None without poses."""
-    try:
-        part = swing.trajectory.window(*swing.window_s) if swing.window_s else swing.trajectory
-    except DataError:  # an empty window is said where the run is prepared
-        return None
-    poses = part.values[part.is_known]
-    if not part.is_pose or not len(poses):
+    part = swing.known_poses()
+    if part is None:
         return None
     model = build_model(robot)
-    lengths = evaluate(model.lengths, poses, model.start_values)[0].reshape(len(poses), -1)
+    lengths = evaluate(model.lengths, part.values, model.start_values)[0].reshape(len(part), -1)
     return lengths.mean(axis=0) if np.isfinite(lengths).all() else None
 
 
@@ -179,7 +175,7 @@ def _orders(count: int, before: Array | None) -> Iterator[list[tuple[int, ...]]]
 def _free_part(swing: SwingRun) -> Trajectory | None:
     """A run's known samples inside its window; None where it measures no position or all."""
     try:
-        part = swing.trajectory.window(*swing.window_s) if swing.window_s else swing.trajectory
+        part = swing.inside()
     except DataError:  # an empty window is said where the run is prepared
         return None
     if part.is_pose or not set(POSE_COORDINATES[:3]) & set(part.coordinates):

@@ -42,10 +42,8 @@ def refuse_repeated(swings: Sequence[SwingRun]) -> None:
 
 
 def _part(swing: SwingRun) -> Trajectory:
-    if swing.window_s is None:
-        return swing.trajectory
     try:
-        return swing.trajectory.window(*swing.window_s)
+        return swing.inside()
     except DataError:  # an empty window is said where the run is prepared
         return swing.trajectory
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -111,15 +112,13 @@ def refit(
     for shape in effect.further_shapes():
         starts.append(np.array([shape.get(n, v) for n, v in zip(names, values, strict=True)]))
     fits: list[LikelihoodFit] = []
-    for k, start in enumerate(starts):
-        try:
+    for start in starts:
+        with suppress(ValueError):  # another start may be followed
             fits.append(_refitted(current, candidate, start, noise_scales * np.sqrt(colour)))
-        except ValueError:  # the last start may say so, if none could be followed
-            if k == len(starts) - 1 and not fits:
-                raise
-            continue
-        if fits[-1].converged:
+        if fits and fits[-1].converged:
             break
+    if not fits:
+        raise ValueError(f"{candidate}: no start can be followed")
     found = min(fits, key=lambda one: one.cost)
     if _does_nothing(found, candidate):
         raise ValueError(f"{candidate}: no step from doing nothing lowers the cost")

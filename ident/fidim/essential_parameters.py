@@ -30,6 +30,15 @@ def essential_parameters(W: Array) -> NDArray[np.bool_]:
     return essential
 
 
+def undetermined(values: Array, std: Array) -> NDArray[np.bool_]:
+    """Values small beside the largest of their kind and known to no tenth of themselves, (9,).
+
+    Source:
+        FIDIM 2022, sec. 3.2: parameters that are not essential.
+    """
+    return (100.0 * std > WELL_IDENTIFIED_PERCENT * np.abs(values)) & near_zero(values)
+
+
 def near_zero(values: Array) -> NDArray[np.bool_]:
     """Values small beside the largest of their kind (first moments; inertia), (9,).
 

@@ -23,7 +23,7 @@ from freeswing.cdpr.simulation.free_swing import Motion
 from freeswing.cdpr.simulation.sensitivity import linearise
 from freeswing.cdpr.system.threads import side_by_side
 from freeswing.ident.estimate import Estimate
-from freeswing.ident.fidim.essential_parameters import WELL_IDENTIFIED_PERCENT, near_zero
+from freeswing.ident.fidim.essential_parameters import undetermined
 from freeswing.ident.likelihood.blocks import MODES, columns_of, state_of
 from freeswing.ident.likelihood.cable_ends import GeometryPriors
 from freeswing.ident.likelihood.calibration_modes import amplitudes_of, motion_shifts
@@ -63,6 +63,9 @@ class WrongGeometry:
         freeze(self, "covariance")
 
 
+NOTHING_WRONG = WrongGeometry(0.0, np.zeros((9, 9)))
+
+
 def wrong_geometry(found: LikelihoodFit) -> WrongGeometry:
     """How large errors of the cables' geometry a fit's residuals ask for, and what they do.
 
@@ -82,7 +85,7 @@ def wrong_geometry(found: LikelihoodFit) -> WrongGeometry:
     left, answers, _ = np.linalg.svd(triangle[first:last, first:last])
     size = likely_size(answers, left.T @ triangle[first:last, -1], found.enlargement)
     if size == 0.0:
-        return WrongGeometry(0.0, np.zeros((9, 9)))
+        return NOTHING_WRONG
     change = np.linalg.lstsq(triangle[:first, :first], triangle[:first, first:last], rcond=None)[0]
     moved = np.zeros((9, len(errors)))
     moved[unknown[unknown < 9]] = (change / scale[:, None])[unknown < 9]
@@ -134,11 +137,10 @@ def with_wrong_geometry(entry: Estimate, wrong: WrongGeometry) -> Estimate:
     before = entry.consistency.sentence()
     covariance = entry.covariance + wrong.covariance
     wider = float(np.sqrt(np.diag(covariance) / np.diag(entry.covariance)).max())
-    weak = 100.0 * np.sqrt(np.diag(covariance)) > WELL_IDENTIFIED_PERCENT * np.abs(entry.values)
     told = replace(
         entry,
         covariance=covariance,
-        essential=~(weak & near_zero(entry.values)),
+        essential=~undetermined(entry.values, np.sqrt(np.diag(covariance))),
         notes=(*(note for note in entry.notes if note != before), _sentence(wrong, wider)),
         extra={**entry.extra, "geometry_std": np.sqrt(np.diag(wrong.covariance)).tolist()},
     )
@@ -155,7 +157,7 @@ def with_doubts(entry: Estimate, found: LikelihoodFit) -> tuple[Estimate, WrongG
             "standard deviations hold nothing of what errors of robot.toml do to the inertia: the "
             f"residuals could not be asked for them ({error})"
         )
-        return replace(entry, notes=(*entry.notes, note)), WrongGeometry(0.0, np.zeros((9, 9)))
+        return replace(entry, notes=(*entry.notes, note)), NOTHING_WRONG
     return with_wrong_geometry(entry, wrong), wrong
 
 

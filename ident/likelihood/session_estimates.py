@@ -10,7 +10,7 @@ from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.robot import Array
 from freeswing.cdpr.system.progress import Progress
 from freeswing.ident.estimate import Estimate
-from freeswing.ident.fidim.essential_parameters import WELL_IDENTIFIED_PERCENT, near_zero
+from freeswing.ident.fidim.essential_parameters import undetermined
 from freeswing.ident.judge.free_swing_law import unexplained_motion
 from freeswing.ident.judge.physical_consistency import consistency, is_possible, nearest_possible
 from freeswing.ident.likelihood.between_runs import widened
@@ -226,7 +226,6 @@ def _entry(
             f"{int(found.free.sum())}; record larger swings in all modes about more equilibria"
         )
     std = np.sqrt(np.diag(covariance))
-    weak = 100.0 * std > WELL_IDENTIFIED_PERCENT * np.abs(found.inertia)
     notes = []
     if found.enlargement > 1.0:
         notes.append(
@@ -252,7 +251,7 @@ def _entry(
     return Estimate(
         values=found.inertia,
         covariance=covariance,
-        essential=~(weak & near_zero(found.inertia)),
+        essential=~undetermined(found.inertia, std),
         samples=sum(len(run.times_s) for run in found.samples),
         dropped=dropped,
         notes=tuple(notes),

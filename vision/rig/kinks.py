@@ -35,7 +35,7 @@ def is_kink(stretches: Stretches, steps: list[int]) -> bool:
         before = np.arange(max(first - _SEEN + 1, 0), first + 1)
         after = np.arange(last + 1, min(last + 1 + _SEEN, count))
         apart = _apart(stretches, before, after)
-        fits = [stretches.unlikeliness(rows, _pattern(stretches, rows)) for rows in (before, after)]
+        fits = [stretches.unlikeliness(rows, stretches.pattern(rows)) for rows in (before, after)]
         if apart is not None and all(one is not None and one[1] <= FITS for one in fits):
             between, spread = apart
             if np.min(np.mean(between**2, axis=1) / spread) < MEETS:
@@ -52,7 +52,7 @@ def kink_unlikeliness(stretches: Stretches, frames: Ints) -> float:
     least = np.inf
     for split in range(_LEAST_SEEN, len(frames) - _LEAST_SEEN + 1):
         before, after = frames[:split], frames[split:]
-        told = [stretches.unlikeliness(rows, _pattern(stretches, rows)) for rows in (before, after)]
+        told = [stretches.unlikeliness(rows, stretches.pattern(rows)) for rows in (before, after)]
         apart = _apart(stretches, before, after)
         if apart is not None and told[0] is not None and told[1] is not None:
             between, spread = apart
@@ -61,10 +61,6 @@ def kink_unlikeliness(stretches: Stretches, frames: Ints) -> float:
             link = np.sum(between**2, axis=1) / spread + between.shape[1] * np.log(spread / unit)
             least = min(least, told[0][0] + told[1][0] + float(link.min()))
     return least
-
-
-def _pattern(stretches: Stretches, rows: Ints) -> Ints:
-    return stretches.numbers[rows] - stretches.numbers[rows[0]]
 
 
 def _apart(stretches: Stretches, before: Ints, after: Ints) -> tuple[Array, Array] | None:

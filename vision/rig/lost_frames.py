@@ -184,7 +184,7 @@ def _may_hide(stretches: Stretches, steps: Ints) -> NDArray[np.bool_]:
         Bishop 2006, Pattern Recognition and Machine Learning, sec. 3.4: odds of models.
     """
     rows = steps[:, None] + np.arange(-_MOST_BESIDE + 1, _MOST_BESIDE + 1)
-    patterns = stretches.numbers[rows] - stretches.numbers[rows[:, :1]]
+    patterns = stretches.pattern(rows)
     count = stretches.values.shape[1]
     scores = np.full((3, len(steps)), np.inf)
     fits = np.full((3, len(steps)), np.inf)
@@ -311,12 +311,11 @@ def likeliest(stretches: Stretches, frames: Ints, ways: Iterable[Steps]) -> Told
     Source:
         Bishop 2006, Pattern Recognition and Machine Learning, sec. 3.4: odds of models.
     """
-    numbers = stretches.numbers
+    unshifted = stretches.pattern(frames)
     scores: dict[Steps, float] = {}
     fits: dict[Steps, float] = {}
     for steps in ways:
-        pattern = numbers[frames] - numbers[frames[0]] + _shift(frames, steps)
-        told = stretches.unlikeliness(frames, pattern)
+        told = stretches.unlikeliness(frames, unshifted + _shift(frames, steps))
         if told is not None:
             rare = sum(4.0 * np.log(max(abs(count), 1)) for _, count in steps)
             scores[steps], fits[steps] = told[0] + rare, told[1]

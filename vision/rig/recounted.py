@@ -9,6 +9,7 @@ import numpy as np
 from freeswing.cdpr.files.documents import DataError
 from freeswing.vision.fuse.run_views import CameraViews
 from freeswing.vision.rig.lag_accepted import own_track
+from freeswing.vision.rig.lag_search import OwnTrack
 from freeswing.vision.rig.lost_frames import Loss, Lost, lost_frames
 from freeswing.vision.rig.rig_step import Finding
 
@@ -24,18 +25,19 @@ def recounted(
     """
     now, findings, said = [], [], []
     for view in views:
-        lost = lost_frames(own_track(view))
-        told, own, words = _put_right(view, lost)
+        track = own_track(view)
+        told, own, words = _put_right(view, track, lost_frames(track))
         now.append(told)
         findings += own
         said += words
     return now, findings, said
 
 
-def _put_right(view: CameraViews, lost: Lost) -> tuple[CameraViews, list[Finding], list[str]]:
+def _put_right(
+    view: CameraViews, track: OwnTrack, lost: Lost
+) -> tuple[CameraViews, list[Finding], list[str]]:
     if not (lost.losses or lost.unclear or lost.kinks):
         return view, [], []
-    track = own_track(view)
     frame_at = {float(time): k for k, time in enumerate(view.middle_times())}
     frame_of = [frame_at[float(time)] for time in track.times_s]
     name = view.camera.name

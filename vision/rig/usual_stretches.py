@@ -90,6 +90,10 @@ class Stretches:
         self._place[numbers] = np.arange(len(numbers))
         self._usual: dict[tuple[int, ...], Usual | None] = {}
 
+    def pattern(self, rows: Ints) -> Ints:
+        """How frames (.., n) lie to the first of them."""
+        return self.numbers[rows] - self.numbers[rows[..., :1]]
+
     def alike(self, pattern: Ints) -> Ints:
         """Indices of frames that lie to each other as the pattern does, (stretches, n)."""
         starts = self.numbers[self.numbers <= self.numbers[-1] - pattern[-1]]
@@ -178,8 +182,8 @@ def strained_steps(numbers: Ints, values: Array) -> set[int]:
     """
     least, most = np.full(len(values), np.inf), np.zeros(len(values))
     rows = np.arange(len(numbers) - _TOGETHER + 1)[:, None] + np.arange(_TOGETHER)
-    patterns = numbers[rows] - numbers[rows[:, :1]]
     stretches = Stretches(numbers, values, NO_STEPS)
+    patterns = stretches.pattern(rows)
     for pattern in np.unique(patterns, axis=0):
         if pattern[-1] > _LONGEST or len(alike := stretches.alike(pattern)) < LEAST_STRETCHES:
             continue

@@ -52,22 +52,13 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
     from freeswing.cdpr.effects import catalogue
     from freeswing.cdpr.files.documents import InputError
     from freeswing.cdpr.system.threads import threads
-    from freeswing.doctor.recordings_against_lengths import refuse_mistaken_recordings
-    from freeswing.doctor.robot_file.mistaken_cables import refuse_mistaken_cables
-    from freeswing.doctor.time_stamps import refuse_wrong_stamps
+    from freeswing.doctor.refused_runs import refuse_wrong_runs
     from freeswing.ident.diagnose.diagnose import diagnose
     from freeswing.results.diagnosis import Diagnosis
     from freeswing.results.motion_from_results import ladder_motions
-    from freeswing.session.exchanged_lengths import refuse_exchanged_lengths
     from freeswing.session.load_bench import is_bench
-    from freeswing.session.load_swings import (
-        load_robot,
-        load_swings,
-        load_target,
-        measured_swings,
-    )
+    from freeswing.session.load_swings import load_robot, load_swings, load_target
     from freeswing.session.made import Made
-    from freeswing.session.repeated_runs import refuse_repeated
 
     only = settings["only"]
     for name in only or ():
@@ -85,11 +76,7 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
     candidates = None if only is None else tuple(only)
     with threads(count):
         swings = list(load_swings(session, robot, load_target(session)))
-        refuse_repeated(swings)
-        refuse_mistaken_recordings(swings, robot)
-        refuse_wrong_stamps(measured_swings(session, swings), session.frame_rate_hz)
-        refuse_exchanged_lengths(swings, robot)
-        refuse_mistaken_cables(swings, robot)
+        refuse_wrong_runs(session, swings, robot)
         found = diagnose(swings, robot, console.progress, count, candidates, crew.executor)
     document = Diagnosis.from_json(found.document())
     _summarise(document, console)

@@ -70,25 +70,16 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
     import os
 
     from freeswing.cdpr.system.threads import threads
-    from freeswing.doctor.recordings_against_lengths import refuse_mistaken_recordings
-    from freeswing.doctor.robot_file.mistaken_cables import refuse_mistaken_cables
-    from freeswing.doctor.time_stamps import refuse_wrong_stamps
+    from freeswing.doctor.refused_runs import refuse_wrong_runs
     from freeswing.ident.identify import IdentifySettings, identify
     from freeswing.ident.swing_places import swing_places
     from freeswing.results.identification import Identification
     from freeswing.results.markers import marker_document
     from freeswing.results.motion_from_results import predicted_motions
-    from freeswing.session.exchanged_lengths import refuse_exchanged_lengths
     from freeswing.session.load_bench import is_bench
-    from freeswing.session.load_swings import (
-        load_robot,
-        load_swings,
-        load_target,
-        measured_swings,
-    )
+    from freeswing.session.load_swings import load_robot, load_swings, load_target
     from freeswing.session.made import Made
     from freeswing.session.marker_runs import read_marker_runs
-    from freeswing.session.repeated_runs import refuse_repeated
 
     robot = load_robot(session)
     if is_bench(session, robot):
@@ -98,11 +89,7 @@ def make(session: Session, console: Console, settings: dict[str, Any], crew: Cre
     with threads(count):
         markers = read_marker_runs(session, target)
         swings = load_swings(session, robot, target, markers)
-    refuse_repeated(swings)
-    refuse_mistaken_recordings(swings, robot)
-    refuse_wrong_stamps(measured_swings(session, swings), session.frame_rate_hz)
-    refuse_exchanged_lengths(swings, robot)
-    refuse_mistaken_cables(swings, robot)
+    refuse_wrong_runs(session, swings, robot)
     geometry = _geometry(settings)
     chosen = IdentifySettings(
         weighting=settings["weighting"],

@@ -179,13 +179,9 @@ def _sentence(
 
 def _known(run: SwingRun) -> _Run | None:
     """What a run with full poses knows inside its window; None: too little."""
-    try:
-        part = run.trajectory.window(*run.window_s) if run.window_s else run.trajectory
-    except DataError:  # an empty window is said where the run is prepared
+    part = run.known_poses()
+    if part is None:
         return None
-    if not part.is_pose or not part.is_known.any():
-        return None
-    part = part.take(part.is_known)
     count = max(1, round(MEAN_OF_S / float(np.median(np.diff(part.times_s)))))
     stated = run.lengths_m
     return _Run(part.values, count, stated) if len(part) >= LEAST_MEANS * count else None

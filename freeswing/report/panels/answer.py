@@ -20,7 +20,7 @@ from freeswing.report.space import in_space
 from freeswing.report.words import ESTIMATES, parameter_row, plain, unit_of
 from freeswing.results.common import Parameter
 from freeswing.results.diagnosis import Diagnosis
-from freeswing.results.identification import Body
+from freeswing.results.identification import PLATFORM, Body
 
 NOTHING_MISSING = "The model explains the held-out runs; no effect that they would show is missing."
 IZZ_ABOUT = {"Izz_kg_m2": "about its own centre", "Izz_P_kg_m2": "about P"}
@@ -64,7 +64,7 @@ def objects_told(material: Material) -> list[str]:
     bodies = () if found is None else found.objects or ()
     if diagnosis is not None and diagnosis.accepted and diagnosis.objects_after:
         bodies = diagnosis.objects_after
-    return [f"{one.name}: {_izz(one)}" for one in bodies if one.name != "platform"]
+    return [f"{one.name}: {_izz(one)}" for one in bodies if one.name != PLATFORM]
 
 
 def _izz(body: Body) -> str:

@@ -7,9 +7,14 @@ from typing import Any
 from freeswing.report.bench_words import HALF_WIDTH_95, changed_objects, classic_why, untold
 from freeswing.report.material import Material
 from freeswing.report.words import number, parameter_row
-from freeswing.results.identification import Body, BodyParameter, Budget, ChannelGain, ClassicRow
-
-PLATFORM = "platform"
+from freeswing.results.identification import (
+    PLATFORM,
+    Body,
+    BodyParameter,
+    Budget,
+    ChannelGain,
+    ClassicRow,
+)
 
 
 class BenchPanel:
