@@ -28,7 +28,7 @@ from freeswing.calib.footage.interlacing import torn_text
 from freeswing.cdpr.files.documents import DataError, InputError
 from freeswing.cdpr.measured.trajectory import Trajectory
 from freeswing.cdpr.system.progress import Progress
-from freeswing.vision.fuse.calibration_share import read_calibration_noise
+from freeswing.vision.fuse.calibration_share import CalibrationNoise, read_calibration_noise
 from freeswing.vision.fuse.tag_layout import layout_change, with_layout
 from freeswing.vision.jobs import Job, run_jobs
 from freeswing.vision.look.sightings import collect_sightings
@@ -121,13 +121,14 @@ def track_session(
     paths = run_jobs(jobs, workers, _scaled(progress, 0.0, _FOLLOWING), executor)
     sources = _by_run(pairs, paths)
     told = _scaled(progress, _FOLLOWING, 1.0)
-    tracks = _fuse(sources, watch, results, settings, workers, told)
+    noise = read_calibration_noise(results / "calibration.json", tied=not tied)
+    tracks = _fuse(sources, watch, noise, settings, workers, told)
     change = layout_change([track.layout for track in tracks], watch).against(stated)
     if settings.refine_layout:
         for _ in range(_LAYOUT_ROUNDS):
             refined = layout_change([track.layout for track in tracks], watch)
             watch = with_layout(watch, refined.corners_m)
-            tracks = _fuse(sources, watch, results, settings, workers, told)
+            tracks = _fuse(sources, watch, noise, settings, workers, told)
     tracks = [replace(t, problems=(*remarks[t.name], *t.problems)) for t in tracks]
     document = tracking_document(tracks, watch, change, refined=settings.refine_layout)
     known = {track.name: track.trajectory for track in tracks if track.trajectory is not None}
@@ -198,12 +199,11 @@ def _by_run(
 def _fuse(
     sources: Sequence[tuple[str, tuple[tuple[Camera, tuple[Path, ...]], ...]]],
     watch: Watch,
-    results: Path,
+    noise: CalibrationNoise | None,
     settings: Settings,
     workers: int,
     progress: Progress | None,
 ) -> list[RunTrack]:
-    noise = read_calibration_noise(results / "calibration.json")
     jobs = [
         Job(
             f"{name} fused",

@@ -130,10 +130,11 @@ class TiedTag(Entry):
 
 @entry
 class TiedLayout(Entry):
-    """The places of the platform's tags that cameras were tied by."""
+    """The platform's tags that cameras were tied by; `covariance` with the cameras' numbers."""
 
     worst_mismatch_mm: float | None = None
     tags: tuple[TiedTag, ...] = ()
+    covariance: Covariance | None = absent(default=None)
 
 
 @entry

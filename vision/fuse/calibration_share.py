@@ -3,6 +3,7 @@
 Pixel noise scatters the poses; a calibration that is a little wrong shifts them all alike, and no
 residual shows it. The covariance that `calibrate` leaves in calibration.json is carried through
 the solve: dpose = N^-1 J' W (d rays / d calibration) d calibration, at some instants of each run.
+Where the platform's tags tie the cameras their places are part of it.
 What the runs have in common is kept as modes, each of one standard deviation; `identify` takes
 them as what they are, errors that all poses of the session share.
 """
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 
 from freeswing.calib.camera.lens_models import PARAMETER_NAMES
 from freeswing.calib.verdict.calibration_result import read_camera_covariance
+from freeswing.calib.verdict.platform_layout import read_layout, tag_entries
 from freeswing.cdpr.files.documents import InputError
 from freeswing.cdpr.measured.pose_errors import TERMS, PoseErrors, error_terms, fitted_terms
 from freeswing.vision.fuse.blocks import blocks
@@ -39,7 +41,7 @@ _LEFT_OUT = 1e-4  # of the variance, over all runs
 
 @dataclass(frozen=True, slots=True)
 class CalibrationNoise:
-    """Covariance (n, n) of named numbers such as `cam0.fx` and `cam0.rx_rad`."""
+    """Covariance (n, n) of named numbers such as `cam0.fx`, `platform.tag36h11 3.rx_rad`."""
 
     names: tuple[str, ...]
     matrix: Array
@@ -67,12 +69,21 @@ class RunShare:
     spread: Array
 
 
-def read_calibration_noise(path: Path) -> CalibrationNoise | None:
-    """From calibration.json; None where there is none, or it tells no covariance."""
+def read_calibration_noise(path: Path, *, tied: bool = True) -> CalibrationNoise | None:
+    """From calibration.json; None where there is none, or it tells no covariance.
+
+    Args:
+        path: of the file.
+        tied: whether tags of the platform that tie the cameras are taken where it has them; then
+            their places are off together with the cameras.
+    """
     try:
         told = read_camera_covariance(path)
+        layout = read_layout(path) if tied else None
     except InputError:
         return None
+    if layout is not None and layout.covariance is not None:
+        told = layout.covariance
     return CalibrationNoise(told.names, told.matrix) if np.isfinite(told.matrix).all() else None
 
 
@@ -133,7 +144,7 @@ def pose_slopes(
         fit: how its sightings agree with them.
         views: its cameras.
         watch: what was looked for.
-        names: such as `cam0.fx` and `cam0.line_time_s`.
+        names: such as `cam0.fx`, `cam0.line_time_s` and `platform.tag36h11 3.tx_m`.
 
     Source:
         Triggs et al. 2000, Bundle Adjustment: A Modern Synthesis, sec. 6: what is held changes
@@ -143,7 +154,7 @@ def pose_slopes(
     for block in blocks(views, watch, poses.times_s, poses):
         mine = chosen[(chosen >= block.first) & (chosen < block.first + len(block.starts) - 1)]
         if len(mine):
-            found.append(_pose_slopes(block, poses, views, fit.noise, names, mine, free_of(watch)))
+            found.append(_pose_slopes(block, poses, views, fit.noise, names, mine, watch))
     return np.concatenate(found) if found else np.zeros((0, 6, len(names)))
 
 
@@ -204,14 +215,16 @@ def _pose_slopes(
     corners: Noise,
     names: tuple[str, ...],
     chosen: Ints,
-    free: int,
+    watch: Watch,
 ) -> Array:
     """Change of the pose by the calibration at the chosen instants, (n, 6, n_names)."""
+    free, tags = free_of(watch), _tag_columns(watch, names)
     linear = linearised(block, views, poses)
     residuals, rates, places = linear.residuals, linear.rates, linear.places
     white = whitened(block, corners, views)
     slopes = np.zeros((len(chosen), 6, len(names)))
     for row, k in enumerate(chosen - block.first):
+        turn = poses.rotations[chosen[row]]
         normal, cross = np.zeros((free, free)), np.zeros((free, len(names)))
         for o in range(block.starts[k], block.starts[k + 1]):
             points = int(block.counts[o])
@@ -223,9 +236,32 @@ def _pose_slopes(
             view = views[block.camera_of[o]]
             by_time = rates[o, :m].reshape(points, 2)
             slope = _ray_slopes(view, places[o, :points], by_time, block.rows_px[o], names)
+            if (columns := tags.get(int(block.things[o]))) is not None:
+                slope[:, columns] = _tag_slopes(linear.jacobians[o, :m, :3] @ turn, block.points[o])
             cross += jacobian.T @ white[o, :m, :m] @ slope
         slopes[row, :free] = np.linalg.pinv(normal, hermitian=True) @ cross
     return slopes
+
+
+def _tag_columns(watch: Watch, names: tuple[str, ...]) -> dict[int, list[int]]:
+    """Where the numbers of the places of tags stand among the names, by the tag's index."""
+    at = {name: k for k, name in enumerate(names)}
+    entries = {thing: tag_entries(*tag) for thing, tag in enumerate(watch.tags)}
+    return {
+        thing: [at[name] for name in own]
+        for thing, own in entries.items()
+        if all(name in at for name in own)
+    }
+
+
+def _tag_slopes(by_point: Array, corners_m: Array) -> Array:
+    """How residual rays of a tag's corners (4, 3) change with its shift and turn, (8, 6).
+
+    A corner that moves on the platform moves as it would with the platform: `by_point` (8, 3) is
+    what the rays of the corners do then, along the platform's axes.
+    """
+    arms = np.repeat(corners_m - corners_m.mean(axis=0), 2, axis=0)
+    return -np.concatenate([by_point, np.cross(arms, by_point)], axis=1)
 
 
 def _ray_slopes(

@@ -21,6 +21,7 @@ from freeswing.calib.rig.views import FixedPoints, Views, make_views
 from freeswing.calib.verdict.halves_and_lengths import rigidly_fitted, volume_std_m
 from freeswing.cdpr.files.documents import DataError, dump_toml
 from freeswing.cdpr.files.trajectory_files import read_trajectory
+from freeswing.cdpr.measured.pose_errors import read_pose_errors
 from freeswing.cdpr.measured.target import Tag, Target, write_target
 from freeswing.cdpr.rotation import exp_rotation, invert, log_rotation, transform
 from freeswing.main import main
@@ -332,14 +333,14 @@ def test_the_swings_tie_a_ring(tmp_path, count) -> None:
     error = rms(seen - rigidly_fitted(points, seen))
     assert error < 2e-4, f"{1e3 * error:.3f} mm"
     assert document["layout"]["worst_mismatch_mm"] > 0.2, document["layout"]
-    check_track(tmp_path)
+    check_track(tmp_path, T)
     for camera, one in zip(found, cameras, strict=True):
         late = camera.clock_offset_s - found[0].clock_offset_s
         wanted = one.clock_offset_s - cameras[0].clock_offset_s
         assert abs(late - wanted) < 2e-4, (camera.name, late, wanted)
 
 
-def check_track(folder: Path) -> None:
+def check_track(folder: Path, T_first: np.ndarray) -> None:
     """Tracked by the cameras and tags of one fit: nothing is off, and claims of poses hold.
 
     Both frames are free, 12 numbers: the base is a camera's, and what all tags do together is none
@@ -366,6 +367,22 @@ def check_track(folder: Path) -> None:
 
     z = least_squares(off, np.concatenate([start, np.zeros(6)]), x_scale="jac").fun
     assert np.sqrt(np.mean(z**2)) < 1.5, np.sqrt(np.mean(z.reshape(-1, 6) ** 2, axis=0))
+    check_shared(folder, track, told["runs"][0]["calibration_errors"], T_first)
+
+
+def check_shared(folder: Path, track, told: dict, T_first: np.ndarray) -> None:
+    """The mean error of the poses, no frame freed, by what all poses share: chi-square of six.
+
+    Beyond 20 it is three times in a thousand. By the cameras alone it is 2700 and 2800.
+    """
+    places, turns = swing(track.times_s)
+    places, turns = places @ T_first[:3, :3].T + T_first[:3, 3], T_first[:3, :3] @ turns
+    rates = np.concatenate([np.gradient(places, track.times_s, axis=0), np.zeros_like(places)], 1)
+    turned = log_rotation(track.rotations() @ np.swapaxes(turns, 1, 2))
+    error = np.concatenate([track.positions() - places, turned], axis=1)
+    modes = read_pose_errors(told).at(track.positions(), track.rotations(), rates).mean(axis=0)
+    square = float(error.mean(0) @ np.linalg.solve(modes @ modes.T, error.mean(0)))
+    assert square < 20.0, (square, error.mean(axis=0), np.sqrt(np.sum(modes**2, axis=1)))
 
 
 def rms(off: np.ndarray) -> float:
