@@ -183,7 +183,7 @@ def board_from(table: Mapping[str, object]) -> Board:
             family = str(table.get("family", "tag36h11"))
             tag_dictionary(family)
             columns, rows = int(_number(table, "tagCols")), int(_number(table, "tagRows"))
-            return Board(kind, columns, rows, size, gap, family)
+            return _of_its_tags(Board(kind, columns, rows, size, gap, family))
         if kind == "chessboard" and "targetCols" in table:
             columns, rows = int(_number(table, "targetCols")), int(_number(table, "targetRows"))
             return Board(kind, columns, rows, _number(table, "rowSpacingMeters"))
@@ -199,9 +199,21 @@ def board_from(table: Mapping[str, object]) -> Board:
         family = str(table.get("dictionary", ""))
         tag_dictionary(family)
         legacy = table.get("legacy") is True
-        return Board(kind, columns, rows, square, _number(table, "marker_m"), family, legacy)
+        board = Board(kind, columns, rows, square, _number(table, "marker_m"), family, legacy)
+        return _of_its_tags(board)
     except ValueError as error:
         raise InputError(f"board: {error}") from error
+
+
+def _of_its_tags(board: Board) -> Board:
+    """The board where its dictionary has so many tags."""
+    known = tag_dictionary(board.dictionary).bytesList.shape[0]
+    if board.n_tags > known:
+        raise ValueError(
+            f"{board.columns} by {board.rows} need {board.n_tags} tags, {board.dictionary} has "
+            f"{known}: check its counts and its dictionary"
+        )
+    return board
 
 
 def read_board(path: Path | str) -> Board:

@@ -33,6 +33,8 @@ Array = NDArray[np.float64]
 MOST_CABLES = 8
 # Driven ones may be more than pose and limits need: r = n - 6 spare ones, by a QP above 2.
 MOST_DRIVEN = 24
+# A tenth of the Earth's in mm/s2, and four times Jupiter's.
+LARGEST_GRAVITY_M_S2 = 100.0
 AXIS_TOLERANCE = 1e-6
 SWIVEL_KEYS = ("swivel_x", "swivel_y", "swivel_z")
 INERTIA_TOLERANCE = 1e-9
@@ -161,8 +163,11 @@ def _read_gravity(reader: Reader) -> Array:
     gravity = reader.optional_vector("gravity_m_s2", 3)
     if gravity is None:
         return np.array([0.0, 0.0, -STANDARD_GRAVITY_M_S2])
-    if np.linalg.norm(gravity) == 0.0:
+    size = float(np.linalg.norm(gravity))
+    if size == 0.0:
         reader.add("gravity_m_s2", "is zero; a suspended platform swings only under gravity")
+    elif size > LARGEST_GRAVITY_M_S2:
+        reader.add("gravity_m_s2", f"{size:g} m/s2 are no gravity: this looks like mm/s2")
     return gravity
 
 

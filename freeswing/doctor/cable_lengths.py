@@ -13,7 +13,6 @@ from freeswing.cdpr.model.equations import build_model
 from freeswing.cdpr.robot import Robot
 from freeswing.cdpr.rotation import transform
 from freeswing.doctor.finding import Finding
-from freeswing.doctor.recordings_against_lengths import mistaken_recording
 from freeswing.ident.runs import SwingRun
 from freeswing.session.exchanged_lengths import (
     LENGTH_DIFFERENCE_M,
@@ -62,10 +61,6 @@ def cable_findings(
     model = build_model(robot)
     poses = part.values[part.is_known]
     lengths = evaluate(model.lengths, poses, model.start_values)[0].reshape(len(poses), -1)
-    said, remedy = mistaken_recording(run, robot)
-    if said:
-        yield Finding("error", subject, said, remedy)
-        return
     if not np.isfinite(lengths).all():
         text = "the poses put a cable inside its pulley or on its swivel axis"
         yield Finding("error", subject, text, "check the base frame of the poses and entry_m")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -10,7 +10,8 @@ from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.measured.trajectory import Trajectory
 from freeswing.cdpr.robot import Robot
 from freeswing.doctor.cable_lengths import cable_findings
-from freeswing.doctor.finding import Finding
+from freeswing.doctor.finding import Finding, named_runs
+from freeswing.doctor.recordings_against_lengths import mistaken_recording
 from freeswing.doctor.time_stamps import stamp_findings
 from freeswing.ident.runs import SwingRun
 from freeswing.session.exchanged_lengths import (
@@ -26,6 +27,7 @@ LONGEST_GAP_S = 0.1
 # Beyond every hall; and beside it twenty times the pulleys' own distance, for stadium cameras.
 FARTHEST_M = 100.0
 FARTHEST_REACHES = 20.0
+FAR_REMEDY = "millimetres look so: write metres"
 # Swings of use are 10 mm and more; 0.1 mm is what standing platforms show as noise.
 HARDLY_MOVES_M = 1e-4
 
@@ -50,7 +52,12 @@ def run_findings(
     yield from _missing(subject, part)
     if not part.is_known.any():
         return
-    yield from _places(subject, part, robot)
+    said, remedy = mistaken_recording(run, robot)
+    beyond = _beyond(part, robot)
+    if said or beyond:
+        yield Finding("error", subject, said or beyond, remedy or FAR_REMEDY)
+        return
+    yield from _still(subject, part)
     if part.is_pose:
         yield from cable_findings(subject, run, part, robot)
     elif exchanged := exchanged_at_rest(run, robot)[1]:
@@ -83,16 +90,40 @@ def _missing(subject: str, part: Trajectory) -> Iterator[Finding]:
         yield Finding("warning", subject, text, "markers or tags were hidden there")
 
 
-def _places(subject: str, part: Trajectory, robot: Robot) -> Iterator[Finding]:
-    lengths = [k for k, name in enumerate(part.coordinates) if name in ("x", "y", "z")]
-    if not lengths:
-        return
-    farthest = float(np.nanmax(np.abs(part.values[:, lengths])))
+def refuse_far_platforms(swings: Sequence[SwingRun], robot: Robot) -> None:
+    """Refuse runs that put the platform farther off than any cable holds it.
+
+    Raises:
+        DataError: naming the runs and the columns.
+    """
+    told = [(swing.name, _beyond(swing.inside(), robot)) for swing in swings]
+    wrong = [one for one in told if one[1]]
+    if wrong:
+        names = [name for name, _ in wrong]
+        raise DataError(f"{named_runs(names)}: {wrong[0][1]}; {FAR_REMEDY}")
+
+
+def _positions(part: Trajectory) -> list[int]:
+    return [k for k, name in enumerate(part.coordinates) if name in ("x", "y", "z")]
+
+
+def _beyond(part: Trajectory, robot: Robot) -> str:
+    """Which coordinates reach farther than any cable does; empty where none."""
     reach = float(np.abs(robot.entries_m).max())
-    if farthest > max(FARTHEST_M, FARTHEST_REACHES * reach):
-        text = f"the platform is {farthest:g} m from the origin, the pulleys within {reach:g} m"
-        yield Finding("error", subject, text, "the unit is metres")
-    still = float(np.nanmax(np.nanstd(part.values[:, lengths], axis=0)))
+    limit = max(FARTHEST_M, FARTHEST_REACHES * reach)
+    known = part.values[part.is_known]
+    farthest = {
+        part.coordinates[k]: float(np.abs(known[:, k]).max(initial=0.0)) for k in _positions(part)
+    }
+    said = [f"{name} reaches {far:g} m" for name, far in farthest.items() if far > limit]
+    return f"{', '.join(said)}, the pulleys lie within {reach:g} m" if said else ""
+
+
+def _still(subject: str, part: Trajectory) -> Iterator[Finding]:
+    columns = _positions(part)
+    if not columns:
+        return
+    still = float(np.nanmax(np.nanstd(part.values[:, columns], axis=0)))
     if still < HARDLY_MOVES_M:
         text = f"the platform hardly moves (std {1e3 * still:.3f} mm)"
         yield Finding("warning", subject, text, "set it swinging, or correct window_s")

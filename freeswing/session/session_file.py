@@ -14,6 +14,7 @@ from freeswing.calib.scene.scene_keys import read_scene, read_surveyed
 from freeswing.calib.scene.source import SceneSource
 from freeswing.calib.scene.tape_measured import SurveyedPoint
 from freeswing.cdpr.files.documents import InputError, Problems, Reader, inside, load_toml
+from freeswing.cdpr.files.drive_file import LARGEST_FRAME_M
 from freeswing.cdpr.robot import frozen_array
 from freeswing.cdpr.system.confine import results_folder
 from freeswing.ident.bench.channels import Channel
@@ -314,6 +315,9 @@ def _read_run(reader: Reader, paths: _Paths) -> Run:
         reader.add("trajectory", f"{trajectory.suffix!r} is not one of {allowed}")
     if lengths is not None and (not len(lengths) or (lengths <= 0.0).any()):
         reader.add("cable_lengths_m", f"{lengths.tolist()} must all be > 0")
+    elif lengths is not None and lengths.max() > LARGEST_FRAME_M:
+        said = f"{lengths.max():g} m, more than {LARGEST_FRAME_M:g} m: this looks like mm"
+        reader.add("cable_lengths_m", f"{said}; write metres")
     if window is not None and not window[0] < window[1]:
         reader.add("window_s", f"{window.tolist()}: its end must follow its start")
     has_numbers = lengths is not None and np.isfinite(lengths).all()

@@ -173,7 +173,9 @@ HELD = (
     Held("cdpr/files/mocap/fill_values.py", ("LEAST_FILL",), FILES),
     Held("cdpr/files/trajectory_c3d.py", ("SPARE_SHARE",), FILES),
     Held("cdpr/files/drive_file.py", ("LARGEST_FRAME_M", "LARGEST_DRUM_M"), FILES),
-    Held("cdpr/files/robot_file.py", ("MOST_DRIVEN", "AXIS_TOLERANCE"), FILES),
+    Held(
+        "cdpr/files/robot_file.py", ("MOST_DRIVEN", "AXIS_TOLERANCE", "LARGEST_GRAVITY_M_S2"), FILES
+    ),
     Held("servo/design/pid.py", ("BEYOND_MODES",), LAWS),
     Held("servo/design/lqg.py", ("FILTER_RATIO",), LAWS),
     Held("servo/design/pid.py", ("FILTER",), LAWS),

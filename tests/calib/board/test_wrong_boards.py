@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import replace
 
 import numpy as np
@@ -80,3 +81,10 @@ def test_millimetres_and_marker_sizes_are_said() -> None:
     assert marker_warning(STATED, 0.0005) is None
     assert "90.00" in str(marker_warning(STATED, -0.003))
     assert "87.00 mm" in str(marker_warning(STATED, -0.003))
+
+
+@pytest.mark.parametrize(("rows", "refused"), [(10, False), (11, True)])
+def test_a_board_has_no_more_tags_than_its_dictionary(rows: int, refused: bool) -> None:
+    table = {**BOARD, "dictionary": "DICT_4X4_50", "squares": [10, rows]}
+    with pytest.raises(InputError, match="10 by 11 need 55 tags") if refused else nullcontext():
+        board_from(table)

@@ -99,6 +99,14 @@ def test_a_driven_robot_is_no_larger_than_a_hall(tmp_path, key, value, words):
     assert words in said
 
 
+@pytest.mark.parametrize(("gravity", "refused"), [(99.0, False), (101.0, True)])
+def test_gravity_of_a_hundred_is_none(tmp_path, gravity, refused):
+    head = HEAD.replace("-9.80665", str(-gravity))
+    text = head + "".join(CABLE.format(name=name) for name in "1234")
+    (tmp_path / "robot.toml").write_text(text)
+    assert ("no gravity" in refusal(read_robot, tmp_path / "robot.toml")) == refused
+
+
 @pytest.mark.parametrize(("product", "refused"), [(0.9e-6, False), (1.1e-6, True)])
 def test_swivel_axes_are_perpendicular_to_a_millionth(tmp_path, product, refused):
     tilted = CABLE.replace("swivel_y = [-0.0, -0, -1]", f"swivel_y = [0.0, {product}, -1]")

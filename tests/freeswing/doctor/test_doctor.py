@@ -173,7 +173,7 @@ def test_long_gaps(hidden, levels) -> None:
 def test_places_far_away(x_m, levels) -> None:
     values = np.tile(REST, (601, 1))
     values[:, 0] = x_m
-    assert said(swing(values), "m from the origin") == levels
+    assert said(swing(values), "the pulleys lie within") == levels
 
 
 @pytest.mark.parametrize(("x_m", "levels"), [(1990.0, []), (2010.0, ["error"])])
@@ -181,7 +181,7 @@ def test_places_far_beyond_large_frames(x_m, levels) -> None:
     large = robot(entry_m=np.array([100.0, 0.0, 0.0]))
     values = np.tile(REST, (601, 1))
     values[:, 0] = x_m
-    assert told(run_findings(swing(values), large, None), "m from the origin") == levels
+    assert told(run_findings(swing(values), large, None), "the pulleys lie within") == levels
 
 
 @pytest.mark.parametrize(("std_m", "levels"), [(1.1e-4, []), (0.9e-4, ["warning"])])

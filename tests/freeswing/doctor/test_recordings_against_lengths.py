@@ -130,3 +130,23 @@ def test_a_driven_session_is_told_so_too(
     assert "run ident: quaternions stand as x y z w" in told.out + told.err
     assert "write w into qw" in told.out + told.err
     assert "latency" not in told.out + told.err
+
+
+@pytest.mark.parametrize("command", ["check", "identify", "diagnose"])
+def test_one_column_in_millimetres_is_a_unit_and_no_slack_cable(
+    command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.copytree(SAMPLE, tmp_path / "session")
+    path = tmp_path / "session" / "runs" / "swing-01.csv"
+    head, *rows = path.read_text(encoding="utf-8").splitlines()
+    cells = [row.split(",") for row in rows]
+    z = head.split(",").index("z_m")
+    for row in cells:
+        row[z] = repr(1e3 * float(row[z])) if row[z] else ""
+    path.write_text("\n".join([head, *map(",".join, cells)]) + "\n", encoding="utf-8")
+    assert main([command, str(tmp_path / "session")]) == 1
+    said = "".join(capsys.readouterr())
+    assert "run swing-01" in said
+    assert "z reaches 895" in said
+    assert "write metres" in said
+    assert "slack" not in said

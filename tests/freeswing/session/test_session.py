@@ -160,6 +160,15 @@ def test_paths_may_not_leave_the_folder(tmp_path: Path, place: str) -> None:
         read_session(written(folder, text))
 
 
+@pytest.mark.parametrize(("length", "refused"), [(199.0, False), (201.0, True)])
+def test_lengths_in_millimetres_are_named(tmp_path: Path, length: float, refused: bool) -> None:
+    run = f'name = "a"\nrole = "identify"\ntrajectory = "a.csv"\ncable_lengths_m = [1.5, {length}]'
+    text = f'format = "freeswing-session/1"\nname = "s"\nrobot = "r.toml"\n[[runs]]\n{run}\n'
+    path = written(tmp_path, text)
+    with pytest.raises(InputError, match="looks like mm") if refused else contextlib.nullcontext():
+        read_session(path)
+
+
 def test_a_newer_format_and_no_file_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="update freeswing"):
         read_session(written(tmp_path, WHOLE.replace("session/1", "session/2")))
