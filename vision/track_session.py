@@ -29,7 +29,7 @@ from freeswing.cdpr.files.documents import DataError, InputError
 from freeswing.cdpr.measured.trajectory import Trajectory
 from freeswing.cdpr.system.progress import Progress
 from freeswing.vision.fuse.calibration_share import CalibrationNoise, read_calibration_noise
-from freeswing.vision.fuse.tag_layout import layout_change, with_layout
+from freeswing.vision.fuse.tag_layout import layout_change, never_seen, with_layout
 from freeswing.vision.jobs import Job, run_jobs
 from freeswing.vision.look.sightings import collect_sightings
 from freeswing.vision.look.target_check import examined_watch
@@ -40,6 +40,7 @@ from freeswing.vision.track_run import RunTrack, track_run
 from freeswing.vision.tracking_report import tracking_document
 
 _LAYOUT_ROUNDS = 3
+_NEVER = "seen in no run beside another tag of target.toml: hidden, or its id is another"
 _FOLLOWING = 0.85  # share of the time that goes into the images
 
 
@@ -123,7 +124,9 @@ def track_session(
     told = _scaled(progress, _FOLLOWING, 1.0)
     noise = read_calibration_noise(results / "calibration.json", tied=not tied)
     tracks = _fuse(sources, watch, noise, settings, workers, told)
-    change = layout_change([track.layout for track in tracks], watch).against(stated)
+    layouts = [track.layout for track in tracks]
+    remarks[pairs[0][0]] += [f"{name}: {_NEVER}" for name in never_seen(layouts, watch)]
+    change = layout_change(layouts, watch).against(stated)
     if settings.refine_layout:
         for _ in range(_LAYOUT_ROUNDS):
             refined = layout_change([track.layout for track in tracks], watch)

@@ -74,15 +74,16 @@ def _read(path: Path, size: int, changed_ns: int) -> Presentation | None:
             field_order = getattr(stream.codec_context, "field_order", 0)
         with av.open(str(path)) as container:
             frame = next(container.decode(video=0), None)
-            turn_deg = 0 if frame is None else turn_of(frame)
     except (FFmpegError, OSError) as error:
         raise InputError(f"{path}: cannot be decoded ({error})") from error
+    if frame is None:
+        raise InputError(f"{path}: not one frame can be decoded: copied in part? copy it again")
     ticks = np.unique(np.array(times, dtype=np.int64))
     if len(ticks) < 2 or len(ticks) < len(times) or tick_s <= 0.0:
         return None
     shown, beat_s, even, missing = evened((ticks - ticks[0]) * tick_s, tick_s)
     interlaced = int(field_order) > 1
-    return Presentation(ticks, shown, 1.0 / beat_s, even, missing, turn_deg, interlaced)
+    return Presentation(ticks, shown, 1.0 / beat_s, even, missing, turn_of(frame), interlaced)
 
 
 def turn_of(frame: object) -> int:

@@ -133,8 +133,11 @@ def _beside_container(name: str, stamps: dict[int, float], shown: Presentation) 
     numbers = np.array([number for number in stamps if number < len(shown.times_s)], dtype=int)
     remarks = []
     if len(stamps) != len(shown.times_s):
-        text = f"{name} has {len(stamps)} stamps, the video {len(shown.times_s)} frames"
-        remarks.append(Remark(is_warning=False, text=text))
+        text = (
+            f"{name} has {len(stamps)} stamps, the video {len(shown.times_s)} frames: cut short, "
+            "or frames were lost in between and have the stamps of others"
+        )
+        remarks.append(Remark(is_warning=True, text=text))
     if len(numbers) < 3:
         return remarks
     told = np.array([stamps[int(number)] for number in numbers])

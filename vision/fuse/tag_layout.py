@@ -81,6 +81,12 @@ def layout_change(sums: Sequence[LayoutSums], watch: Watch) -> LayoutChange:
     return LayoutChange(watch.tag_corners_m + moves, change, np.sqrt(variance))
 
 
+def never_seen(sums: Sequence[LayoutSums], watch: Watch) -> list[str]:
+    """Names of the tags that no run shows beside another one, where there are two or more."""
+    seen = np.diag(np.sum([s.normal for s in sums], axis=0))[::6] > 0.0
+    return [watch.name(k) for k in range(len(seen)) if len(seen) > 1 and not seen[k]]
+
+
 def with_layout(watch: Watch, corners_m: Array) -> Watch:
     """The same things to look for with the tags elsewhere on the platform."""
     return replace(watch, tag_corners_m=corners_m)

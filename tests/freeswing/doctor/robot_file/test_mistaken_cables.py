@@ -74,6 +74,7 @@ def test_what_is_right_or_wrong_otherwise_is_not_named() -> None:
     attached = with_cables(lambda _, one: replace(one, attachment_m=one.attachment_m + off))
     assert mistaken_cables(swings(), attached) == ("", "")
     double = radii(2.0, 0, 1, 2, 3)
+    assert mistaken_cables(swings()[:3], double)[0]
     assert mistaken_cables(swings()[:2], double) == ("", "")
     free = tuple(replace(one, trajectory=one.trajectory.select(("x", "y"))) for one in swings())
     assert mistaken_cables(free, double) == ("", "")
