@@ -831,6 +831,9 @@ HELD = (
     ),
     Held("vision/rig/kinks.py", ("MEETS",), "tests/vision/rig/test_lost_frames.py"),
     Held("vision/rig/stamp_jitter.py", ("LEAST_JITTER_S", "_LEAST_FRAMES", "_FLOOR_PX"), START),
+    Held(
+        "vision/rig/stamp_jitter.py", ("_SURE_SIGMAS",), "tests/vision/rig/test_shared_jitter.py"
+    ),
     Held("vision/rig/untied_cameras.py", ("_LEAST_TAGS", "_LEAST_KNOWN"), START),
     Held("calib/rig/bundle_adjustment.py", ("_COMMON_FREEDOM", "_LEAST_FREEDOM"), RIG_START),
     Held("calib/rig/tie_by_shared_boards.py", ("LEAST_SHARED", "_CAP_PX"), RIG_START),

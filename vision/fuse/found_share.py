@@ -1,4 +1,4 @@
-"""What clocks and line times that were found in a run may still be off by, in its poses.
+"""What times of frames may still be off by, in a run's poses: clocks, line times, jitter.
 
 A line time goes with the clock: what a recording tells best is when the middle of its picture was
 taken. So a line time is off about the middle row, and a clock by what is left of its deviation.
@@ -60,6 +60,37 @@ def widened_by_found(
         middle = rows[camera] if told.clock_std_s > 0.0 else 0.0
         rest = max(told.clock_std_s**2 - (middle * told.line_std_s) ** 2, 0.0)
         causes += [told.line_std_s * (by_line - middle * by_clock), np.sqrt(rest) * by_clock]
+    return _widened(poses, np.stack(causes, axis=2))
+
+
+def widened_by_jitter(
+    poses: Poses, fit: Fit, views: Sequence[CameraViews], watch: Watch, jitter_s: Array
+) -> Poses:
+    """Poses whose covariances hold what stamps that jitter put them off by.
+
+    A late camera does not move a pose by its share of the way alone: two that look aslant at each
+    other then meet at another distance.
+
+    Args:
+        poses: of a run.
+        fit: how its sightings agree with them.
+        views: its cameras.
+        watch: what was looked for.
+        jitter_s: deviation of each camera's stamps, one independent of the other, (n_c,).
+
+    Source:
+        Bishop 2006, Pattern Recognition and Machine Learning, sec. 2.3: what is estimated apart
+        adds its covariance through its slope.
+    """
+    if not jitter_s.any() or not poses.known.any() or not len(poses.covariances):
+        return poses
+    names = tuple(f"{view.camera.name}.clock_offset_s" for view in views)
+    return _widened(poses, pose_slopes(poses, fit, views, watch, names) * jitter_s)
+
+
+def _widened(poses: Poses, causes: Array) -> Poses:
+    """The same with the scatter of causes that are told at `share_instants`, (n, 6, m)."""
+    known = np.flatnonzero(poses.known)
     about = int(known[len(known) // 2])
     origin, turn = poses.positions_m[about], poses.rotations[about]
 
@@ -67,7 +98,7 @@ def widened_by_found(
         places, turns = poses.positions_m[chosen], poses.rotations[chosen]
         return error_terms(places, turns, poses.motions[chosen, :6], origin, turn)
 
-    fitted = fitted_terms(terms(share_instants(poses)), np.stack(causes, axis=2))
+    fitted = fitted_terms(terms(share_instants(poses)), causes)
     off = np.einsum("nk,akm->nam", terms(known), fitted)
     covariances = poses.covariances.copy()
     covariances[known] += off @ np.swapaxes(off, 1, 2)

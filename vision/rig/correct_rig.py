@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.rotation import log_rotation
 from freeswing.vision.fuse.corner_noise import LEAST_FLOOR_PX
+from freeswing.vision.fuse.found_share import widened_by_jitter
 from freeswing.vision.fuse.fuse_cameras import Fit, fuse
 from freeswing.vision.fuse.poses import Poses
 from freeswing.vision.fuse.run_views import CameraViews, instants_of
@@ -34,7 +35,12 @@ from freeswing.vision.rig.real_effects import LEAST_CLOCK_S, LEAST_LINE_S, is_re
 from freeswing.vision.rig.recounted import recounted
 from freeswing.vision.rig.rig_kernels import CLOCK, LINE, PER_CAMERA, POSE
 from freeswing.vision.rig.rig_step import Finding, RigStep, frame_squares_px2, iterated, rig_step
-from freeswing.vision.rig.stamp_jitter import stamp_jitter_s, widened_poses, widened_step
+from freeswing.vision.rig.stamp_jitter import (
+    along_the_motion_s,
+    stamp_jitter_s,
+    widened_along,
+    widened_step,
+)
 from freeswing.vision.rig.untied_cameras import untied_shifts
 
 Array = NDArray[np.float64]
@@ -115,8 +121,9 @@ def correct_rig(
     if not (moved or clocks.any() or lines.any()):
         _refuse_contradicting(views, before, jitter)
         views, poses, after, doubt, said = _settled(views, watch, poses, before, survey_std_m)
-        poses = widened_poses(poses, jitter)
-        return Corrected(views, poses, before, after, tuple(lost), (*remarks, *said), doubt)
+        poses, along = _widened(poses, after, views, watch, jitter)
+        remarks = (*remarks, *said, *along)
+        return Corrected(views, poses, before, after, tuple(lost), remarks, doubt)
     final = [
         _decided(view, own, clock, line)
         for view, own, clock, line in zip(current, calibrated, clocks, lines, strict=True)
@@ -126,8 +133,22 @@ def correct_rig(
     _refuse_contradicting(final, after, jitter)
     settled, poses, after, doubt, said = _settled(final, watch, poses, after, survey_std_m)
     findings = (*lost, *_findings(calibrated, settled, moved, clocks, lines, last))
-    poses = widened_poses(poses, jitter)
-    return Corrected(settled, poses, before, after, findings, (*remarks, *said), doubt)
+    poses, along = _widened(poses, after, settled, watch, jitter)
+    return Corrected(settled, poses, before, after, findings, (*remarks, *said, *along), doubt)
+
+
+def _widened(
+    poses: Poses, fit: Fit, views: Sequence[CameraViews], watch: Watch, jitter_s: Array
+) -> tuple[Poses, tuple[str, ...]]:
+    """Poses whose covariances hold jitter of stamps, and what is said of what no camera tells."""
+    poses = widened_by_jitter(poses, fit, views, watch, jitter_s)
+    along_s = along_the_motion_s(poses)
+    if along_s == 0.0:
+        return poses, ()
+    return widened_along(poses, along_s), (
+        f"poses lie along their motion as stamps would put them that jitter by {1e3 * along_s:.2f} "
+        "ms (standard deviation) in all cameras alike: their deviations count it",
+    )
 
 
 def _refuse_contradicting(views: Sequence[CameraViews], fit: Fit, jitter_s: Array) -> None:
@@ -155,14 +176,15 @@ def _motion_sentences(
     """Why what is seen at different times does not fit together, in words."""
     spectrum = None if poses.course is None or len(views) < 2 else poses.course.spectrum
     hz = None if spectrum is None else spectrum.too_fast_hz
+    fast: tuple[str, ...] = ()
     if spectrum is not None and hz is not None:
         rate = 1.0 / spectrum.step_s
-        return (
+        fast = (
             f"the platform swings at {hz:.1f} Hz, or at {rate - hz:.1f} Hz: {rate:.1f} frames a "
             "second do not tell which. What cameras see between each other's frames counts less; "
             "record faster, or let cameras take their frames at the same time",
         )
-    return tuple(
+    return fast + tuple(
         f"{view.camera.name}: its stamps jitter by {1e3 * own:.2f} ms (standard deviation), which "
         "the deviations of poses, clocks and line times count"
         for view, own in zip(views, jitter_s, strict=True)

@@ -3,6 +3,10 @@
 A camera whose frame was stamped late by dt sees the platform along its motion from where the others
 see it. What slow errors do to that dt cancels between neighbouring frames; what is left beyond the
 pixels' noise is the stamps' own.
+
+What all cameras' stamps have wrong alike, or those of one alone, no other tells: even stamps, made
+of a frame's number, hide it. The platform's motion does: poses that are stamped wrong lie before or
+behind where the others put them.
 """
 
 from __future__ import annotations
@@ -31,6 +35,9 @@ _LEAST_FRAMES = 20  # a median of so many steps is good to a fifth
 _FLOOR_PX = 0.03
 """What lenses leave from frame to frame; the fit's own floor may hold the very jitter."""
 _NORMAL_MAD = 1.4826
+_VARIANCE_BY_MAD = 2.33
+"""Relative deviation of a variance by the median of n absolute values, times the root of n."""
+_SURE_SIGMAS = 4.0  # of that: claims that are 10 % off are no jitter of half a minute's frames
 
 
 def stamp_jitter_s(views: Sequence[CameraViews], watch: Watch, poses: Poses, fit: Fit) -> Array:
@@ -96,11 +103,41 @@ def widened_step(step: RigStep, views: Sequence[CameraViews], jitter_s: Array) -
     return replace(step, deviations=deviations)
 
 
-def widened_poses(poses: Poses, jitter_s: Array) -> Poses:
-    """Poses whose covariance holds the shift along the motion that jittering stamps bring."""
-    if not jitter_s.any() or not len(poses.covariances):
+def along_the_motion_s(poses: Poses) -> float:
+    """Jitter that all stamps may have alike, by how poses lie along their motion, 0 without any.
+
+    A bound: all that a pose misses the motion of the others by beyond what both claim is taken for
+    its own, though the others' jitter is in it as well.
+
+    Source:
+        Rousseeuw, Croux 1993, Alternatives to the median absolute deviation, for the scale and
+        its deviation.
+    """
+    if poses.course is None or not len(poses.covariances):
+        return 0.0
+    left = poses.course.left_out()
+    there = poses.known & (np.abs(poses.motions[:, :6]).sum(axis=1) > 0.0)
+    sought = poses.course.deviations > 0.0
+    motion, misses = poses.motions[there, :6][:, sought], left.misses[there][:, sought]
+    weight = np.linalg.inv(poses.covariances[there][:, sought][:, :, sought])
+    pulled = np.einsum("nij,nj->ni", weight, motion)
+    variance = 1.0 / np.einsum("ni,ni->n", pulled, motion)
+    late = variance * np.einsum("ni,ni->n", pulled, misses)
+    variance = variance * (1.0 + left.others[there])
+    sharp = variance <= np.median(variance) if there.any() else there[:0]
+    if sharp.sum() < _LEAST_FRAMES:
+        return 0.0
+    spread = (_NORMAL_MAD * float(np.median(np.abs(late[sharp])))) ** 2
+    claimed = float(np.median(variance[sharp]))
+    if spread < claimed * (1.0 + _SURE_SIGMAS * _VARIANCE_BY_MAD / np.sqrt(sharp.sum())):
+        return 0.0
+    jitter = float(np.sqrt(spread - claimed))
+    return jitter if jitter > LEAST_JITTER_S else 0.0
+
+
+def widened_along(poses: Poses, jitter_s: float) -> Poses:
+    """Poses whose covariance holds the way in so much time."""
+    if jitter_s == 0.0:
         return poses
-    variance = float(np.sum(jitter_s**2)) / len(jitter_s) ** 2  # of the cameras' mean time
-    motion = poses.motions[:, :6]
-    more = variance * motion[:, :, None] * motion[:, None, :]
-    return replace(poses, covariances=poses.covariances + more)
+    motion = poses.motions[:, :6] * jitter_s
+    return replace(poses, covariances=poses.covariances + motion[:, :, None] * motion[:, None, :])

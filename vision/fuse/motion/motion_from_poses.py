@@ -43,6 +43,18 @@ class Carried(NamedTuple):
     variances: Array
 
 
+class LeftOut(NamedTuple):
+    """Poses against the motion that the others make.
+
+    Attributes:
+        misses: of position and small rotation, NaN where no pose is known, (n, 6).
+        others: variance that the others leave of it, in that of a pose's own noise, (n,).
+    """
+
+    misses: Array
+    others: Array
+
+
 @dataclass(frozen=True, slots=True)
 class Course:
     """A run's motion.
@@ -98,6 +110,26 @@ class Course:
         where = where.ravel()
         return Carried(shifts[where], motions[where], variances[where])
 
+    def left_out(self) -> LeftOut:
+        """What each pose misses the motion by that the others make.
+
+        Source:
+            Rasmussen, Williams 2006, Gaussian Processes for Machine Learning, sec. 5.4.2:
+            predictions of what is left out.
+        """
+        n = len(self.times_s)
+        groups = np.arange(-(-n // _TOGETHER))
+        stretch = self._stretches(groups)
+        patterns, waves = stretch.patterns(), self.spectrum.waves()
+        inverses = inverse_covariances(patterns, waves)[patterns.of]
+        pulled = inverses @ stretch.steps
+        at = np.arange(n)
+        group = at // _TOGETHER
+        own = inverses[group, at - stretch.first[group], at - stretch.first[group]]
+        variances = np.divide(1.0, own, out=np.full(n, np.nan), where=self.known)
+        misses = pulled[group, at - stretch.first[group]] * variances[:, None]
+        return LeftOut(misses * self.deviations, variances / waves.noise - 1.0)
+
     def _stretches(self, groups: Ints) -> _Stretches:
         return _stretches(
             self.times_s, self.positions_m, self.rotations, self.known, self.deviations, groups
@@ -105,8 +137,9 @@ class Course:
 
 
 class _Stretches(NamedTuple):
-    """Poses about groups: times (g, w), middle (g,), steps from there in deviations (g, w, 6)."""
+    """Poses about groups: the first (g,), times (g, w), middle, steps from there in deviations."""
 
+    first: Ints
     times_s: Array
     about_s: Array
     steps: Array
@@ -137,7 +170,7 @@ def _stretches(
     steps = np.where(usable[..., None], steps, 0.0)
     scaled = np.where(deviations > 0.0, steps / np.where(deviations > 0.0, deviations, 1.0), 0.0)
     at = times_s[middle]
-    return _Stretches(times_s[index] - at[:, None], at, scaled, usable)
+    return _Stretches(first, times_s[index] - at[:, None], at, scaled, usable)
 
 
 def course_of(
