@@ -27,7 +27,9 @@ def test_jitter_is_measured_and_widens_the_poses(tmp_path) -> None:
     found = 1e-3 * float(said.split("jitter by ")[1].split(" ms")[0])
     assert 0.5 * JITTER_S < found < 1.5 * JITTER_S, said
     track_csv = read_trajectory(folder / "results" / "tracks" / "swing-01.csv")
-    claimed = track_csv.standard_deviations()[:, :3]
+    deviations = track_csv.standard_deviations()
+    assert deviations is not None
+    claimed = deviations[:, :3]
     wrong = errors_m(folder, 0.0)
     size = np.sqrt(np.mean(wrong**2) / np.nanmean(claimed**2))
     assert 0.7 < size < 1.4, f"errors are {size:.2f} times what is claimed"
@@ -51,6 +53,8 @@ def test_jitter_that_all_stamps_share_is_counted(tmp_path) -> None:
         run = json.loads((folder / "results" / "tracking.json").read_text())["runs"][0]
         assert any("lie along their motion" in text for text in run["problems"]), run["problems"]
         track_csv = read_trajectory(folder / "results" / "tracks" / "swing-01.csv")
-        claimed = track_csv.standard_deviations()[:, :3]
+        deviations = track_csv.standard_deviations()
+        assert deviations is not None
+        claimed = deviations[:, :3]
         size = np.sqrt(np.mean(errors_m(folder, 0.0) ** 2) / np.nanmean(claimed**2))
         assert 0.7 < size < 1.3, f"{cameras}: errors are {size:.2f} times what is claimed"
