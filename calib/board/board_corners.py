@@ -171,7 +171,7 @@ def fitted_corners(image: Image, quad: Array, cells: Array) -> TagFit | None:
     right, bottom = np.ceil(high + margin).astype(int) + 1
     window = np.ascontiguousarray(image[top:bottom, left:right])
     rows, columns = np.indices(window.shape)
-    rays = np.stack([columns + left, rows + top], axis=-1).astype(np.float64)
+    rays = np.stack([columns + left, rows + top], axis=-1).astype(np.float32)
     fit = fit_tag(window, rays, quad, quad - [left, top], cells)
     return None if fit is None or fit.explained < _LEAST_EXPLAINED else fit
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from freeswing.calib.tags.corner_kernels import TagImage
+from freeswing.calib.tags.corner_kernels import Rays, TagImage
 from freeswing.calib.tags.pattern_fit import Search, fit_pattern
 from freeswing.calib.tags.tag_map import corners_of_map, map_of_square
 from freeswing.cdpr.compiled.kernels import kernel
@@ -54,7 +54,7 @@ def _box(corners_px: Array, n: int, height: int, width: int) -> NDArray[np.int64
 
 
 @kernel
-def _ray_step(rays: Array, corners_px: Array) -> Array:
+def _ray_step(rays: Rays, corners_px: Array) -> Array:
     """How a pixel to the right and one down change the ray in the tag's middle, (2, 2) columns."""
     middle_u = middle_v = 0.0
     for k in range(4):
@@ -71,7 +71,7 @@ def _ray_step(rays: Array, corners_px: Array) -> Array:
 @kernel
 def fit_guess(
     image: NDArray[np.uint8],
-    rays: Array,
+    rays: Rays,
     guess: Array,
     cells: Array,
     blurs: Array,

@@ -135,7 +135,9 @@ def _fitted(
     guess = camera.normalise(quad)
     if not (np.isfinite(rays).all() and np.isfinite(guess).all()):
         return None
-    fit = fit_tag(window, rays, guess, quad - [left, top], rimmed_cells(family, tag_id))
+    fit = fit_tag(
+        window, rays.astype(np.float32), guess, quad - [left, top], rimmed_cells(family, tag_id)
+    )
     if fit is None:
         return None
     pixels, covariance = to_pixels(camera, fit.rays, fit.rays_covariance)

@@ -25,6 +25,7 @@ from freeswing.calib.tags.tag_map import blur_at_centre
 from freeswing.cdpr.compiled.kernels import kernel
 
 Array = NDArray[np.float64]
+Rays = NDArray[np.float32]
 
 UNKNOWNS = 11
 _FLAT = 4.4  # blur widths from an edge at which nothing of it is left, with a margin
@@ -44,7 +45,7 @@ class TagImage(NamedTuple):
     """
 
     image: NDArray[np.uint8]
-    rays: Array
+    rays: Rays
     ray_step: Array
     cells: Array
     box: NDArray[np.int64]

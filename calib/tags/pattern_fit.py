@@ -270,8 +270,8 @@ def _fit_edges(tag: TagImage, h: Array, state: Array, search: Search, scale: flo
     Its pixels are `TOO_NARROW` where the blur turns out too wide for the cells.
     """
     half = (tag.cells.shape[0] - 2) / 2.0
-    work, stale = new_work(), True
-    pixels = np.empty((0, 0, 0))
+    work, stale = new_work(), False
+    pixels = edge_pixels(tag, h, state[2], search.most_pixels)
     count, noise, last = 0.0, 0.0, 1e9
     for turn in range(MOST_EDGE_PASSES):
         if stale:

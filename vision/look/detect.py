@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.calib.camera.camera import Camera
+from freeswing.calib.tags.corner_kernels import Rays
 from freeswing.calib.tags.corners import FIRST_BLURS_PX, TagFit, fit_tag, rimmed_cells
 from freeswing.calib.tags.tag_patterns import cut_dictionary
 
@@ -70,7 +71,7 @@ class TagFinder:
 
 
 def detect_tags(
-    image: Image, camera: Camera, rays: Array, tags: Sequence[TagKey], finder: TagFinder
+    image: Image, camera: Camera, rays: Rays, tags: Sequence[TagKey], finder: TagFinder
 ) -> dict[TagKey, TagFit]:
     """Tags in the whole image with fitted corners; what does not fit its pattern is left out.
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from freeswing.calib.camera import lens_models
 from freeswing.calib.camera.camera import Camera
+from freeswing.calib.tags.corner_kernels import Rays
 from freeswing.calib.tags.corners import (
     FIRST_BLURS_PX,
     TagFit,
@@ -86,7 +87,7 @@ class Follower:
     before: dict[int, Look] = field(default_factory=dict)
     misses: int = 0
     count: int = 0
-    _rays: Array = field(init=False, repr=False)
+    _rays: Rays = field(init=False, repr=False)
     _finder: TagFinder = field(init=False, repr=False)
     _plates: Plates = field(init=False, repr=False)
     _lens: tuple[bool, Array, Array] = field(init=False, repr=False)

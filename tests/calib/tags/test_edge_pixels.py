@@ -75,7 +75,7 @@ def both(side_px: float, blur: float, most: float = 1e9):
     return (
         deviation_of(whole.normal),
         deviation_of(edges.normal),
-        int(pixels[:, COUNTS].sum()),
+        int(pixels.fields[:, COUNTS].sum()),
         float(whole.pixels),
     )
 
@@ -114,6 +114,25 @@ def corner_errors(side_px: float, blur: float, draws: int, noise: float, off_px=
         errors.append((fit.rays - corners).ravel())
         covariances.append(fit.rays_covariance)
     return np.array(errors), np.array(covariances)
+
+
+def test_pixels_without_a_ray_count_nothing() -> None:
+    """A lens has no ray beyond its rim; what is told of the rest stays as it is."""
+    corners, cells = square(80.0), rimmed_cells("tag36h11", 5)
+    image, without = exposed(drawn(corners, 0.76), 0), GRID.copy()
+    left = int(corners[:, 0].min())
+    without[:, left - 2 : left + 4] = np.nan
+    whole, fit = (
+        fit_tag(
+            image, rays, corners, corners, cells, blurs_px=(0.76,), before=(*LEVELS, 0.76, NOISE)
+        )
+        for rays in (GRID, without)
+    )
+    assert whole is not None
+    assert fit is not None
+    assert 0.7 * whole.pixels < fit.pixels < 0.95 * whole.pixels
+    off = np.abs(fit.rays - corners).max()
+    assert off < 0.05, f"{off:.3f} px off"
 
 
 def test_80_px_corners_come_close_to_their_bound() -> None:
