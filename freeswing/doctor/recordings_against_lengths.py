@@ -28,6 +28,8 @@ from freeswing.ident.runs import SwingRun
 # Geometry known to a centimetre moves lengths by some mm along a swing: more is another matter,
 # and a reading that leaves more is not the one that was meant.
 LENGTHS_OFF_M = 0.02
+LEFT_BY_A_SLIP = 0.05
+"""Of what is wrong as recorded: geometry that is right leaves some millimetres of 20 and more."""
 UNITS_M = {"millimetres": 1e-3, "centimetres": 1e-2, "inches": 0.0254, "feet": 0.3048}
 SAMPLES_TRIED = 200
 """Looked at of a run; cables that keep their length keep it in any of them."""
@@ -59,6 +61,7 @@ class _Reading:
     said: tuple[str, ...]
     remedies: tuple[str, ...]
     values: Array | None = None
+    is_slip: bool = False
 
 
 def mistaken_recording(run: SwingRun, robot: Robot) -> tuple[str, str]:
@@ -79,8 +82,12 @@ def mistaken_recording(run: SwingRun, robot: Robot) -> tuple[str, str]:
     if found < LENGTHS_OFF_M:
         return "", ""
     readings = [*_readings(part, model), *_orders(part, robot), *_turns(part, model)]
+    readings += _slips(part, robot)
     stated = run.lengths_m
     off = np.array([_lengths_off(one.model, one.poses, stated, one.values) for one in readings])
+    # An end that is really elsewhere may come near one of many slips, but not that near.
+    slips = np.array([one.is_slip for one in readings])
+    off[slips & (off > LEFT_BY_A_SLIP * found)] = np.inf
     most = min(LEFT_OVER * found, LENGTHS_OFF_M)
     if off.min() > most:
         return "", ""
@@ -160,6 +167,39 @@ def _orders(part: Trajectory, robot: Robot) -> Iterator[_Reading]:
             names = ", ".join(cables[k].name for k in moved)
             said = f"robot.toml has {key} of cables {names} in each other's place"
             yield _Reading(part, model, (said,), (do,), values)
+
+
+def _slips(part: Trajectory, robot: Robot) -> Iterator[_Reading]:
+    """One end of one cable with a sign turned, two numbers exchanged or a decimal point moved."""
+    part = _thinned(part)
+    model = build_model(robot, tuple(ENDS))
+    for effect, (key, _) in ENDS.items():
+        for k, cable in enumerate(robot.cables):
+            own = np.array(getattr(cable, key))
+            for said, meant in _slipped(own):
+                moved = np.zeros((robot.n_cables, 3))
+                moved[k] = meant - own
+                values = np.zeros(len(model.parameters))
+                values[model.place_of(effect)] = moved.ravel()
+                said = f"robot.toml has {said} in {key} of cable {cable.name}"
+                yield _Reading(part, model, (said,), ("correct it",), values, is_slip=True)
+
+
+def _slipped(point: Array) -> Iterator[tuple[str, Array]]:
+    """How a point may have been meant, (3,), and what then was done wrong."""
+    for k, axis in enumerate("xyz"):
+        for said, factor in (
+            ("the sign of {} turned", -1.0),
+            ("{} ten times too large", 0.1),
+            ("{} ten times too small", 10.0),
+        ):
+            meant = point.copy()
+            meant[k] *= factor
+            yield said.format(axis), meant
+        following = (k + 1) % 3
+        order = list(range(3))
+        order[k], order[following] = order[following], order[k]
+        yield f"{axis} and {'xyz'[following]} exchanged", point[order]
 
 
 def refuse_mistaken_recordings(swings: Sequence[SwingRun], robot: Robot) -> None:

@@ -111,6 +111,6 @@ def changed_objects(document: Diagnosis) -> list[tuple[str, str]]:
             next((row for row in one.parameters if row.name == "Izz_kg_m2"), None)
             for one in (before, after)
         ]
-        told = [object_row(row).removeprefix("Izz_kg_m2").strip() for row in rows if row]
-        found.append((after.name, f"Izz {told[0]} kg m2 before, {told[-1]} after"))
+        told = [" ".join(object_row(row).split()).removeprefix("Izz ") for row in rows if row]
+        found.append((after.name, f"Izz {told[0]} before, {told[-1]} after"))
     return found

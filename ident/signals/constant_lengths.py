@@ -30,7 +30,7 @@ def mean_lengths(model: Model, signals: Signals) -> Array:
     if not off[worst] <= LENGTH_LIMIT_M:
         raise UnusableRunError(
             f"cable {model.robot.cables[worst].name} is off its mean length by up to "
-            f"{1e3 * off[worst]:.1f} mm (limit {1e3 * LENGTH_LIMIT_M:g} mm): slack, or its winch "
-            "was not locked"
+            f"{1e3 * off[worst]:.1f} mm (limit {1e3 * LENGTH_LIMIT_M:g} mm): slack, its winch "
+            "was not locked, or robot.toml has its ends wrong"
         )
     return mean

@@ -14,6 +14,8 @@ from freeswing.cdpr.files.robot_file import read_robot
 from freeswing.cdpr.files.trajectory_files import read_trajectory
 from freeswing.cdpr.measured.quaternion_readings import READINGS
 from freeswing.cdpr.measured.trajectory import Trajectory
+from freeswing.cdpr.model.equations import build_model
+from freeswing.doctor import recordings_against_lengths
 from freeswing.doctor.recordings_against_lengths import mistaken_recording
 from freeswing.ident.runs import SwingRun
 from freeswing.main import main
@@ -92,6 +94,58 @@ def test_cables_with_ends_of_each_other_and_a_turned_platform_are_named() -> Non
 
 
 @pytest.mark.parametrize(
+    ("key", "meant", "said"),
+    [
+        ("attachment_m", lambda p: p * [1.0, -1.0, 1.0], "the sign of y turned in attachment_m"),
+        ("attachment_m", lambda p: p[[1, 0, 2]], "x and y exchanged in attachment_m"),
+        ("entry_m", lambda p: p[[0, 2, 1]], "y and z exchanged in entry_m"),
+        ("entry_m", lambda p: p * [0.1, 1.0, 1.0], "x ten times too small in entry_m"),
+        ("entry_m", lambda p: p * [1.0, 10.0, 1.0], "y ten times too large in entry_m"),
+    ],
+)
+def test_a_slip_in_one_end_of_one_cable_is_named(key, meant, said) -> None:
+    """All runs had been left out, their cable slack."""
+    run = SwingRun("a", "identify", read_trajectory(SAMPLE / "runs" / "swing-01.csv"))
+    one, *others = ROBOT.cables
+    wrong = replace(one, **{key: meant(np.array(getattr(one, key)))})
+    told, remedy = mistaken_recording(run, replace(ROBOT, cables=(wrong, *others)))
+    assert told.startswith(f"robot.toml has {said} of cable {one.name}"), told
+    assert remedy == "correct it"
+
+
+def test_an_end_that_is_elsewhere_is_no_slip() -> None:
+    """Displaced by 40 to 200 mm anyhow, and a slip that is near leaves a tenth."""
+    run = SwingRun("a", "identify", read_trajectory(SAMPLE / "runs" / "swing-01.csv"))
+    one, *others = ROBOT.cables
+    rng = np.random.default_rng(7)
+    for key in ("entry_m", "attachment_m"):
+        for size in (0.04, 0.1, 0.2, 0.2, 0.2):
+            step = rng.normal(size=3)
+            moved = np.array(getattr(one, key)) + size * step / np.linalg.norm(step)
+            robot = replace(ROBOT, cables=(replace(one, **{key: moved}), *others))
+            assert mistaken_recording(run, robot) == ("", "")
+
+
+@pytest.mark.parametrize(("left", "named"), [(0.049, True), (0.051, False)])
+def test_what_a_slip_may_leave(monkeypatch, left, named) -> None:
+    room = "freeswing.doctor.recordings_against_lengths"
+    off, meant = chain([1.0], repeat(0.3)), build_model(ROBOT)
+    monkeypatch.setattr(
+        f"{room}._lengths_off",
+        lambda model, *_: left * 0.2 if model is meant else next(off) * 0.2,
+    )
+    still = Trajectory.from_poses(np.arange(9.0), np.zeros((9, 3)), np.tile(np.eye(3), (9, 1, 1)))
+    slip = recordings_against_lengths._Reading(
+        still, meant, ("a slip",), ("correct it",), None, is_slip=True
+    )
+    for name in ("_orders", "_turns", "_readings"):
+        monkeypatch.setattr(f"{room}.{name}", lambda *_: iter(()))
+    monkeypatch.setattr(f"{room}._slips", lambda *_: iter([slip]))
+    monkeypatch.setattr(f"{room}.build_model", lambda _: None)
+    assert bool(mistaken_recording(SwingRun("a", "identify", still), ROBOT)[0]) == named
+
+
+@pytest.mark.parametrize(
     ("off_m", "left_m", "named"),
     [
         (0.0205, 0.001, True),
@@ -109,6 +163,7 @@ def test_what_is_left_by_the_right_reading(monkeypatch, off_m, left_m, named) ->
         "freeswing.doctor.recordings_against_lengths._lengths_off", lambda *_: next(off)
     )
     monkeypatch.setattr("freeswing.doctor.recordings_against_lengths._orders", lambda *_: iter(()))
+    monkeypatch.setattr("freeswing.doctor.recordings_against_lengths._slips", lambda *_: iter(()))
     monkeypatch.setattr("freeswing.doctor.recordings_against_lengths.build_model", lambda _: None)
     still = Trajectory.from_poses(np.arange(9.0), np.zeros((9, 3)), np.tile(np.eye(3), (9, 1, 1)))
     assert bool(mistaken_recording(SwingRun("a", "identify", still), ROBOT)[0]) == named
