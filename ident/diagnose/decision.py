@@ -12,12 +12,12 @@ from freeswing.cdpr.robot import Array
 from freeswing.ident.diagnose.leave_one_out import Score
 from freeswing.ident.diagnose.lengths.stated_lengths import lengths_off
 from freeswing.ident.diagnose.lengths.wrong_places import WrongPlace
-from freeswing.ident.diagnose.model_probabilities import LeftOut, Rival, model_probabilities
+from freeswing.ident.diagnose.model_probabilities import LeftOut, model_probabilities
 from freeswing.ident.diagnose.refit import Refit, plausible
-from freeswing.ident.diagnose.screen import known_rows
+from freeswing.ident.diagnose.sets.fits_as_rivals import rival_of
+from freeswing.ident.diagnose.sets.ways import Exchange, Way
 from freeswing.ident.diagnose.spectrum import independent_numbers
-from freeswing.ident.diagnose.variants import effect_of, inside, variants
-from freeswing.ident.likelihood.joint_problem import INERTIA_UNIT
+from freeswing.ident.diagnose.variants import effect_of, inside
 
 # How many are fitted at a time beyond those that promise so near to the best, and what is not
 # worth a fit.
@@ -48,9 +48,6 @@ CONFOUNDED_DIFFERENCE = 12.0
 CLEARLY_LIKELIER = 1.0 / 3.0
 LEAST_EXCESS = 0.005
 CONTRADICTED = 0.15
-# Inertias are anywhere within so many of their usual sizes: a centre of mass within half a metre,
-# moments of a radius within 45 cm, those of platforms of a metre.
-INERTIA_RANGE = 10.0
 # Effects whose best mixture explains less than this of the excess are the nearest, not the cause.
 LEAST_SHARE_EXPLAINED = 0.75
 # What is not the cause shows in the residuals, or in runs left out although each run by itself is
@@ -92,6 +89,8 @@ class Decision:
         key: the winner's, or "".
         group: effects that held-out runs cannot tell from it, its own among them.
         rival: the fit with the likeliest other effect of the group, or None.
+        instead: those of the group that may be wrong instead by other parts than are in the model.
+        exchange: what may be there instead of the winner, or although nothing won.
     """
 
     candidates: tuple[Candidate, ...]
@@ -99,6 +98,8 @@ class Decision:
     key: str = ""
     group: tuple[str, ...] = ()
     rival: Refit | None = None
+    instead: tuple[str, ...] = ()
+    exchange: Exchange | None = None
 
 
 def by_lengths(place: WrongPlace, share: float) -> tuple[Candidate, ...]:
@@ -228,7 +229,17 @@ def decided(
         )
     others = [n for n in passed if effect_of(n) in group and effect_of(n) != effect_of(key)]
     rival = max(others, key=lambda n: chances[n], default="")
-    return Decision(tuple(candidates), passed.get(key), key, group, passed.get(rival))
+    unsure = None if key else _unsure(current, tried, chances)
+    winner, rival_fit = passed.get(key), passed.get(rival)
+    return Decision(tuple(candidates), winner, key, group, rival_fit, exchange=unsure)
+
+
+def _unsure(current: Refit, tried: dict[str, Refit], chances: dict[str, float]) -> Exchange | None:
+    """What may be there though it was refused, the likeliest first: nothing impossible is."""
+    likely = sorted((n for n in tried if chances[n] > RIVAL), key=lambda n: -chances[n])
+    ways = [Way((n,), chances[n], tried[n]) for n in likely if not plausible(tried[n], n)]
+    nothing = 1.0 - sum(chances.values())
+    return Exchange((), nothing, (current,), tuple(ways)) if ways else None
 
 
 def probabilities(current: Refit, tried: dict[str, Refit], noise_scales: Array) -> dict[str, float]:
@@ -238,7 +249,7 @@ def probabilities(current: Refit, tried: dict[str, Refit], noise_scales: Array) 
     """
     counts = current.evidence.counts
     independent = independent_numbers(current.fit, noise_scales)
-    rivals = [_rival(current, ""), *(_rival(one, key) for key, one in tried.items())]
+    rivals = [rival_of(current), *(rival_of(one, key) for key, one in tried.items())]
     weights = model_probabilities(rivals, counts, independent)
     return dict(zip(tried, weights[1:].tolist(), strict=True))
 
@@ -246,26 +257,6 @@ def probabilities(current: Refit, tried: dict[str, Refit], noise_scales: Array) 
 def included(fewer: Refit, more: Refit, key: str, noise_scales: Array) -> float:
     """Probability that what a fit has beside another is there, of these two alone."""
     return probabilities(fewer, {key: more}, noise_scales)[key]
-
-
-def _rival(one: Refit, key: str) -> Rival:
-    """A fit as a model among others; `key` is what it has beside the current one, or "".
-
-    What each run has for itself was eliminated with the run's state: it counts by what the run's
-    own data leave of it. Errors that all poses share are unknowns of every model.
-    """
-    fit = one.fit
-    columns = np.flatnonzero(fit.free)
-    linear = one.evidence.subset(columns)
-    known = known_rows(fit.model, fit.values, fit.samples)[:, one.evidence.columns(columns)]
-    size = len(INERTIA_UNIT)
-    body = np.zeros((size, known.shape[1]))
-    body[:, :size] = np.diag(1.0 / (INERTIA_RANGE * INERTIA_UNIT))
-    prior = np.vstack([body, known[np.abs(known[:, :-1]).sum(axis=1) > 0.0]])
-    tries = 0.0
-    if key:
-        tries = float(np.log(len(variants(fit.model.robot, effect_of(key)))))
-    return Rival(linear.triangles, prior, int(bool(key)), tries, linear.own)
 
 
 def delta_bic(current: Refit, one: Score, key: str, colour: float) -> float:

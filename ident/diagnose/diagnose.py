@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -15,7 +15,7 @@ from freeswing.cdpr.model.equations import build_model
 from freeswing.cdpr.robot import POSE_COORDINATES, Array, Robot
 from freeswing.cdpr.system.progress import Progress
 from freeswing.ident.diagnose.answer.decay import swing_decay
-from freeswing.ident.diagnose.answer.deviations import honest_covariance
+from freeswing.ident.diagnose.answer.deviations import honest_covariance, with_ways
 from freeswing.ident.diagnose.answer.entries import (
     accepted_entries,
     candidate_entry,
@@ -51,6 +51,7 @@ from freeswing.ident.diagnose.heldout import HeldOut, held_out
 from freeswing.ident.diagnose.lengths.wrong_places import Kinematics
 from freeswing.ident.diagnose.refit import Refit
 from freeswing.ident.diagnose.search import Round, Search
+from freeswing.ident.diagnose.sets.exchange import sentence
 from freeswing.ident.diagnose.unexplained import Unexplained, unexplained
 from freeswing.ident.diagnose.variants import effect_of
 from freeswing.ident.fidim.fidim_stage import How, fidim_estimates
@@ -265,8 +266,17 @@ def _told(
     is_missing = won or _follows_badly(last, rest)
     check = check or gravity_unasked(accepted, last, is_missing, scales)
     rest = with_unmet(suspected(rest, check) if check else rest, rungs[-1].held_out)
+    told = [one.decision.exchange for one in _counting(search.rounds, accepted)]
+    for exchange in filter(None, told):
+        spread = with_ways(spread, final, exchange)
+        notes += filter(None, [sentence(exchange)])
     spreads = honest_covariance(first, begun), with_settled(spread, last) if held else spread
     return _Told(last, accepted, rest, rungs, first, final, spreads)
+
+
+def _counting(rounds: Sequence[Round], accepted: Sequence[Round]) -> list[Round]:
+    """Those that count, and the last one where nothing won in it."""
+    return [*accepted, *(one for one in rounds[-1:] if one.decision.winner is None)]
 
 
 def _kept_from_dynamics(

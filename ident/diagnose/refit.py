@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -211,6 +211,48 @@ def displaced(
     unknowns = with_effect_values(unknowns, known, values)
     swings = Swings(known, found.samples, scales)
     return polished(_ranked(swings, unknowns, found.cost), noise_scales)
+
+
+def exchanged(
+    found: LikelihoodFit,
+    key: str,
+    places: Sequence[str],
+    values: Mapping[str, Array],
+    noise_scales: Array,
+) -> Refit:
+    """A fit with other places in it instead of one, from where it stands, converged.
+
+    Args:
+        found: the fit.
+        key: of the place that leaves.
+        places: keys of those that come.
+        values: to begin with, of the whole effects of `places`, (k,) each.
+        noise_scales: of metres and radians, (2,).
+
+    Raises:
+        ValueError: when that start cannot be followed.
+    """
+    model, unknowns = _freed_of(found, key)
+    for place in places:
+        begun = values[effect_of(place)]
+        model, unknowns = _joined(model, unknowns, place, begun, len(found.samples))
+    together = effect_values(unknowns, model)
+    for place in places:
+        together[model.place_of(effect_of(place))] = values[effect_of(place)]
+    unknowns = with_effect_values(unknowns, model, together)
+    swings = Swings(model, found.samples, found.scales)
+    return polished(_ranked(swings, unknowns, found.cost), noise_scales)
+
+
+def _freed_of(found: LikelihoodFit, key: str) -> tuple[Model, Unknowns]:
+    """A fit's model and unknowns without one place; parts of its kind that are not it stay."""
+    name, model, unknowns = effect_of(key), found.model, found.unknowns
+    block, mine = unknowns.block(name), inside(model.robot, key)
+    if not (block.mask & ~mine).any():
+        return without_effect(model, name), unknowns.without(name)
+    start = np.array([p.start for p in model.parameters[model.place_of(name)]])
+    value = np.where(mine, start, block.value)
+    return model, unknowns.exchanged(replace(block, value=value, estimated=block.mask & ~mine))
 
 
 def polished(found: LikelihoodFit, noise_scales: Array) -> Refit:

@@ -42,6 +42,7 @@ from freeswing.ident.diagnose.refit import (
     Refit,
     colour_of,
     displaced,
+    exchanged,
     freed,
     polished,
     refit,
@@ -49,6 +50,8 @@ from freeswing.ident.diagnose.refit import (
     without,
 )
 from freeswing.ident.diagnose.screen import Screen, screen
+from freeswing.ident.diagnose.sets.exchange import decisions, exchange
+from freeswing.ident.diagnose.sets.ways import Places
 from freeswing.ident.diagnose.spectrum import Residual, too_small
 from freeswing.ident.diagnose.variants import effect_of, inside, variants
 from freeswing.ident.likelihood.fit_swings import LikelihoodFit
@@ -110,7 +113,8 @@ class Search:
                 if index and (lacks_little(current) or too_small(current.fit)):
                     break
                 done = self._round(current, index)
-                self.rounds.append(done)
+                self.rounds += self._instead(done, index)
+                done = self.rounds[-1]
                 if done.decision.winner is None:
                     break
                 current = done.after
@@ -200,6 +204,43 @@ class Search:
             removed.append(name)
         stand_in = outdone(decision, tried)
         return Round(current, replace(decision, winner=found), tuple(removed), stand_in=stand_in)
+
+    def _instead(self, done: Round, index: int) -> list[Round]:
+        """What stands for a round, its place held against sets of places (`sets.exchange`)."""
+        decision = done.decision
+        if decision.winner is None:
+            return [done]
+        self._tell(
+            f"round {index + 1}: places that may be wrong instead", (index + 0.95) / MOST_ROUNDS
+        )
+        told = exchange(
+            done.before,
+            decision.winner,
+            decision.key,
+            self._left(done.before),
+            self.noise_scales,
+            partial(self._of_sets, decision.winner, decision.key),
+        )
+        if told is None:
+            return [done]
+        before, rounds = done.before, []
+        for one in decisions(decision, told):
+            rounds.append(replace(done, before=before, decision=one))
+            before = rounds[-1].after
+        return rounds
+
+    def _of_sets(
+        self, found: Refit, key: str, begun: Sequence[tuple[Places, dict[str, Array]]]
+    ) -> dict[Places, Refit]:
+        """Fits with sets of places in place of one, without those that cannot be followed."""
+        pool = self.pool
+        jobs = {one: (found, key, one, values, self.noise_scales) for one, values in begun}
+        calls = {
+            one: pool.submit(_of_set, *job).result if pool else partial(_of_set, *job)
+            for one, job in jobs.items()
+        }
+        made = {one: call() for one, call in calls.items()}
+        return {one: refitted for one, refitted in made.items() if refitted is not None}
 
     def _left(self, current: Refit) -> list[str]:
         """Keys of what is not in the model yet: whole effects, and parts of any."""
@@ -295,6 +336,15 @@ def _job(
 ) -> Refit | None:
     try:
         return refit(current.fit, name, values, noise_scales, colour)
+    except ValueError:
+        return None
+
+
+def _of_set(
+    found: Refit, key: str, places: Places, values: dict[str, Array], noise_scales: Array
+) -> Refit | None:
+    try:
+        return exchanged(found.fit, key, places, values, noise_scales)
     except ValueError:
         return None
 

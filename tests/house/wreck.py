@@ -315,7 +315,7 @@ HELD = (
         ("LARGEST_EXCESS_LEFT",),
         "tests/ident/diagnose/test_search.py",
     ),
-    Held("ident/diagnose/decision.py", ("INERTIA_RANGE",), RESIDUALS),
+    Held("ident/diagnose/sets/fits_as_rivals.py", ("INERTIA_RANGE",), RESIDUALS),
     Held("ident/diagnose/backward_removal.py", ("LARGEST_RISE",), RESIDUALS),
     Held(
         "ident/diagnose/spectrum.py",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,8 @@ from freeswing.cdpr.effects import effect_named
 from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.robot import Array
 from freeswing.ident.diagnose.refit import Refit
+from freeswing.ident.diagnose.sets.ways import Exchange
+from freeswing.ident.likelihood.blocks import INERTIA
 from freeswing.ident.likelihood.fit_swings import LikelihoodFit
 
 AXES = ("x", "y", "z")
@@ -36,6 +39,39 @@ def honest_covariance(found: LikelihoodFit, scored: Refit) -> Array:
     safe = np.where(stds > 0.0, stds, 1.0)
     factors = np.where(np.isfinite(stds), np.maximum(1.0, jackknife / safe), 1.0)
     return found.covariance * np.outer(factors, factors)
+
+
+def with_ways(covariance: Array, final: LikelihoodFit, told: Exchange) -> Array:
+    """A covariance of the shared unknowns with what other ways than the one told make of them.
+
+    Inertia counts, and values of effects that both ways have.
+
+    Args:
+        covariance: of the final fit's, (p, p).
+        final: that fit.
+        told: the way that stands in it, and those that may be instead.
+
+    Source:
+        Bishop 2006, Pattern Recognition and Machine Learning, sec. 2.3.9: moments of a mixture,
+        here about the values that are told.
+    """
+    wider, stands = covariance.copy(), told.fits[-1].fit
+    for probability, other in ((way.probability, way.fit.fit) for way in told.ways):
+        fits = (final, stands, other)
+        common = [n for n in stands.model.effects if all(n in one.model.effects for one in fits)]
+        where = [one.unknowns.columns(INERTIA, *common) for one in fits]
+        both = np.all([one.free[k] for one, k in zip(fits, where, strict=True)], axis=0)
+        mine, here, there = (k[both] for k in where)
+        away = _values(other, common)[both] - _values(stands, common)[both]
+        more = other.covariance[np.ix_(there, there)] - stands.covariance[np.ix_(here, here)]
+        sizes, axes = np.linalg.eigh(more)
+        more = (axes * np.maximum(sizes, 0.0)) @ axes.T
+        wider[np.ix_(mine, mine)] += probability * (np.outer(away, away) + more)
+    return wider
+
+
+def _values(found: LikelihoodFit, effects: Sequence[str]) -> Array:
+    return np.concatenate([found.value(name) for name in (INERTIA, *effects)])
 
 
 def chance_of_nothing(found: LikelihoodFit, covariance: Array, name: str) -> float:

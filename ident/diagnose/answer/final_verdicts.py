@@ -15,8 +15,10 @@ def rivals_of(accepted: Sequence[Round]) -> dict[str, tuple[str, ...]]:
     winners = {effect_of(one.decision.key) for one in accepted}
     found = {}
     for one in accepted:
-        name = effect_of(one.decision.key)
-        found[name] = tuple(n for n in one.decision.group if n == name or n not in winners)
+        name, told = effect_of(one.decision.key), one.decision
+        found[name] = tuple(
+            n for n in told.group if n == name or n not in winners or n in told.instead
+        )
     return found
 
 
@@ -43,7 +45,7 @@ def final_verdicts(
                 candidate = replace(candidate, verdict="rejected", confounded_with=())
             known = words.get(candidate.effect)
             if stays and candidate.effect in together:
-                candidate = _beside(candidate, together)
+                candidate = _beside(candidate, together.difference(one.decision.instead))
             first = candidate.effect == effect_of(one.decision.key)
             if known is None or known.verdict == "rejected" or (stays and first):
                 words[candidate.effect] = candidate

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from freeswing.cdpr.effects.base import Parameter
-from freeswing.ident.diagnose import decision, spectrum
+from freeswing.ident.diagnose import spectrum
 from freeswing.ident.diagnose.backward_removal import superfluous
 from freeswing.ident.diagnose.leave_one_out import Evidence
+from freeswing.ident.diagnose.sets import fits_as_rivals
 
 
 @pytest.mark.parametrize(
@@ -84,10 +85,12 @@ def test_an_effect_worth_a_fit_without_it(rise, leaves) -> None:
 
 def test_a_platforms_inertia_is_one_of_a_metres_size(monkeypatch) -> None:
     """Its centre of mass within half a metre, moments of a radius within 45 cm, products half."""
-    monkeypatch.setattr(decision, "known_rows", lambda *_: np.zeros((0, 10)))
+    monkeypatch.setattr(fits_as_rivals, "known_rows", lambda *_: np.zeros((0, 10)))
     one = SimpleNamespace(
-        fit=SimpleNamespace(free=np.ones(9, bool), model=None, values=None, samples=()),
+        fit=SimpleNamespace(
+            free=np.ones(9, bool), model=SimpleNamespace(robot=None), values=None, samples=()
+        ),
         evidence=Evidence(("run",), np.zeros((1, 10, 10)), np.ones(1), np.zeros((0, 10))),
     )
-    std = 1.0 / decision._rival(one, "").prior[:, :9].diagonal()
+    std = 1.0 / fits_as_rivals.rival_of(one).prior[:, :9].diagonal()
     assert std == pytest.approx(np.repeat([0.5, 0.2, 0.1], 3), rel=0.05)

@@ -27,6 +27,7 @@ def test_effects_are_added_one_after_another(monkeypatch, there, found) -> None:
         return Round(current, Decision((), after, f"effect-{index}", (f"effect-{index}",)))
 
     monkeypatch.setattr(Search, "_round", one_more)
+    monkeypatch.setattr(Search, "_instead", lambda self, done, index: [done])
     monkeypatch.setattr(Search, "_geometry", lambda self, current: current)
     monkeypatch.setattr(module, "colour_of", lambda *_: 1.0)
     monkeypatch.setattr(module, "rescored", lambda base, *_: anything(fit=None, left=base.left))

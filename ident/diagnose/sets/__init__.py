@@ -1,0 +1,1 @@
+"""Sets of wrong places that replace one another."""
