@@ -814,22 +814,22 @@ HELD = (
     Held(
         "vision/rig/gross_faults.py",
         ("MOST_CONTRADICTING",),
-        "tests/vision/rig/test_lost_frames.py::test_frames_on_end_that_contradict",
+        "tests/vision/rig/lost/test_lost_frames.py::test_frames_on_end_that_contradict",
     ),
     Held(
-        "vision/rig/lost_frames.py",
+        "vision/rig/lost/lost_frames.py",
         (
             "LEAST_FRAMES", "REGULAR", "MOSTLY", "SURE", "MOST_LOST", "_MOST_TWICE",
             "_MOST_BESIDE", "_LEAST_CLUSTER", "_MOST_CLUSTER",
         ),
-        "tests/vision/rig/test_lost_frames.py",
+        "tests/vision/rig/lost/test_lost_frames.py",
     ),
     Held(
-        "vision/rig/usual_stretches.py",
+        "vision/rig/lost/usual_stretches.py",
         ("STRAINED", "AROUND", "FITS", "LEAST_STRETCHES", "_MOST_STRETCHES"),
-        "tests/vision/rig/test_lost_frames.py",
+        "tests/vision/rig/lost/test_lost_frames.py",
     ),
-    Held("vision/rig/kinks.py", ("MEETS",), "tests/vision/rig/test_lost_frames.py"),
+    Held("vision/rig/lost/kinks.py", ("MEETS",), "tests/vision/rig/lost/test_lost_frames.py"),
     Held("vision/rig/stamp_jitter.py", ("LEAST_JITTER_S", "_LEAST_FRAMES", "_FLOOR_PX"), START),
     Held(
         "vision/rig/stamp_jitter.py", ("_SURE_SIGMAS",), "tests/vision/rig/test_shared_jitter.py"

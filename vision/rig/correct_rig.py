@@ -30,9 +30,9 @@ from freeswing.vision.rig.gross_faults import (
     refuse_gross,
 )
 from freeswing.vision.rig.lag_accepted import Missed, aligned, later
+from freeswing.vision.rig.lost.recounted import recounted
 from freeswing.vision.rig.moved_cameras import moved_cameras, repose_by_base_tags
 from freeswing.vision.rig.real_effects import LEAST_CLOCK_S, LEAST_LINE_S, is_real
-from freeswing.vision.rig.recounted import recounted
 from freeswing.vision.rig.rig_kernels import CLOCK, LINE, PER_CAMERA, POSE
 from freeswing.vision.rig.rig_step import Finding, RigStep, frame_squares_px2, iterated, rig_step
 from freeswing.vision.rig.stamp_jitter import (

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from freeswing.vision.rig.usual_stretches import FITS, Stretches
+from freeswing.vision.rig.lost.usual_stretches import FITS, Stretches
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]

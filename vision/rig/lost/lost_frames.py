@@ -16,9 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.cdpr.rotation import log_rotation
-from freeswing.vision.rig.kinks import is_kink, kink_unlikeliness
 from freeswing.vision.rig.lag_search import OwnTrack
-from freeswing.vision.rig.usual_stretches import FITS, NO_STEPS, Stretches, in_noise, strained_steps
+from freeswing.vision.rig.lost.kinks import is_kink, kink_unlikeliness
+from freeswing.vision.rig.lost.usual_stretches import (
+    FITS,
+    NO_STEPS,
+    Stretches,
+    in_noise,
+    strained_steps,
+)
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -11,10 +11,10 @@ import pytest
 
 from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.rotation import exp_rotation
-from freeswing.vision.rig import kinks
 from freeswing.vision.rig.gross_faults import refuse_contradicting
 from freeswing.vision.rig.lag_search import OwnTrack
-from freeswing.vision.rig.lost_frames import (
+from freeswing.vision.rig.lost import kinks
+from freeswing.vision.rig.lost.lost_frames import (
     Loss,
     Told,
     counted,
@@ -23,7 +23,7 @@ from freeswing.vision.rig.lost_frames import (
     lost_frames,
     ways_to_lose,
 )
-from freeswing.vision.rig.usual_stretches import Stretches, is_strained
+from freeswing.vision.rig.lost.usual_stretches import Stretches, is_strained
 
 RATE_HZ = 20.0
 NOISE = np.array([1e-4, 1e-4, 5e-4, 2e-3, 2e-3, 5e-4])

@@ -10,7 +10,7 @@ from freeswing.cdpr.files.documents import DataError
 from freeswing.vision.fuse.run_views import CameraViews
 from freeswing.vision.rig.lag_accepted import own_track
 from freeswing.vision.rig.lag_search import OwnTrack
-from freeswing.vision.rig.lost_frames import Loss, Lost, lost_frames
+from freeswing.vision.rig.lost.lost_frames import Loss, Lost, lost_frames
 from freeswing.vision.rig.rig_step import Finding
 
 

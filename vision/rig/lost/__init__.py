@@ -1,0 +1,1 @@
+"""Frames that were lost while the stamps were counted on."""
