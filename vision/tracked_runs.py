@@ -39,12 +39,14 @@ class TrackedCamera:
         pieces: its sightings.
         lost: frames after which others were lost while the stamps were counted on, and the
             seconds that these took.
+        rate: by how much longer its stamps take than those of most, and the stamp that stays.
     """
 
     camera: Camera
     recording: Recording
     pieces: tuple[Path, ...]
     lost: tuple[tuple[float, float], ...] = ()
+    rate: tuple[float, float] = (0.0, 0.0)
 
     def frames(self) -> Iterator[tuple[Piece, int]]:
         """The piece and the row in it of every frame, in order, with its stamp put right.
@@ -55,7 +57,9 @@ class TrackedCamera:
         for path in self.pieces:
             piece = load_piece(path)
             later = sum((gap_s * (piece.numbers > after) for after, gap_s in self.lost), 0.0)
-            piece = replace(piece, stamps_s=piece.stamps_s + later)
+            stamps = piece.stamps_s + later
+            rate, about = self.rate
+            piece = replace(piece, stamps_s=stamps - rate * (stamps - about))
             for row in range(len(piece.numbers)):
                 yield piece, row
 
@@ -116,7 +120,8 @@ def tracked_run(
         paths = collect_sightings(folder, camera, watch, recording, frame_rate_hz)
         findings = found.on(run.name, camera.name)
         own = as_found(camera, findings)
-        seen.append(TrackedCamera(own, recording, tuple(paths), lost_by(findings)))
+        lost, rate = lost_by(findings), rate_by(findings)
+        seen.append(TrackedCamera(own, recording, tuple(paths), lost, rate))
     if found.corners_platform_m is not None:
         watch = with_layout(watch, found.corners_platform_m)
     return TrackedRun(run.name, watch, read_trajectory(csv), tuple(seen))
@@ -130,6 +135,15 @@ def lost_by(findings: Sequence[Finding]) -> tuple[tuple[float, float], ...]:
         if finding.effect == "lost_frames"
     ]
     return tuple((one["after_frame"], one["gap_s"]) for one in told)
+
+
+def rate_by(findings: Sequence[Finding]) -> tuple[float, float]:
+    """By how much longer a camera's stamps take, and about which stamp; zero where alike."""
+    for finding in findings:
+        if finding.effect == "clock_rate":
+            told = {name: value for name, value, _ in finding.parameters}
+            return told["rate"], told["about_s"]
+    return 0.0, 0.0
 
 
 def as_found(camera: Camera, findings: Sequence[Finding]) -> Camera:

@@ -831,6 +831,7 @@ HELD = (
     ),
     Held("vision/rig/lost/kinks.py", ("MEETS",), "tests/vision/rig/lost/test_lost_frames.py"),
     Held("vision/rig/stamp_jitter.py", ("LEAST_JITTER_S", "_LEAST_FRAMES", "_FLOOR_PX"), START),
+    Held("vision/rig/clock_rates.py", ("MOST_APART",), "tests/vision/rig/test_clock_rates.py"),
     Held(
         "vision/rig/stamp_jitter.py", ("_SURE_SIGMAS",), "tests/vision/rig/test_shared_jitter.py"
     ),

@@ -8,7 +8,7 @@ is not made.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.rotation import log_rotation
 from freeswing.vision.fuse.corner_noise import LEAST_FLOOR_PX
-from freeswing.vision.fuse.found_share import widened_by_jitter
 from freeswing.vision.fuse.fuse_cameras import Fit, fuse
 from freeswing.vision.fuse.poses import Poses
 from freeswing.vision.fuse.run_views import CameraViews, instants_of
 from freeswing.vision.fuse.tag_growth import growth_of
 from freeswing.vision.look.marker_names import label_markers
 from freeswing.vision.look.watched_target import Watch
+from freeswing.vision.rig.clock_rates import Rates, at_one_rate, clock_rates, refuse_far_apart
 from freeswing.vision.rig.gross_faults import (
     moved_too_far,
     refuse_contradicting,
@@ -36,9 +36,9 @@ from freeswing.vision.rig.real_effects import LEAST_CLOCK_S, LEAST_LINE_S, is_re
 from freeswing.vision.rig.rig_kernels import CLOCK, LINE, PER_CAMERA, POSE
 from freeswing.vision.rig.rig_step import Finding, RigStep, frame_squares_px2, iterated, rig_step
 from freeswing.vision.rig.stamp_jitter import (
-    along_the_motion_s,
+    lateness,
     stamp_jitter_s,
-    widened_along,
+    widened_by_stamps,
     widened_step,
 )
 from freeswing.vision.rig.untied_cameras import untied_shifts
@@ -74,7 +74,12 @@ class Corrected:
 
 
 def correct_rig(
-    views: Sequence[CameraViews], watch: Watch, survey_std_m: float, *, look: bool = True
+    views: Sequence[CameraViews],
+    watch: Watch,
+    survey_std_m: float,
+    *,
+    look: bool = True,
+    rated: bool = False,
 ) -> Corrected:
     """Poses of a run, with the effects of the cameras found and removed.
 
@@ -83,10 +88,11 @@ def correct_rig(
         watch: what was looked for.
         survey_std_m: of the base tags' corners.
         look: False leaves the cameras as calibrated.
+        rated: whether clocks were brought to one rate already.
 
     Raises:
-        DataError: when a camera is not where it can have got by a knock, or the cameras do not
-            agree after all corrections.
+        DataError: when a camera is not where it can have got by a knock, clocks run at other rates
+            than clocks do, or the cameras do not agree after all corrections.
     """
     started, lost, counted = None, [], []
     if look and watch.tags:
@@ -115,13 +121,21 @@ def correct_rig(
         current[index] = views[index].believed(
             repose_by_base_tags(views[index], watch, survey_std_m)
         )
-    clocks, lines, last, jitter = _estimate(current, watch, instants, moved, survey_std_m, poses)
+    found = _estimate(current, watch, instants, moved, survey_std_m, poses)
+    clocks, lines, last, jitter, rates = found
+    if rates.real.any() and not rated:
+        refuse_far_apart(views, rates)
+        offsets = np.array([view.camera.clock_offset_s for view in current])
+        even, runs, said = at_one_rate(calibrated, offsets, rates)
+        again = correct_rig(even, watch, survey_std_m, rated=True)
+        findings, remarks = (*lost, *runs, *again.findings), (*counted, *said, *again.remarks)
+        return replace(again, before=before, findings=findings, remarks=remarks)
     clocks = clocks + lags
     remarks += _motion_sentences(views, poses, jitter)
     if not (moved or clocks.any() or lines.any()):
         _refuse_contradicting(views, before, jitter)
         views, poses, after, doubt, said = _settled(views, watch, poses, before, survey_std_m)
-        poses, along = _widened(poses, after, views, watch, jitter)
+        poses, along = widened_by_stamps(poses, after, views, watch, jitter)
         remarks = (*remarks, *said, *along)
         return Corrected(views, poses, before, after, tuple(lost), remarks, doubt)
     final = [
@@ -133,22 +147,8 @@ def correct_rig(
     _refuse_contradicting(final, after, jitter)
     settled, poses, after, doubt, said = _settled(final, watch, poses, after, survey_std_m)
     findings = (*lost, *_findings(calibrated, settled, moved, clocks, lines, last))
-    poses, along = _widened(poses, after, settled, watch, jitter)
+    poses, along = widened_by_stamps(poses, after, settled, watch, jitter)
     return Corrected(settled, poses, before, after, findings, (*remarks, *said, *along), doubt)
-
-
-def _widened(
-    poses: Poses, fit: Fit, views: Sequence[CameraViews], watch: Watch, jitter_s: Array
-) -> tuple[Poses, tuple[str, ...]]:
-    """Poses whose covariances hold jitter of stamps, and what is said of what no camera tells."""
-    poses = widened_by_jitter(poses, fit, views, watch, jitter_s)
-    along_s = along_the_motion_s(poses)
-    if along_s == 0.0:
-        return poses, ()
-    return widened_along(poses, along_s), (
-        f"poses lie along their motion as stamps would put them that jitter by {1e3 * along_s:.2f} "
-        "ms (standard deviation) in all cameras alike: their deviations count it",
-    )
 
 
 def _refuse_contradicting(views: Sequence[CameraViews], fit: Fit, jitter_s: Array) -> None:
@@ -270,10 +270,10 @@ def _estimate(
     moved: dict[int, float],
     survey_std_m: float,
     poses: Poses,
-) -> tuple[Array, Array, RigStep, Array]:
+) -> tuple[Array, Array, RigStep, Array, Rates]:
     """Changes of clock and line time that are real, (n_c,) each; moved cameras in place.
 
-    With the last step, and the jitter of each camera's stamps.
+    With the last step, and the jitter and rates of the cameras' stamps.
     """
     n_c = len(current)
     clock_free = np.arange(n_c) != _reference(current)
@@ -286,7 +286,8 @@ def _estimate(
     with_lines = free.copy()
     with_lines[:, LINE] = True
     poses, fit = fuse(current, watch, instants, start=poses, passes=2, rough=True)
-    jitter = stamp_jitter_s(current, watch, poses, fit)
+    late = lateness(current, watch, poses, fit)
+    jitter = stamp_jitter_s(late)
     # Lines that are not in the views yet put stretches and tags apart: equations alone decide.
     trial = rig_step(current, watch, poses, fit, with_lines, survey_std_m, told=False)
     trial = widened_step(trial, current, jitter)
@@ -296,11 +297,14 @@ def _estimate(
     if real.any():
         free[:, LINE] = real
         step = iterated(current, watch, poses, fit, free, total, survey_std_m)
+        poses, fit = fuse(current, watch, instants, start=poses, passes=2, rough=True)
+        late = lateness(current, watch, poses, fit)  # a rolling shutter also makes frames late
+    rates = clock_rates(late, poses, fit)
     step = widened_step(step, current, jitter)
     clocks = total[:, CLOCK] - (np.median(total[:, CLOCK]) if n_c > 2 else 0.0)
     deviation = np.where(clock_free, step.deviations[:, CLOCK], step.deviations[:, CLOCK].max())
     sure = is_real(clocks, deviation, LEAST_CLOCK_S)
-    return np.where(sure, clocks, 0.0), np.where(real, total[:, LINE], 0.0), step, jitter
+    return np.where(sure, clocks, 0.0), np.where(real, total[:, LINE], 0.0), step, jitter, rates
 
 
 def _longest_lines(views: Sequence[CameraViews]) -> Array:
@@ -325,8 +329,6 @@ def _reference(views: Sequence[CameraViews]) -> int:
 
 def _decided(view: CameraViews, calibrated: CameraViews, clock: float, line: float) -> CameraViews:
     """The pose that was found, with clock and line time changed only as decided."""
-    from dataclasses import replace
-
     camera = replace(
         view.camera,
         clock_offset_s=calibrated.camera.clock_offset_s + float(clock),

@@ -50,7 +50,7 @@ class Finding:
     """One camera's effect.
 
     Attributes:
-        effect: `clock_offset`, `rolling_shutter`, `camera_moved` or `lost_frames`.
+        effect: `clock_offset`, `clock_rate`, `rolling_shutter`, `camera_moved` or `lost_frames`.
         camera: its name.
         parameters: (name, value, standard deviation).
     """

@@ -12,13 +12,14 @@ behind where the others put them.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from freeswing.vision.fuse.blocks import blocks
 from freeswing.vision.fuse.corner_noise import whitened
+from freeswing.vision.fuse.found_share import widened_by_jitter
 from freeswing.vision.fuse.fuse_cameras import Fit, free_of
 from freeswing.vision.fuse.linearised_block import linearised
 from freeswing.vision.fuse.poses import Poses
@@ -40,20 +41,29 @@ _VARIANCE_BY_MAD = 2.33
 _SURE_SIGMAS = 4.0  # of that: claims that are 10 % off are no jitter of half a minute's frames
 
 
-def stamp_jitter_s(views: Sequence[CameraViews], watch: Watch, poses: Poses, fit: Fit) -> Array:
-    """Standard deviation of each camera's stamps against the others', 0 where none shows, (n_c,).
+@dataclass(frozen=True, slots=True)
+class Lateness:
+    """Equations of how late each camera's frame is at each instant, the pose eliminated.
 
-    One camera alone shows none: there is nothing to hold its stamps against.
+    Attributes:
+        normal: (n, n_c, n_c); what is late alike in all is the pose's.
+        right: (n_c, n).
+        alone: of each camera if the pose were known, (n_c, n).
+    """
+
+    normal: Array
+    right: Array
+    alone: Array
+
+
+def lateness(views: Sequence[CameraViews], watch: Watch, poses: Poses, fit: Fit) -> Lateness:
+    """How late frames are, by what they miss the poses along their motion.
 
     Source:
-        Press et al. 2007, Numerical Recipes, sec. 15.4: late stamps as unknowns of least
-        squares, poses eliminated.
+        Triggs et al. 2000, Bundle Adjustment: A Modern Synthesis, sec. 6: poses eliminated.
     """
-    n_c, n = len(views), len(poses.times_s)
-    if n_c < 2:
-        return np.zeros(n_c)
-    size = free_of(watch)
-    late, own = np.zeros((n_c, n)), np.zeros((n_c, n))
+    n_c, n, size = len(views), len(poses.times_s), free_of(watch)
+    right, alone = np.zeros((n_c, n)), np.zeros((n_c, n))
     cross, whole = np.zeros((n_c, n, size)), np.zeros((n, size, size))
     pull = np.zeros((n, size))
     for block in blocks(views, watch, poses.times_s, poses):
@@ -64,16 +74,34 @@ def stamp_jitter_s(views: Sequence[CameraViews], watch: Watch, poses: Poses, fit
         by_pose = white @ linear.jacobians[:, :, :size]
         instant = block.first + np.repeat(np.arange(len(block.starts) - 1), np.diff(block.starts))
         at = (block.camera_of, instant)
-        np.add.at(late, at, (rates * misses).sum(axis=1))
-        np.add.at(own, at, (rates**2).sum(axis=1))
+        np.add.at(right, at, (rates * misses).sum(axis=1))
+        np.add.at(alone, at, (rates**2).sum(axis=1))
         np.add.at(cross, at, np.einsum("oia,oi->oa", by_pose, rates))
         np.add.at(pull, instant, np.einsum("oia,oi->oa", by_pose, misses))
         np.add.at(whole, instant, np.einsum("oia,oib->oab", by_pose, by_pose))
     # the pose moves with a late camera as far as the others let it (Schur complement)
     inverse = np.linalg.pinv(whole, rcond=1e-9, hermitian=True)
-    weight = own - np.einsum("cna,nab,cnb->cn", cross, inverse, cross)
-    late -= np.einsum("cna,nab,nb->cn", cross, inverse, pull)
-    weight = np.where(weight > 1e-3 * own, weight, 0.0)
+    normal = -np.einsum("cna,nab,dnb->ncd", cross, inverse, cross, optimize=True)
+    normal[:, np.arange(n_c), np.arange(n_c)] += alone.T
+    right -= np.einsum("cna,nab,nb->cn", cross, inverse, pull, optimize=True)
+    return Lateness(normal, right, alone)
+
+
+def stamp_jitter_s(told: Lateness) -> Array:
+    """Standard deviation of each camera's stamps against the others', 0 where none shows, (n_c,).
+
+    One camera alone shows none: there is nothing to hold its stamps against.
+
+    Source:
+        Press et al. 2007, Numerical Recipes, sec. 15.4: late stamps as unknowns of least
+        squares, poses eliminated.
+    """
+    n_c = len(told.right)
+    if n_c < 2:
+        return np.zeros(n_c)
+    weight = np.diagonal(told.normal, axis1=1, axis2=2).T
+    late = told.right
+    weight = np.where(weight > 1e-3 * told.alone, weight, 0.0)
     both = (weight > 0.0).sum(axis=0) > 1
     jitter = np.zeros(n_c)
     for index in range(n_c):
@@ -141,3 +169,17 @@ def widened_along(poses: Poses, jitter_s: float) -> Poses:
         return poses
     motion = poses.motions[:, :6] * jitter_s
     return replace(poses, covariances=poses.covariances + motion[:, :, None] * motion[:, None, :])
+
+
+def widened_by_stamps(
+    poses: Poses, fit: Fit, views: Sequence[CameraViews], watch: Watch, jitter_s: Array
+) -> tuple[Poses, tuple[str, ...]]:
+    """Poses whose covariances hold jitter of stamps, and what is said of what no camera tells."""
+    poses = widened_by_jitter(poses, fit, views, watch, jitter_s)
+    along_s = along_the_motion_s(poses)
+    if along_s == 0.0:
+        return poses, ()
+    return widened_along(poses, along_s), (
+        f"poses lie along their motion as stamps would put them that jitter by {1e3 * along_s:.2f} "
+        "ms (standard deviation) in all cameras alike: their deviations count it",
+    )

@@ -208,7 +208,8 @@ def jitter(monkeypatch, frames: int, late_s: float, noise_px: float, speed_px_s:
     )
     fit = stub(noise=stub(at_most=lambda floor_px: floor_px))
     poses = stub(times_s=np.arange(float(frames)))
-    return float(stamp_jitter.stamp_jitter_s([stub(), stub()], stub(), poses, fit)[0])
+    told = stamp_jitter.lateness([stub(), stub()], stub(), poses, fit)
+    return float(stamp_jitter.stamp_jitter_s(told)[0])
 
 
 @pytest.mark.parametrize(("late_s", "shown"), [(0.93e-4, False), (1.07e-4, True)])
