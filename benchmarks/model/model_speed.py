@@ -18,7 +18,7 @@ sys.path.insert(0, str(ROOT))
 
 from benchmarks.harness import Row, best_of, publish  # noqa: E402
 from freeswing.cdpr.model.batch import Bound, evaluate, only  # noqa: E402
-from freeswing.cdpr.model.elastic_motion import elastic_model, elastic_values  # noqa: E402
+from freeswing.cdpr.model.elastic_motion import SPRUNG, elastic_values  # noqa: E402
 from freeswing.cdpr.model.equations import build_model  # noqa: E402
 from freeswing.cdpr.model.free_motion import assemble, free_basis  # noqa: E402
 from freeswing.cdpr.model.internal_dynamics import body_regressor, internal_regressor, twist_of  # noqa: E402
@@ -78,7 +78,7 @@ def regressor(model, free) -> Row:
 def main() -> int:
     """Measure and publish."""
     model = build_model(robot_named("bologna-4"))
-    inertia = model.robot.inertia
+    inertia = np.asarray(model.robot.inertia)
     rest = rest_of(model, inertia)
     zeta = released(model, rest)
     span, still = (0.0, 10.0), np.zeros(6)
@@ -103,7 +103,7 @@ def main() -> int:
         start = released(model, rest_of(model, inertia, lengths))
         others.append(best_of(lambda s=start: simulate(model, s, still, span, inertia), 3))
     rows.append(Row("free motion, mean of columns 2 to 12", float(np.mean(others)), "s"))
-    elastic = elastic_model(model.robot)
+    elastic = build_model(model.robot, SPRUNG)
     values = elastic_values(elastic, 8e-5, evaluate(model.lengths, zeta, [])[0] - 0.0005)
     rows.append(
         Row(

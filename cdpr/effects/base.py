@@ -194,6 +194,8 @@ class Effect:
         tolerance: which of `cdpr.tolerances.Tolerances` says how far its values may be from zero
             where nobody has erred; "" where that is a hundredth or so of their plausible range.
         nuisance: whether it is no claim about the robot but stands beside all that are.
+        fully: the effect, in no catalogue, that makes its slow part the full motion; "": none.
+        springs: whether cables pull by their stretch where it is there, instead of being held.
     """
 
     name: str = ""
@@ -206,6 +208,8 @@ class Effect:
     on_free: bool = True
     tolerance: str = ""
     nuisance: bool = False
+    fully: str = ""
+    springs: bool = False
 
     @property
     def changes_measurement(self) -> bool:

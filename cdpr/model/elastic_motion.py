@@ -1,55 +1,132 @@
 """Cables as springs with damping: the full elastic motion beside the quasi-static one.
 
-`elastic_model` gives a `Model` whose acceleration lets the cables pull with the tension of their
-stretch instead of holding their length, from the same expressions. `simulate`, `linearise` and
-`Motion.tensions` take it as they take any other; every state is admissible. The effect
-`cable_elasticity` is its slow, quasi-static limit, three to four times faster to simulate.
+A model with the effects `SPRUNG` lets the cables pull with the tension of their stretch instead of
+holding their length. `simulate`, `linearise` and `Motion.tensions` take it as they take any other;
+every state is admissible. `cable_elasticity` alone is its slow, quasi-static limit.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import casadi as ca
 import numpy as np
 
-from freeswing.cdpr.effects import Parameter
-from freeswing.cdpr.model.equations import Model, build_model
-from freeswing.cdpr.robot import Array, Robot
+from freeswing.cdpr.model.batch import evaluate
+from freeswing.cdpr.model.body import Expression
+from freeswing.cdpr.model.constrained import Owned
+from freeswing.cdpr.robot import Array
 
-QUASI_STATIC = "cable_elasticity"
+if TYPE_CHECKING:
+    from freeswing.cdpr.model.equations import Model
+
+SPRUNG = ("cable_elasticity", "cable_vibration")
+Functions = dict[str, Any]
+PLUCKED_M_S2 = 9.81  # a cable plucked by 1 pulls by the whole weight more than it would
+EASED = 5  # steps, each of which leaves the strain's share of the last one
 
 
-def elastic_model(robot: Robot, effects: tuple[str, ...] = ()) -> Model:
-    """The model of `robot` on elastic cables, for any number of cables.
-
-    Its values are those of the effects, then `elastic_cables.mass_over_stiffness_s2_m` (the
-    platform's mass over EA), `elastic_cables.relaxation_s` (damping: tension = EA (strain +
-    relaxation strain rate), never pushing) and the unstretched length of each cable from D.
-    `acceleration` gives specific tensions as well; `told` the unstretched lengths; `slip` zero;
-    `energy` holds the stretch's energy too.
-
-    Args:
-        robot: its declared constants.
-        effects: names of effects, without `cable_elasticity`.
+def springs_of(owned: Owned) -> tuple[Expression, ...]:
+    """Compliance, its product with the relaxation, and what vibration has; () without springs.
 
     Raises:
-        ValueError: for an unknown or repeated effect, or `cable_elasticity` among them.
+        ValueError: for vibration without elasticity.
     """
-    if QUASI_STATIC in effects:
-        raise ValueError(f"elastic cables replace the effect {QUASI_STATIC}: leave it out")
-    held = build_model(robot, effects)
-    own = (
-        Parameter("mass_over_stiffness_s2_m", 1e-7, 0.01, 2e-4, start=1e-5),
-        Parameter("relaxation_s", 0.0, 0.05, 1e-3, start=1e-3),
-        *(Parameter(f"unstretched_{c.name}_m", 0.01, 100.0, 0.01, start=1.0) for c in robot.cables),
-    )
-    return replace(
-        held,
-        parameters=(*held.parameters, *own),
-        names=(*held.names, *(f"elastic_cables.{parameter.name}" for parameter in own)),
-        **_functions(held, robot.n_cables),
-    )
+    values = {effect.name: its for effect, its in owned}
+    elastic, vibrating = (values.get(name) for name in SPRUNG)
+    if vibrating is None:
+        return ()
+    if elastic is None:
+        raise ValueError(f"{SPRUNG[1]} without {SPRUNG[0]}: rigid cables do not vibrate")
+    return elastic[0], elastic[1], vibrating
+
+
+def held_by(owned: Owned) -> Owned:
+    """What a model is made of whose cables are held where others are springs."""
+    return [one for one in owned if one[0].name not in SPRUNG] if springs_of(owned) else owned
+
+
+def sprung(held: Functions, s: dict[str, Expression], springs: tuple[Expression, ...]) -> Functions:
+    """What springs change of a model whose cables are held.
+
+    Tension = EA (strain + relaxation strain rate), never pushing.
+
+    Args:
+        held: its functions, without stretch.
+        s: all inputs by name.
+        springs: of `springs_of`.
+
+    Returns:
+        `acceleration`, `told` (the unstretched lengths), `slip` (zero), `plucked` and `energy`,
+        which holds the stretch's too.
+    """
+    compliance, damping, vibration = springs
+    plucked, rest = vibration[0], vibration[1:]
+    everything = [*s.values()]
+    _, zeta, rates, inertia, values = everything
+    stretch = held["told"](*everything) - rest
+    slip = held["slip"](*everything)
+    stiffness = 1 / (compliance * (held["lengths"](zeta, values) - stretch))
+    tensions = ca.fmax(0, stiffness * (stretch + damping / compliance * slip))
+    acceleration = held["pulled"](*everything[:3], tensions, inertia, values)
+    kinetic, potential = held["energy"](zeta, rates, inertia, values)
+    stored = ca.sum1(stiffness * ca.fmax(0, stretch) ** 2) / 2
+    stored = ca.substitute(stored, ca.vertcat(s["scalar_time"], rates), ca.SX.zeros(7))
+    slow = ca.SX.zeros(rest.numel())
+    if isinstance(held["acceleration"], ca.Function):  # held by six cables there is no such motion
+        slow = held["acceleration"](*everything)[1]
+    excess = ca.vertcat(stiffness * stretch - slow, ca.sqrt(stiffness) * slip)
+    moving = {name: s[name] for name in ("zeta", "rates", "inertia", "values")}
+    energies = {"scalar_kinetic": kinetic, "scalar_potential": potential + stored}
+    outputs = {
+        "acceleration": {"acceleration": acceleration, "tensions": tensions},
+        "told": {"told": rest},
+        "slip": {"slip": ca.SX.zeros(rest.numel())},
+        "plucked": {"plucked": excess / (PLUCKED_M_S2 * plucked)},
+        "energy": energies,
+    }
+    return {
+        name: _function(name, moving if name == "energy" else s, told)
+        for name, told in outputs.items()
+    }
+
+
+def at_ease(
+    model: Model, zeta: Array, rates: Array, inertia: Array, values: Array, time_s: float = 0.0
+) -> Array:
+    """The values with unstretched lengths that a state does not pluck, (k,).
+
+    As they are in a model without springs.
+
+    Args:
+        model: with or without springs.
+        zeta: pose, (6,).
+        rates: their rates, (6,).
+        inertia: `INERTIA_NAMES` values, (9,).
+        values: effect values, (k,).
+        time_s: time of the state.
+
+    Source:
+        Meirovitch 2001, Fundamentals of Vibrations, ch. 1: a spring at rest bears its static load.
+    """
+    if model.plucked is None:
+        return values
+    own, values = lengths_of(model), values.copy()
+    compliance = values[model.place_of(SPRUNG[0])][0]
+    lengths = evaluate(model.lengths, zeta, values)[0]
+    values[own] = lengths
+    usual = PLUCKED_M_S2 * values[own.start - 1]
+    for _ in range(EASED):
+        state = (time_s, zeta, rates, inertia, values)
+        excess = usual * evaluate(model.plucked, *state)[0][: model.robot.n_cables]
+        values[own] += compliance * values[own] * excess
+    return values
+
+
+def lengths_of(model: Model) -> slice:
+    """Where the unstretched lengths of a model with springs stand among its values."""
+    where = model.place_of(SPRUNG[1])
+    return slice(where.start + 1, where.stop)
 
 
 def elastic_values(
@@ -59,18 +136,20 @@ def elastic_values(
     relaxation_s: float = 1e-3,
     values: Array | None = None,
 ) -> Array:
-    """Values (k + 2 + n,) of an elastic model.
+    """Values (k,) of a model with springs.
 
     Args:
-        model: of `elastic_model`.
+        model: with the effects `SPRUNG`.
         mass_over_stiffness_s2_m: the platform's mass over EA.
-        unstretched_m: (n,); those that keep the start free of vibration are what `told` of the
-            model with `cable_elasticity` gives at the start.
+        unstretched_m: (n,); those that keep the start free of vibration are what `at_ease` gives.
         relaxation_s: damping of the material.
-        values: of the effects, (k,); None for those that leave the declared model as it is.
+        values: the others, (k,); None for those that leave the declared model as it is.
 
     Raises:
         ValueError: when the compliance or a length is not above zero, or the damping is negative.
+
+    Source:
+        Meirovitch 2001, Fundamentals of Vibrations, ch. 1: springs and dashpots in parallel.
     """
     unstretched = np.asarray(unstretched_m, dtype=np.float64)
     n = model.robot.n_cables
@@ -83,67 +162,15 @@ def elastic_values(
         raise ValueError(f"relaxation_s is {relaxation_s}, must be 0 or above")
     if unstretched.shape != (n,) or not (unstretched > 0.0).all():
         raise ValueError(f"unstretched_m is {unstretched}: {n} lengths above 0 are needed")
-    own = model.start_values[: -2 - n] if values is None else np.asarray(values)
-    return np.concatenate([own, [mass_over_stiffness_s2_m, relaxation_s], unstretched])
+    found = model.start_values if values is None else np.array(values, dtype=np.float64)
+    found[model.place_of(SPRUNG[0])] = (
+        mass_over_stiffness_s2_m,
+        mass_over_stiffness_s2_m * relaxation_s,
+    )
+    found[lengths_of(model)] = unstretched
+    return found
 
 
-def _functions(held: Model, n: int) -> dict[str, ca.Function]:
-    time, zeta, rates = ca.SX.sym("t"), ca.SX.sym("zeta", 6), ca.SX.sym("rates", 6)
-    inertia, k = ca.SX.sym("inertia", 9), len(held.parameters)
-    values = ca.SX.sym("values", k + 2 + n)
-    own, compliance, relaxation, rest = values[:k], values[k], values[k + 1], values[k + 2 :]
-    told = held.told(time, zeta, rates, inertia, own)
-    slip = held.slip(time, zeta, rates, inertia, own)
-    stretch = told - rest
-    paid_out = held.lengths(zeta, own) - stretch
-    stiffness = 1 / (compliance * paid_out)
-    tensions = ca.fmax(0, stiffness * (stretch + relaxation * slip))
-    acceleration = held.pulled(time, zeta, rates, tensions, inertia, own)
-    kinetic, potential = held.energy(zeta, rates, inertia, own)
-    stored = ca.sum1(stiffness * ca.fmax(0, stretch) ** 2) / 2
-    stored = ca.substitute(stored, ca.vertcat(time, rates), ca.SX.zeros(7))
-    everything = {
-        "scalar_time": time,
-        "zeta": zeta,
-        "rates": rates,
-        "inertia": inertia,
-        "values": values,
-    }
-    pose = {"zeta": zeta, "values": values}
-    posed = {"zeta": zeta, "inertia": inertia, "values": values}
-    moving = {"zeta": zeta, "rates": rates, "values": values}
-    pulled = everything | {"tensions": ca.SX.sym("tensions", n)}
-    pulled = {name: pulled[name] for name in held.pulled.name_in()}
-
-    def function(
-        name: str, inputs: dict[str, ca.SX], results: list[ca.SX], names: list[str]
-    ) -> ca.Function:
-        dense = [ca.densify(result) for result in results]
-        return ca.Function(name, [*inputs.values()], dense, [*inputs], names, {"cse": True})
-
-    def same(name: str, inputs: dict[str, ca.SX]) -> ca.Function:
-        """A function that does not see the cables' own values."""
-        before = getattr(held, name)
-        arguments = [own if key == "values" else symbol for key, symbol in inputs.items()]
-        return function(name, inputs, before.call(arguments), before.name_out())
-
-    state = {"zeta": zeta, "rates": rates} | {"inertia": inertia, "values": values}
-    multipliers = {"zeta": zeta, "multipliers": ca.SX.sym("multipliers", n)} | posed
-    return {
-        "acceleration": function(
-            "acceleration", everything, [acceleration, tensions], ["acceleration", "tensions"]
-        ),
-        "told": function("told", everything, [rest], ["told"]),
-        "slip": function("slip", everything, [ca.SX.zeros(n)], ["slip"]),
-        "energy": function(
-            "energy", state, [kinetic, potential + stored], ["scalar_kinetic", "scalar_potential"]
-        ),
-        "lengths": same("lengths", pose),
-        "cables": same("cables", pose),
-        "domain": same("domain", pose),
-        "cable_rates": same("cable_rates", moving),
-        "mass_matrix": same("mass_matrix", posed),
-        "lagrangian": same("lagrangian", multipliers),
-        "measured": same("measured", everything),
-        "pulled": same("pulled", pulled),
-    }
+def _function(name: str, inputs: dict[str, Expression], outputs: dict[str, Expression]) -> Any:
+    dense = [ca.densify(output) for output in outputs.values()]
+    return ca.Function(name, [*inputs.values()], dense, [*inputs], [*outputs], {"cse": True})

@@ -29,6 +29,7 @@ from freeswing.cdpr.model.constrained import (
     stretches,
     total_inertia,
 )
+from freeswing.cdpr.model.elastic_motion import held_by, springs_of, sprung
 from freeswing.cdpr.model.pulley import CableState, Geometry, cable_state
 from freeswing.cdpr.model.refused_function import Refused
 from freeswing.cdpr.robot import Array, Robot
@@ -43,8 +44,8 @@ class Model:
     """One robot with a set of effects, as functions of time t, zeta, rates, inertia and values.
 
     Lengths, cables, energies and what follows from the pose alone serve any number of cables.
-    With six cables or more there is no free motion: `acceleration`, and with cables stretched by
-    their tension `told` and `slip`, raise a ValueError when they are used.
+    With six cables or more held there is no free motion: `acceleration`, and with cables stretched
+    by their tension `told` and `slip`, raise a ValueError when they are used.
 
     Attributes:
         robot: what the model was built from.
@@ -69,6 +70,7 @@ class Model:
             multipliers, (6,); its derivative by zeta, made symmetric, (6, 6).
         mass_matrix: (zeta, inertia, values) -> D^T M D / m (6, 6).
         energy: (zeta, rates, inertia, values) -> specific kinetic, potential energy of the weight.
+        plucked: as `told` -> pull and slip of springs over held cables, of usual size (2 n,); None.
         correlations: of what is known beforehand of the values, (k, k); None: independent.
     """
 
@@ -89,12 +91,18 @@ class Model:
     lagrangian: Function
     mass_matrix: Function
     energy: Function
+    plucked: Function | None = None
     correlations: Array | None = None
 
     @property
     def own_values(self) -> IntArray:
         """Which of the values each run has for itself, (o,)."""
         return np.flatnonzero([parameter.per_run for parameter in self.parameters])
+
+    @property
+    def held(self) -> int:
+        """How many cables hold their length: so many of a state's rates are not free."""
+        return self.robot.n_cables if self.plucked is None else 0
 
     def place_of(self, effect: str) -> slice:
         """Where an effect's values stand among `values`.
@@ -190,8 +198,7 @@ def _rebuilt(
     parameters: tuple[Parameter, ...],
     correlations: Array | None,
 ) -> Model:
-    model = build_model(robot, effects)
-    return replace(model, parameters=parameters, correlations=correlations)
+    return replace(build_model(robot, effects), parameters=parameters, correlations=correlations)
 
 
 @lru_cache(maxsize=64)
@@ -209,6 +216,7 @@ def _built(pickled: bytes, effects: tuple[Effect, ...]) -> dict[str, Function]:
 
 
 def _functions(robot: Robot, s: _Symbols, geometry: Geometry, owned: Owned) -> dict[str, Function]:
+    springs, owned = springs_of(owned), held_by(owned)
     turn = rotation(s.zeta[3:])
     states = tuple(cable_state(geometry, i, s.zeta[:3], turn) for i in range(robot.n_cables))
     matrix = rate_matrix(s.zeta[3:])
@@ -219,15 +227,16 @@ def _functions(robot: Robot, s: _Symbols, geometry: Geometry, owned: Owned) -> d
     jacobian = length_jacobian(states, matrix)
     twist_map = ca.diagcat(ca.SX.eye(3), matrix)
     maps = {"matrix_map": twist_map, "matrix_rate": along(twist_map, s.zeta, s.rates)}
-    dynamics = _dynamics(robot, s, instant, spin, geometry, inertia, owned)
-    measured = {"measured": _measured(s, instant, matrix, owned, dynamics["acceleration"])}
+    held = _kinematics(robot, s, states, geometry, jacobian)
+    held |= _energies(s, geometry, inertia, spin, turn)
+    held |= _dynamics(robot, s, instant, spin, geometry, inertia, owned)
+    held |= sprung(held, s.named, springs) if springs else {}
+    measured = {"measured": _measured(s, instant, matrix, owned, held["acceleration"])}
     return {
-        **_kinematics(robot, s, states, geometry, jacobian),
+        **held,
         "twist_map": _function("twist_map", s.some("zeta", "rates"), maps),
         "measured": _function("measured", s.named, measured),
-        **_energies(s, geometry, inertia, spin, turn),
         "lagrangian": _lagrangian(robot, s, instant, spin, geometry, inertia, owned, jacobian),
-        **dynamics,
     }
 
 

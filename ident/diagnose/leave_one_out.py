@@ -33,6 +33,7 @@ class Evidence:
         common: how many of the unknowns, the last ones, are amplitudes of errors that the poses of
             all runs share: they stand beside every set of the others.
         own: what the runs know of effect values that each has for itself; None where none has.
+        plucked: what the runs know of how their starts pluck cables; None where these are held.
     """
 
     runs: tuple[str, ...]
@@ -41,6 +42,7 @@ class Evidence:
     prior_rows: Array
     common: int = 0
     own: OwnValues | None = None
+    plucked: OwnValues | None = None
 
     def columns(self, chosen: np.ndarray) -> np.ndarray:
         """Those of chosen unknowns, of what stands beside every set, and of the residual."""
@@ -53,7 +55,8 @@ class Evidence:
         reduced = np.asarray(np.linalg.qr(self.triangles[:, :, kept], mode="r"))
         prior = self.prior_rows[:, kept]
         prior = prior[np.abs(prior[:, :-1]).sum(axis=1) > 0]
-        return Evidence(self.runs, reduced, self.counts, prior, self.common, self.own)
+        beside = self.common, self.own, self.plucked
+        return Evidence(self.runs, reduced, self.counts, prior, *beside)
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +70,8 @@ class Score:
         cost: sum of squares over all runs after the change.
         held_out: sum of squares of each run with the change found on the others, counted with the
             covariance of that prediction, (r,).
-        wider: logarithm of that covariance's determinant over the noise's, (r,).
+        wider: logarithm of that covariance's determinant over the noise's, and what a start that
+            plucks cables pays, (r,).
         rank: of the joint problem.
     """
 
@@ -98,6 +102,8 @@ def score(evidence: Evidence) -> Score:
         without = _solve(others, evidence.prior_rows, scale)
         changes[k] = without.change
         held_out[k], wider[k] = _predicted(evidence.triangles[k], without)
+    if evidence.plucked is not None:
+        wider -= 2.0 * evidence.plucked.likeliest()[1]
     jackknife = leaving_out_std(changes)
     fitted = evidence.triangles.reshape(-1, size) @ np.append(whole.change, 1.0)
     cost = float(fitted @ fitted)

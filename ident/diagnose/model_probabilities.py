@@ -37,6 +37,7 @@ class Rival:
         effects: how many it has: each is improbable beforehand.
         tries: logarithm of how many ways of it were tried beside this one.
         own: what the runs know of effect values that each has for itself; None where none has.
+        plucked: what the runs know of how their starts pluck cables; None where these are held.
     """
 
     triangles: Array
@@ -44,6 +45,7 @@ class Rival:
     effects: int
     tries: float = 0.0
     own: OwnValues | None = None
+    plucked: OwnValues | None = None
 
 
 def log_predictive(squares: Array, counts: Array, independent: Array) -> Array:
@@ -141,8 +143,9 @@ def log_evidence(rival: Rival, counts: Array, independent: Array, weights: Array
     found = np.sum(weights * log_predictive(squares, counts, independent), axis=1)
     away = np.einsum("da,ab,db->d", change, prior, change)
     wider = np.linalg.slogdet(curves[:, :-1, :-1])[1] - np.linalg.slogdet(prior[:-1, :-1])[1]
-    beside = 0.0 if rival.own is None else rival.own.log_evidence(weights)
-    return found - 0.5 * away - 0.5 * wider + beside
+    for own in (rival.own, rival.plucked):
+        found = found if own is None else found + own.log_evidence(weights)
+    return found - 0.5 * away - 0.5 * wider
 
 
 def _likeliest(

@@ -25,13 +25,15 @@ class OwnValues(NamedTuple):
     Attributes:
         curves: inverse covariance by the data of each run, its state and frame free, (r, o, o).
         pulls: that times the likeliest values, (r, o).
+        held: the size, over the plausible one, that values were found with, (r,).
     """
 
     curves: Array
     pulls: Array
+    held: Array
 
     def log_evidence(self, weights: Array) -> Array:
-        """Beside squares that were found with values of their plausible size, (d,).
+        """Beside squares that were found with values of the size held, (d,).
 
         Args:
             weights: of the runs, (d, r).
@@ -40,14 +42,29 @@ class OwnValues(NamedTuple):
             MacKay 2003, Information Theory, Inference, and Learning Algorithms, ch. 28; the size as
             in Bishop 2006, Pattern Recognition and Machine Learning, sec. 3.5: the likeliest.
         """
+        return (weights @ self._by_size()[1].T).max(axis=1)
+
+    def likeliest(self) -> tuple[float, Array]:
+        """The likeliest size over the plausible one, and log densities of the runs by it, (r,).
+
+        Source:
+            Bishop 2006, Pattern Recognition and Machine Learning, sec. 3.5: the evidence's maximum.
+        """
+        tried, by_run = self._by_size()
+        best = int(np.argmax(by_run.sum(axis=1)))
+        return float(tried[best]), by_run[best]
+
+    def _by_size(self) -> tuple[Array, Array]:
+        """Sizes that are tried, (s,), and log densities of the runs by them, (s, r)."""
         known, axes = np.linalg.eigh(self.curves)
         pulls = np.einsum("rab,ra->rb", axes, self.pulls)
         known = np.maximum(known, 0.0)
-        scales = sizes(float(known.max()))[:, None, None] ** 2
+        tried = sizes(float(known.max()))
+        scales = tried[:, None, None] ** 2
         narrowed = 1.0 + scales * known
-        fitted = pulls**2 * (scales / narrowed - 1.0 / (1.0 + known))
-        by_run = 0.5 * np.sum(fitted - np.log(narrowed), axis=2)
-        return (weights @ by_run.T).max(axis=1)
+        taken = 1.0 / (1.0 / self.held[:, None] ** 2 + known)
+        fitted = pulls**2 * (scales / narrowed - taken)
+        return tried, 0.5 * np.sum(fitted - np.log(narrowed), axis=2)
 
 
 def sizes(known: float) -> Array:

@@ -132,7 +132,7 @@ def _refitted(current: LikelihoodFit, key: str, values: Array, scales: Array) ->
     swings = replace(current.swings, scales=scales).under(model, unknowns, RANKING_ACCURACY_M)
     # What the current fit costs under these scales: its own may be the noise's, a thousandth.
     cost = current.cost * float(np.mean(np.square(current.scales / scales)))
-    return _ranked(swings, unknowns, cost)
+    return ranked(swings, unknowns, cost)
 
 
 def _does_nothing(found: LikelihoodFit, key: str) -> bool:
@@ -210,7 +210,7 @@ def displaced(
     known = with_known(model, chosen, centre, covariance, BY_LENGTHS)
     unknowns = with_effect_values(unknowns, known, values)
     swings = Swings(known, found.samples, scales)
-    return polished(_ranked(swings, unknowns, found.cost), noise_scales)
+    return polished(ranked(swings, unknowns, found.cost), noise_scales)
 
 
 def exchanged(
@@ -241,7 +241,7 @@ def exchanged(
         together[model.place_of(effect_of(place))] = values[effect_of(place)]
     unknowns = with_effect_values(unknowns, model, together)
     swings = Swings(model, found.samples, found.scales)
-    return polished(_ranked(swings, unknowns, found.cost), noise_scales)
+    return polished(ranked(swings, unknowns, found.cost), noise_scales)
 
 
 def _freed_of(found: LikelihoodFit, key: str) -> tuple[Model, Unknowns]:
@@ -285,14 +285,23 @@ def freed(one: Refit, noise_scales: Array) -> Refit:
 
 def without(found: LikelihoodFit, name: str, noise_scales: Array) -> Refit:
     """A fit without one of its effects, from where it stands, converged."""
-    mine = (name, each_run(name)) if each_run(name) in found.unknowns else (name,)
-    unknowns, fewer = found.unknowns.without(*mine), without_effect(found.model, name)
+    unknowns, fewer = found.unknowns, found.model
+    for one in (effect_named(name).fully, name):
+        if one in fewer.effects:
+            mine = (one, each_run(one)) if each_run(one) in unknowns else (one,)
+            unknowns, fewer = unknowns.without(*mine), without_effect(fewer, one)
     exact = fit(Swings(fewer, found.samples, found.scales), unknowns, SEARCHED)
     return rescored(exact, noise_scales, colour_of(exact, noise_scales))
 
 
-def _ranked(swings: Swings, unknowns: Unknowns, cost: float) -> LikelihoodFit:
-    """Converged to a ten-thousandth of the cost before: enough to rank candidates."""
+def ranked(swings: Swings, unknowns: Unknowns, cost: float) -> LikelihoodFit:
+    """Converged to a ten-thousandth of the cost before: enough to rank candidates.
+
+    Args:
+        swings: the runs.
+        unknowns: where to start.
+        cost: that of the fit before.
+    """
     how = replace(
         SEARCHED,
         steps=RANKING_STEPS,

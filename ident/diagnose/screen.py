@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from freeswing.cdpr.effects import effect_named
+from freeswing.cdpr.model.elastic_motion import SPRUNG
 from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.model.known_values import prior_whitener, with_effects
 from freeswing.cdpr.robot import Array
@@ -20,7 +21,7 @@ from freeswing.ident.diagnose.variants import effect_of, inside
 from freeswing.ident.likelihood.blocks import columns_of, shared_size
 from freeswing.ident.likelihood.calibration_modes import amplitudes_of, motion_shifts
 from freeswing.ident.likelihood.fit_swings import LikelihoodFit
-from freeswing.ident.likelihood.run_residuals import Reduced, Samples, reduce_run
+from freeswing.ident.likelihood.run_residuals import Reduced, Samples, own_numbers, reduce_run
 
 NONE = np.zeros(0, dtype=np.int64)
 
@@ -86,7 +87,9 @@ def screen(
     own = len(fit.inertia) + model.own_values
     wanted[np.concatenate([base, own, beside, *columns.values()])] = True
 
-    def reduced(motion: Motion, samples: Samples) -> tuple[Array, OwnValues | None]:
+    def reduced(
+        motion: Motion, samples: Samples
+    ) -> tuple[Array, OwnValues | None, OwnValues | None]:
         mine = values.copy()
         mine[: len(fit.values)] = motion.values
         moved = replace(motion, model=model, values=mine)
@@ -97,9 +100,9 @@ def screen(
             motion_shifts(motion, samples, common) if common else None,
             prior_weight=float(np.sqrt(colour)),
         )
-        return found.rows, _own_values(found, moved, colour)
+        return found.rows, _own_values(found, moved, colour), _plucked(found, moved, colour)
 
-    triangles, known = zip(*side_by_side(reduced, fit.motions, fit.samples), strict=True)
+    triangles, known, plucked = zip(*side_by_side(reduced, fit.motions, fit.samples), strict=True)
     counts = [_count(samples, model) for samples in fit.samples]
     evidence = Evidence(
         tuple(s.name for s in fit.samples),
@@ -108,14 +111,14 @@ def screen(
         np.sqrt(colour) * known_rows(model, values, fit.samples),
         common,
         _together(known),
+        _together(plucked),
     )
     return Screen(model, values, evidence, base, columns)
 
 
 def _count(samples: Samples, model: Model) -> int:
-    n = model.robot.n_cables
-    own = 12 - n + len(model.own_values)
-    return samples.values.size - own + (0 if samples.lengths_m is None else n)
+    lengths = 0 if samples.lengths_m is None else model.robot.n_cables
+    return samples.values.size - own_numbers(model) + lengths
 
 
 def _amplitudes(model: Model, key: str) -> np.ndarray:
@@ -144,12 +147,29 @@ def _own_values(reduced: Reduced, motion: Motion, colour: float) -> OwnValues | 
         return None
     places = model.own_values[mine]
     rows = reduced.own[first:, first : first + len(reduced.own_columns)]
-    # Nuisances come first in a model: what is left of them was eliminated by the rows above.
-    kept, right = rows[np.ix_(mine, mine)], reduced.own[first:, -1][mine]
+    # What is left of nuisances is eliminated by the rows above.
+    others = [i for i in range(len(model.own_values)) if i not in mine]
+    both = np.column_stack([rows[:, [*others, *mine]], reduced.own[first:, -1]])
+    square = np.asarray(np.linalg.qr(both, mode="r"))[len(others) :, len(others) :]
+    kept, right = square[: len(mine), :-1], square[: len(mine), -1]
     size = np.array([model.parameters[k].prior_std for k in places])
     known = kept.T @ kept * np.outer(size, size) / colour
     values = motion.values[places] - np.linalg.solve(kept, right)
-    return OwnValues(known - np.eye(len(mine)), known @ (values / size))
+    return OwnValues(known - np.eye(len(mine)), known @ (values / size), np.array(1.0))
+
+
+def _plucked(reduced: Reduced, motion: Motion, colour: float) -> OwnValues | None:
+    """What a run knows of how its start plucks cables, in the whole weight; None: they are held."""
+    if not len(reduced.plucked):
+        return None
+    count, model = len(reduced.own), motion.model
+    usual = float(motion.values[model.place_of(SPRUNG[1])][0])
+    own, right = reduced.own[:, :count], reduced.own[:, -1]
+    by_own, start = reduced.plucked[:, :-1], reduced.plucked[:, -1]
+    values = usual * (start - by_own @ np.linalg.solve(own, right))
+    root = usual * np.linalg.solve(own.T, by_own.T)
+    known = np.linalg.inv(root.T @ root) / colour
+    return OwnValues(known - np.eye(len(start)) / usual**2, known @ values, np.array(usual))
 
 
 def _together(runs: Sequence[OwnValues | None]) -> OwnValues | None:

@@ -53,6 +53,7 @@ from freeswing.ident.diagnose.screen import Screen, screen
 from freeswing.ident.diagnose.sets.exchange import decisions, exchange
 from freeswing.ident.diagnose.sets.ways import Places
 from freeswing.ident.diagnose.spectrum import Residual, too_small
+from freeswing.ident.diagnose.springs.full_motion import fully
 from freeswing.ident.diagnose.variants import effect_of, inside, variants
 from freeswing.ident.likelihood.fit_swings import LikelihoodFit
 
@@ -335,9 +336,10 @@ def _job(
     colour: float,
 ) -> Refit | None:
     try:
-        return refit(current.fit, name, values, noise_scales, colour)
+        found = refit(current.fit, name, values, noise_scales, colour)
     except ValueError:
         return None
+    return found if lacks_little(found) else fully(found, name, noise_scales, colour)
 
 
 def _of_set(

@@ -8,10 +8,12 @@ mean square; the values of the runs are a block of their own, and so are the run
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from freeswing.cdpr.model.elastic_motion import at_ease
 from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.robot import Array
 from freeswing.ident.likelihood.joint_problem import (
@@ -132,8 +134,23 @@ def first_unknowns(
     values = model.start_values if values is None else values
     loads = Loads.of(payloads)
     state = State(inertia, values, starts, np.ones(2), loads=loads.start(mass_kg))
+    state = replace(state, own_values=eased(model, inertia, values, starts)[:, model.own_values])
     free = np.ones(shared_size(model) + loads.count, dtype=bool)
     return model_unknowns(model, loads, state, free)
+
+
+def eased(model: Model, inertia: Array, values: Array, starts: Array) -> Array:
+    """Values that each run begins with where no cable is plucked, (runs, k).
+
+    Args:
+        model: with or without springs.
+        inertia: (9,).
+        values: (k,), or (runs, k).
+        starts: initial [zeta; rates] of each run, (runs, 12).
+    """
+    each = np.broadcast_to(values, (len(starts), len(model.parameters)))
+    pairs = zip(starts, each, strict=True)
+    return np.array([at_ease(model, one[:6], one[6:], inertia, its) for one, its in pairs])
 
 
 def split_own(model: Model, own: Array) -> dict[str, Array]:

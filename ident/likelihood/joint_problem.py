@@ -22,7 +22,9 @@ from freeswing.ident.likelihood.run_residuals import (
     Reduced,
     Samples,
     lengths_residual,
+    own_numbers,
     own_prior,
+    plucked_start,
     reduce_run,
     residuals,
 )
@@ -371,7 +373,7 @@ class Problem:
             for g in (0, 1):
                 squares[g] += np.sum(white[:, samples.groups == g] ** 2)
                 counts[g] += white[:, samples.groups == g].size
-        own = 12 - self.model.robot.n_cables + len(self.model.own_values)
+        own = own_numbers(self.model)
         share = 1.0 - min(0.9, (own * len(self.samples) + self.free.sum()) / max(counts.sum(), 1.0))
         factors = np.sqrt(squares / np.maximum(share * counts, 1.0))
         scales = np.where(counts > 0, state.scales * np.maximum(factors, 1e-6), state.scales)
@@ -382,4 +384,5 @@ def _run_cost(motion: Motion, samples: Samples, scales: Array) -> float:
     """Sum of squares of a run: residuals, lengths, and what is known of its own effect values."""
     total = float(np.sum(residuals(motion, samples, scales) ** 2))
     total += float(np.sum(lengths_residual(motion, samples) ** 2))
+    total += float(np.sum(plucked_start(motion) ** 2))
     return total + float(np.sum(own_prior(motion, samples) ** 2))

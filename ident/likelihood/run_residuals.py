@@ -99,12 +99,15 @@ class Reduced:
             then the effect values that are the run's own.
         basis: state change by [state directions; shared; 1], (12, 12 - n + p + 1).
         own_columns: where the run's own effect values stand among the shared unknowns, (o,).
+        plucked: how the start plucks cables by [own unknowns; 1], over what is known of that,
+            (2 n, 12 + n + o + 1); no rows where they are held.
     """
 
     rows: Array
     own: Array
     basis: Array
     own_columns: np.ndarray
+    plucked: Array
 
     def own_change(self, shared: Array) -> tuple[Array, Array]:
         """Change of the initial [zeta; rates], and of the run's own effect values.
@@ -187,11 +190,13 @@ def reduce_run(
     white = _whitened(off, samples, scales)
     count = len(linear.asked)
     further = 0 if shifts is None else shifts.shape[2]
-    lengths = lengths_residual(motion, samples)
-    everything = np.zeros((white.size + len(lengths), count + further + 1))
+    plucked, by_all = _plucked_rows(motion)
+    beside = np.concatenate([lengths_residual(motion, samples), prior_weight * plucked])
+    by_beside = np.vstack([_length_rows(motion, samples), prior_weight * by_all])
+    everything = np.zeros((white.size + len(beside), count + further + 1))
     everything[: white.size, :count] = matrix.reshape(-1, count)
-    everything[white.size :, :count] = _length_rows(motion, samples)[:, linear.asked]
-    everything[:, -1] = np.concatenate([white.reshape(-1), lengths])
+    everything[white.size :, :count] = by_beside[:, linear.asked]
+    everything[:, -1] = np.concatenate([white.reshape(-1), beside])
     if shifts is not None:
         everything[: white.size, count:-1] = (maps @ shifts).reshape(white.size, -1)
     # What follows combines columns: a triangle of them serves as well, and is a hundredth as long.
@@ -200,7 +205,7 @@ def reduce_run(
     rows = np.zeros((len(triangle), STATE + motion.inertia.size + motion.values.size))
     rows[:, linear.asked] = triangle[:, :count]
     basis = _allowed_states(motion)
-    directions = STATE - motion.model.robot.n_cables
+    directions = STATE - motion.model.held
     body = rows[:, :STATE] @ basis
     shared = body[:, directions:-1] + rows[:, STATE:]
     shared[:, np.setdiff1d(np.arange(shared.shape[1]), linear.asked[STATE:] - STATE)] = 0.0
@@ -215,7 +220,9 @@ def reduce_run(
     size = together.shape[1]
     full = np.zeros((size, size))
     full[: len(triangle)] = triangle
-    return Reduced(full[n_own:, n_own:], full[:n_own], basis, mine)
+    by_own = np.hstack([by_all[:, :STATE] @ basis[:, :directions], by_all[:, STATE + mine]])
+    plucked = np.column_stack([by_own, plucked])
+    return Reduced(full[n_own:, n_own:], full[:n_own], basis, mine, plucked)
 
 
 def _triangle(rows: Array) -> Array:
@@ -353,10 +360,28 @@ def _start_slopes(motion: Motion, function: object) -> tuple[Array, Array]:
     return value, slopes
 
 
+def plucked_start(motion: Motion) -> Array:
+    """How a run's start plucks cables that are springs, over what is known of that; (0,): held."""
+    return _plucked_rows(motion)[0]
+
+
+def _plucked_rows(motion: Motion) -> tuple[Array, Array]:
+    """The same, (q,), and its derivatives by [state; inertia; values], (q, 21 + k)."""
+    if motion.model.plucked is None:
+        return np.zeros(0), np.zeros((0, STATE + motion.inertia.size + motion.values.size))
+    return _start_slopes(motion, motion.model.plucked)
+
+
+def own_numbers(model: Model) -> int:
+    """How many numbers a run takes for itself, but for those that its prior tells as well."""
+    n = model.robot.n_cables
+    return STATE - n + len(model.own_values) - (n - model.held)
+
+
 def _allowed_states(motion: Motion) -> Array:
     """State changes by [own; shared; 1] that keep the rates within what the cables allow."""
     slip, slopes = _start_slopes(motion, motion.model.slip)
     by_state, by_shared = slopes[:, :STATE], slopes[:, STATE:]
     inverse = np.linalg.pinv(by_state)
-    free = np.linalg.svd(by_state)[2][len(slip) :].T
+    free = np.linalg.svd(by_state)[2][motion.model.held :].T
     return np.column_stack([free, -inverse @ by_shared, -inverse @ slip])

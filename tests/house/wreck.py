@@ -52,6 +52,7 @@ ROBUST = "test_a_sighting_beyond_three_deviations_weighs_less"
 RIG = "tests/vision/rig/test_rig_limits.py"
 HOMING = "tests/homing/test_limits.py"
 DECISION = "tests/ident/diagnose/test_decision_limits.py"
+SPRINGS = "tests/ident/diagnose/test_springs.py"
 RESIDUALS = "tests/ident/diagnose/test_residual_limits.py"
 PLACES = "tests/ident/diagnose/lengths/test_lengths_limits.py"
 INCLUSION = "tests/ident/diagnose/lengths/test_inclusion.py"
@@ -374,6 +375,7 @@ HELD = (
     ),
     Held("ident/diagnose/outstanding_runs.py", ("OUTSTANDING",), DECISION),
     Held("ident/diagnose/refit.py", ("REWEIGHED",), DECISION),
+    Held("ident/diagnose/springs/full_motion.py", ("PLUCKED_MORE", "MORE_LIKELY"), SPRINGS),
     Held(
         "ident/diagnose/declared_model.py",
         ("LEAST_RUNS", "SMALL_BESIDE_SWINGS", "AT_THE_NOISE"),

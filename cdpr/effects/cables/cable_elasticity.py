@@ -24,6 +24,7 @@ class CableElasticity(Effect):
     tolerance = "stretch_s2_m"
     needs_tension = True
     on_driven = True
+    fully = "cable_vibration"
 
     def parameters(self, robot: Robot) -> tuple[Parameter, ...]:
         """Mass over EA and that times the relaxation time, the same for all cables."""

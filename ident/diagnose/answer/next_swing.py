@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from freeswing.cdpr.model.elastic_motion import at_ease
 from freeswing.cdpr.model.free_motion import admissible_rates
 from freeswing.cdpr.robot import Array
 from freeswing.cdpr.simulation.free_swing import Motion, simulate
@@ -106,10 +107,11 @@ def _swung(one: Refit, run: int, middle: Array, reach: float, duration: float) -
     """
     motion, (start, end) = one.fit.motions[run], one.fit.samples[run].span_s
     zeta = middle + reach * (motion.zetas[0] - middle)
-    known = motion.model, zeta, reach * motion.rates[0], motion.inertia, motion.values
-    rates = admissible_rates(*known, start)
+    model, inertia, rates = motion.model, motion.inertia, reach * motion.rates[0]
+    values = at_ease(model, zeta, rates, inertia, motion.values, start)
+    rates = admissible_rates(model, zeta, rates, inertia, values, start)
     span = start, start + duration * (end - start)
-    return simulate(motion.model, zeta, rates, span, motion.inertia, motion.values, 1e-7)
+    return simulate(model, zeta, rates, span, inertia, values, 1e-7)
 
 
 def _seen(motions: list[Motion], like: Samples) -> Samples:

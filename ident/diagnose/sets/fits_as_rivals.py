@@ -49,4 +49,4 @@ def rival_among(
     body[:, :size] = np.diag(1.0 / (INERTIA_RANGE * INERTIA_UNIT))
     prior = np.vstack([body, known[np.abs(known[:, :-1]).sum(axis=1) > 0.0]])
     tries = sum(float(np.log(len(variants(robot, effect_of(key))))) for key in keys)
-    return Rival(linear.triangles, prior, len(keys), tries, linear.own)
+    return Rival(linear.triangles, prior, len(keys), tries, linear.own, linear.plucked)

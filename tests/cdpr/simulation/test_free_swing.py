@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from freeswing.cdpr.model.batch import evaluate
-from freeswing.cdpr.model.elastic_motion import elastic_model, elastic_values
+from freeswing.cdpr.model.elastic_motion import SPRUNG, elastic_values
 from freeswing.cdpr.model.equations import build_model
 from freeswing.cdpr.model.free_motion import admissible_rates
 from freeswing.cdpr.simulation.free_swing import simulate
@@ -120,7 +120,7 @@ def test_quasi_static_stretch_is_the_slow_part_of_full_stretch(compliance, limit
     slow = swung("bologna-4", ("cable_elasticity",), values)
     state = (0.0, *_start(slow), slow.inertia, values)
     unstretched = evaluate(slow.model.told, *state)[0]
-    model = elastic_model(slow.model.robot)
+    model = build_model(slow.model.robot, SPRUNG)
     full_values = elastic_values(model, compliance, unstretched)
     full = simulate(model, *_start(slow), (0.0, 10.0), slow.inertia, full_values)
     rigid = simulate(build_model(slow.model.robot), *_rigid_start(slow), (0.0, 10.0), slow.inertia)
@@ -145,7 +145,7 @@ def _rigid_start(motion):
 def test_full_stretch_is_the_independent_simulators(eyelets):
     stiffness = 2e4
     model, inertia, zeta, _ = swing_start("bologna-4", eyelets=eyelets)
-    elastic = elastic_model(model.robot)
+    elastic = build_model(model.robot, SPRUNG)
     told = evaluate(model.lengths, zeta, [])[0] - 0.002
     values = elastic_values(elastic, 8.0 / stiffness, told, 0.0 if eyelets else 1e-3)
     motion = simulate(elastic, zeta, np.zeros(6), (0.0, 4.0), inertia, values)
@@ -162,7 +162,7 @@ def test_full_stretch_is_the_independent_simulators(eyelets):
 
 def test_springs_and_stretch_keep_energy():
     robot = robot_named("bologna-4")
-    model = elastic_model(robot)
+    model = build_model(robot, SPRUNG)
     rigid = build_model(robot)
     inertia = true_inertia(robot)
     zeta = released(rigid, rest_of(rigid, inertia))
@@ -177,7 +177,7 @@ def test_springs_and_stretch_keep_energy():
 
 def test_eight_elastic_cables_carry_a_platform():
     robot = ring(8)
-    model = elastic_model(robot)
+    model = build_model(robot, SPRUNG)
     lengths = evaluate(model.lengths, np.zeros(6), model.start_values)[0]
     values = elastic_values(model, 1e-4, lengths - 1e-3, 5e-3)
     motion = simulate(model, np.zeros(6), np.zeros(6), (0.0, 3.0), robot.inertia, values)  # pyright: ignore[reportArgumentType]

@@ -28,7 +28,7 @@ def fans(seed: int, size: float) -> list[Rival]:
     left += np.sum(likeliest**2, axis=1)
     nothing, prior = np.sum(seen**2, axis=1), np.zeros((0, 1))
     squares = [np.sqrt(one)[:, None, None] for one in (nothing, left)]
-    fan = Rival(squares[1], prior, 1, own=OwnValues(curves, pulls))
+    fan = Rival(squares[1], prior, 1, own=OwnValues(curves, pulls, np.ones(RUNS)))
     return [Rival(squares[0], prior, 0), fan]
 
 
@@ -36,7 +36,7 @@ def test_evidence_is_the_integral_over_the_values_of_the_likeliest_size() -> Non
     """One run, of what is left of it below its noise, where the density is exactly Gaussian."""
     none, fan = fans(1, 0.2)
     assert fan.own is not None
-    one = OwnValues(fan.own.curves[:1], fan.own.pulls[:1])
+    one = OwnValues(fan.own.curves[:1], fan.own.pulls[:1], np.ones(1))
     grid = np.linspace(-1.0, 1.0, 401)
     places = np.stack(np.meshgrid(grid, grid), axis=-1).reshape(-1, 2)
     curve, pull = one.curves[0], one.pulls[0]
@@ -76,7 +76,7 @@ def test_sizes_are_close_enough_to_find_the_likeliest() -> None:
     for size in np.sqrt(told[:-1] * told[1:]):
         known = 30.0 / size  # values known to a thirtieth of their size
         pulls = np.full((RUNS, VALUES), known**2 * size)
-        found = OwnValues(np.tile(known**2 * np.eye(VALUES), (RUNS, 1, 1)), pulls)
+        found = OwnValues(np.tile(known**2 * np.eye(VALUES), (RUNS, 1, 1)), pulls, np.ones(RUNS))
         wide = known**2 * np.geomspace(0.5, 2.0, 401)[:, None, None] ** 2 * size**2
         gains = pulls**2 / known**2 * (wide / (1.0 + wide) - known**2 / (1.0 + known**2))
         best = (0.5 * np.sum(gains - np.log1p(wide), axis=(1, 2))).max()

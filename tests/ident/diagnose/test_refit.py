@@ -21,7 +21,7 @@ def test_a_search_ends_by_what_the_fit_costs_as_it_is_weighed(monkeypatch) -> No
     swings: Any = SimpleNamespace(under=lambda *_: "swings", scales=None)
     monkeypatch.setattr(module, "_joined", lambda *_: (None, None))
     monkeypatch.setattr(module, "replace", lambda one, **_: one)
-    monkeypatch.setattr(module, "_ranked", lambda _, __, cost: known.update(cost=cost))
+    monkeypatch.setattr(module, "ranked", lambda _, __, cost: known.update(cost=cost))
     current: Any = SimpleNamespace(
         samples=[None] * 3, model=None, unknowns=None, swings=swings, cost=9e4, scales=np.ones(2)
     )

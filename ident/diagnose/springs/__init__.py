@@ -1,0 +1,1 @@
+"""Cables that stretch, as the springs that they are."""

@@ -1,0 +1,157 @@
+"""Cables that stretch vibrate: the full motion beside its slow part, and starts that pluck them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+from freeswing.cdpr.model.batch import evaluate
+from freeswing.cdpr.model.elastic_motion import SPRUNG, lengths_of
+from freeswing.cdpr.model.equations import build_model
+from freeswing.cdpr.robot import POSE_COORDINATES
+from freeswing.cdpr.simulation.free_swing import Motion, simulate
+from freeswing.ident.diagnose.own_values import OwnValues
+from freeswing.ident.diagnose.refit import Refit, rescored, without
+from freeswing.ident.diagnose.springs import full_motion as module
+from freeswing.ident.diagnose.springs.full_motion import fully
+from freeswing.ident.likelihood.blocks import eased, first_unknowns
+from freeswing.ident.likelihood.fit import fit
+from freeswing.ident.likelihood.fit_swings import ONWARD, Swings
+from freeswing.ident.likelihood.run_residuals import plucked_start
+from freeswing.ident.likelihood.samples_and_noise import UNIT_NOISE_M, prepare
+from tests.ident.swings import TRUE_INERTIA, paper_model, recorded, swing
+
+EQUILIBRIA = (2, 5, 8)
+COMPLIANCE, DAMPING = 1e-4, 2e-7  # 8 kg on EA = 80 kN, 2 ms
+NOISE_M, LONG_S = 1e-4, 2.0
+SCALES = np.full(2, NOISE_M / UNIT_NOISE_M)
+
+
+@cache
+def vibrating(plucked_m: float) -> tuple[Motion, ...]:
+    """Releases with every cable let go of longer than it hangs, by so much."""
+    model, found = build_model(paper_model().robot, SPRUNG), []
+    for place in EQUILIBRIA:
+        start = swing(place, 0.015, 0.01, 1.0).zetas[0]
+        values = np.append([COMPLIANCE, DAMPING], model.start_values[2:])
+        values = eased(model, TRUE_INERTIA, values, np.append(start, np.zeros(6))[None])[0]
+        values[lengths_of(model)] += plucked_m * np.array([1.0, -0.5, 0.7, 0.2])
+        found.append(simulate(model, start, np.zeros(6), (0.0, LONG_S), TRUE_INERTIA, values))
+    return tuple(found)
+
+
+@cache
+def slow(plucked_m: float) -> Refit:
+    """The fit of these runs with stretch that follows its tension."""
+    rng, motions = np.random.default_rng(4), vibrating(plucked_m)
+    runs = [
+        recorded(one, f"run {k}", rng, NOISE_M, POSE_COORDINATES) for k, one in enumerate(motions)
+    ]
+    model = build_model(paper_model().robot, SPRUNG[:1])
+    told = [one.values[lengths_of(one.model)] for one in motions]
+    samples = tuple(
+        prepare(replace(run, lengths_m=lengths), (0.0, LONG_S))
+        for run, lengths in zip(runs, told, strict=True)
+    )
+    starts = np.array([np.append(one.zetas[0], one.rates[0]) for one in motions])
+    values = np.array([COMPLIANCE, DAMPING])
+    unknowns = first_unknowns(model, TRUE_INERTIA, starts, [None] * len(runs), values)
+    swings = Swings(model, samples, SCALES)
+    return rescored(fit(swings, unknowns, replace(ONWARD, tolerance=1.0)), SCALES, 1.0)
+
+
+@cache
+def full(plucked_m: float) -> Refit:
+    """The same runs with the full motion."""
+    return fully(slow(plucked_m), SPRUNG[0], SCALES, 1.0)
+
+
+@pytest.mark.parametrize("plucked_m", [0.0, 3e-4])
+def test_vibration_is_followed_to_the_noise_and_stretch_is_right(plucked_m: float) -> None:
+    found = full(plucked_m)
+    assert found.effects == SPRUNG
+    value, std = found.fit.value(SPRUNG[0]), found.fit.std(SPRUNG[0])
+    off = (value - [COMPLIANCE, DAMPING]) / std
+    assert np.abs(off).max() < 3.5, f"{off} deviations: {value} +- {std}"
+    left, before = (one.fit.cost / found.evidence.counts.sum() for one in (found, slow(plucked_m)))
+    assert left == pytest.approx(1.0, abs=0.06), left
+    assert before > 1.3, before
+
+
+def test_starts_that_pluck_cables_are_told_from_others() -> None:
+    """By so many times the whole weight, of all runs together; a start at ease by hardly any."""
+    truth = np.concatenate([_plucks(one) for one in vibrating(3e-4)])
+    known = full(3e-4).evidence.plucked
+    assert known is not None
+    size = np.sqrt(np.mean(truth**2))
+    assert known.likeliest()[0] == pytest.approx(size, rel=0.4), size
+    quiet = full(0.0).evidence.plucked
+    assert quiet is not None
+    assert quiet.likeliest()[0] < 0.03
+
+
+def _plucks(motion: Motion) -> np.ndarray:
+    usual = motion.values[motion.model.place_of(SPRUNG[1])][0]
+    return usual * plucked_start(motion)
+
+
+def test_a_start_at_ease_plucks_nothing() -> None:
+    rest = plucked_start(vibrating(0.0)[0])
+    assert np.abs(rest).max() < 1e-6, rest
+    assert plucked_start(swing(2, duration_s=1.0)).shape == (0,)
+
+
+def test_without_stretch_nothing_vibrates() -> None:
+    with pytest.raises(ValueError, match="rigid cables do not vibrate"):
+        build_model(paper_model().robot, SPRUNG[1:])
+    fewer = without(full(0.0).fit, SPRUNG[0], SCALES)
+    assert fewer.effects == ()
+
+
+def test_tensions_are_those_of_the_stretch() -> None:
+    motion = vibrating(3e-4)[0]
+    values, times = motion.values, np.array([0.0, 0.4])
+    lengths = evaluate(motion.model.lengths, motion.at(times)[0], values)[0]
+    slopes = np.gradient(
+        evaluate(motion.model.lengths, motion.at(np.array([0.4 - 1e-5, 0.4 + 1e-5]))[0], values)[0],
+        2e-5,
+        axis=0,
+    )[0]
+    rest = values[lengths_of(motion.model)]
+    pull = (lengths[1] - rest + DAMPING / COMPLIANCE * slopes) / (COMPLIANCE * rest)
+    np.testing.assert_allclose(motion.tensions(times)[1], pull, rtol=1e-6)
+
+
+@pytest.mark.parametrize(("chance", "taken"), [(0.49, False), (0.51, True)])
+def test_vibration_must_be_likelier_than_none(monkeypatch, chance, taken) -> None:
+    """A line of the noise is as good as a vibration that rings for ever."""
+    monkeypatch.setattr(module, "included", lambda *_: chance)
+    found = fully(slow(0.0), SPRUNG[0], SCALES, 1.0)
+    assert (SPRUNG[1] in found.effects) == taken
+
+
+@pytest.mark.parametrize(("times", "held"), [(1.95, [0.01, 0.01]), (2.05, [0.01, 0.01, 0.0205])])
+def test_plucks_beyond_what_they_were_held_to_are_fitted_again(monkeypatch, times, held) -> None:
+    usual = 0.01
+    fitted: list[float] = []
+    sizes = iter([times * usual, 0.0])
+    ranked = module.ranked
+
+    def counted(swings: Any, unknowns: Any, cost: float) -> Any:
+        fitted.append(float(unknowns.value(SPRUNG[1])[0]))
+        return ranked(swings, unknowns, cost)
+
+    monkeypatch.setattr(module, "ranked", counted)
+    monkeypatch.setattr(OwnValues, "likeliest", lambda _: (next(sizes), np.zeros(3)))
+    monkeypatch.setattr(module, "included", lambda *_: 1.0)
+    monkeypatch.setattr(module, "rescored", _unscored)
+    fully(slow(0.0), SPRUNG[0], SCALES, 1.0)
+    assert fitted == pytest.approx(held)
+
+
+def _unscored(found: Any, *_: Any) -> Any:
+    return Refit(found, full(0.0).evidence, full(0.0).score)
