@@ -15,6 +15,7 @@ from freeswing.cdpr.system.progress import Progress
 from freeswing.cdpr.system.threads import side_by_side
 from freeswing.ident.estimate import Estimate
 from freeswing.ident.fidim.fidim_stage import How, Weighting, fidim_estimates
+from freeswing.ident.fitted import Fitted, moved_by_missing, with_missing
 from freeswing.ident.inertia_starts import likelihood_starts
 from freeswing.ident.judge.far_samples import far_from_prediction
 from freeswing.ident.judge.free_against_full import ParameterComparison, between_runs, compare
@@ -22,11 +23,7 @@ from freeswing.ident.judge.free_swing_law import LawlessError, fidim_complaint
 from freeswing.ident.judge.lawful_runs import best_ml_estimate
 from freeswing.ident.judge.prediction import Prediction, fitted_motions
 from freeswing.ident.judge.validate import ValidatedRun, validate_run
-from freeswing.ident.judge.wrong_geometry import (
-    WrongGeometry,
-    geometry_of,
-    with_doubts,
-)
+from freeswing.ident.judge.wrong_geometry import geometry_of, with_doubts
 from freeswing.ident.likelihood.cable_ends import GeometryPriors, corrected
 from freeswing.ident.likelihood.calibration_modes import freed
 from freeswing.ident.likelihood.session_estimates import Asked
@@ -188,23 +185,6 @@ def identify(
     )
 
 
-@dataclass(frozen=True, slots=True)
-class Fitted:
-    """A maximum-likelihood estimate.
-
-    Attributes:
-        estimate: as it is reported.
-        robot: with its cable ends where the fit found them.
-        motions: its runs beside what it found for them.
-        wrong: how large errors of the cables' geometry its residuals ask for.
-    """
-
-    estimate: Estimate
-    robot: Robot
-    motions: tuple[Prediction, ...]
-    wrong: WrongGeometry
-
-
 def _estimated(
     model: Model,
     prepared: PreparedRuns,
@@ -236,12 +216,13 @@ def _estimated(
         taut, by_fidim, failures = fidim_estimates(model, prepared, *how)
         if served >= {run.name for run in taut.runs}:
             break
+    fitted, told = with_missing(fitted), how[0]
     if size := max((one.wrong.size for one in fitted.values()), default=0.0):
-        told = (
-            replace(how[0], wrong=geometry_of(robot, settings.geometry), wrong_size=size),
-            *how[1:],
-        )
-        taut, by_fidim, failures = fidim_estimates(model, prepared, *told)
+        told = replace(told, wrong=geometry_of(robot, settings.geometry), wrong_size=size)
+    if moved := moved_by_missing(fitted):
+        told = replace(told, missing=moved)
+    if told is not how[0]:
+        taut, by_fidim, failures = fidim_estimates(model, prepared, told, *how[1:])
     return taut, by_fidim, fitted, {**failures, **more}, lawless
 
 
@@ -280,9 +261,9 @@ def _likelihood_estimates(
             lawless = isinstance(error, LawlessError)
             continue
         starts = [entry.values, *starts]
-        told, wrong = with_doubts(entry, fit)
+        told, wrong, missing = with_doubts(entry, fit)
         truer, motions = corrected(robot, fit.model, fit.values), fitted_motions(fit)
-        found[name] = Fitted(told, truer, motions, wrong)
+        found[name] = Fitted(told, truer, motions, wrong, missing)
     return found, failures, lawless
 
 

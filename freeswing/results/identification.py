@@ -63,6 +63,7 @@ class Estimate(Entry):
         scatter_std: the same, as stretches of the runs say it where that is more (FIDIM).
         tolerances_std: the share of cable ends known to a stated tolerance (FIDIM).
         geometry_std: the share of a robot file as wrong as the residuals of the motions ask for.
+        forces_std: the share of forces that the residuals of the motions ask for.
         lengths_std: the stated cable lengths' share of the deviations (FIDIM).
         noise_bias: foreseen because noise reaches the columns unevenly (FIDIM).
         smoothing_bias: foreseen because smoothing takes some of the swing (FIDIM).
@@ -88,6 +89,7 @@ class Estimate(Entry):
     scatter_std: Numbers | None = absent(default=None)
     tolerances_std: Numbers | None = absent(default=None)
     geometry_std: Numbers | None = absent(default=None)
+    forces_std: Numbers | None = absent(default=None)
     lengths_std: Numbers | None = absent(default=None)
     noise_bias: Numbers | None = absent(default=None)
     smoothing_bias: Numbers | None = absent(default=None)

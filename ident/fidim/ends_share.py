@@ -63,6 +63,21 @@ def geometry_share(
     return Share(name, "geometry_std", size * _changes(model, runs, full, stack))
 
 
+def missing_share(changes: Array, stack: Stack) -> Share:
+    """The share of forces that the motions lack.
+
+    A force moves FIDIM's solution about as far as it moves that of maximum likelihood, which knows
+    the same equations along the same motions.
+
+    Args:
+        changes: what each does to the nine parameters, (k, 9).
+        stack: the runs' regressors.
+    """
+    essential = changes[:, stack.kept[1:]]
+    name = "forces that the motions lack, as residuals ask for them"
+    return Share(name, "forces_std", np.hstack([changes, essential]))
+
+
 def _changes(model: Model, runs: Sequence[PreparedRun], full: bool, stack: Stack) -> Array:
     """What each value does, off by its deviation, to the solution, (k, 9 + e)."""
     changes = []

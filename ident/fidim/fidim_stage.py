@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -14,7 +15,7 @@ from freeswing.cdpr.system.progress import Progress
 from freeswing.ident.estimate import Estimate, fidim_entry
 from freeswing.ident.fidim.bias import noise_bias, smoothing_bias
 from freeswing.ident.fidim.calibration_share import calibration_share
-from freeswing.ident.fidim.ends_share import ends_share, geometry_share
+from freeswing.ident.fidim.ends_share import ends_share, geometry_share, missing_share
 from freeswing.ident.fidim.fidim import FidimEstimate, fidim
 from freeswing.ident.fidim.length_share import length_share
 from freeswing.ident.fidim.payload_mass import LoadedCentre, MassEstimate, mass_from_payloads
@@ -62,6 +63,8 @@ class How:
         wrong: the robot with cables' geometry of known spread that errs as a whole, so many times
             as far as that (`ident.judge.wrong_geometry`); None where no residuals say so.
         wrong_size: how many.
+        missing: what forces that the motions lack do to the inertia, a row each, by full poses
+            (True) and by free coordinates (`ident.judge.missing_forces`).
     """
 
     weighting: Weighting = "published"
@@ -69,6 +72,7 @@ class How:
     ends: Model | None = None
     wrong: Model | None = None
     wrong_size: float = 0.0
+    missing: Mapping[bool, Array] = field(default_factory=dict)
 
 
 def fidim_estimates(
@@ -156,6 +160,8 @@ def _with_deviations(
             shares.append(geometry_share(how.wrong, how.wrong_size, runs, full, stack))
         except (ValueError, np.linalg.LinAlgError) as error:
             notes.append(f"{NOT_HELD} ({error})")
+    if full in how.missing:
+        shares.append(missing_share(how.missing[full], stack))
     if said := shares_sentence(shares, std):
         notes.append(said)
     entry = fidim_entry(raw, (), tuple(notes), weighted, shares, scatter)

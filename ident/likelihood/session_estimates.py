@@ -231,7 +231,8 @@ def _entry(
         notes.append(
             f"the residuals are not white (power below 5 Hz is {found.correlation:.3g} times that "
             "of white noise): the model misses something; standard deviations are enlarged for it, "
-            "but not for what it moves in all runs alike (`freeswing diagnose` asks what it is)"
+            "and for what it moves in all runs alike as far as the residuals tell (`freeswing "
+            "diagnose` asks what it is)"
         )
     wider = np.sqrt(np.diag(covariance) / np.diag(own)).max()
     if wider > 1.0:

@@ -251,7 +251,12 @@ HELD = (
         "tests/freeswing/session/test_exchanged_lengths.py",
     ),
     Held("ident/diagnose/search.py", ("MOST_ROUNDS",), "tests/ident/diagnose/test_search.py"),
-    Held("ident/judge/wrong_geometry.py", ("CHANCE",), "tests/ident/judge/test_wrong_geometry.py"),
+    Held("ident/judge/likely_sizes.py", ("CHANCE",), "tests/ident/judge/test_likely_sizes.py"),
+    Held(
+        "ident/judge/missing_forces.py",
+        ("FAR_FROM_WHITE",),
+        "tests/ident/judge/test_missing_forces.py",
+    ),
     Held("ident/judge/lawful_runs.py", ("AS_BAD",), "tests/ident/judge/test_lawful_runs.py"),
     Held(
         "ident/judge/far_samples.py", ("FAR", "MOST_FAR"), "tests/ident/judge/test_far_samples.py"

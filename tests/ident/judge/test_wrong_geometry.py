@@ -17,7 +17,7 @@ from freeswing.ident import identify as whole
 from freeswing.ident.fidim import fidim_stage
 from freeswing.ident.identify import Identification, IdentifySettings, identify
 from freeswing.ident.judge import wrong_geometry as room
-from freeswing.ident.judge.wrong_geometry import WrongGeometry, likely_size, with_wrong_geometry
+from freeswing.ident.judge.wrong_geometry import WrongGeometry, with_wrong_geometry
 from freeswing.ident.likelihood.cable_ends import GeometryPriors
 from freeswing.ident.runs import SwingRun
 from freeswing.main import main
@@ -31,26 +31,6 @@ from tests.ident.swings import (
 from tests.oracle.recorded.sessions import make_session
 
 ROBOT = paper_model().robot
-
-
-@pytest.mark.parametrize(("size", "colour"), [(0.0, 1.0), (0.0, 8.0), (1.0, 1.0), (30.0, 8.0)])
-def test_the_size_of_errors_is_found(size, colour):
-    """Within what 36 numbers tell; none where there are none, whatever colour residuals have."""
-    generator = np.random.default_rng(3)
-    answers = np.geomspace(300.0, 1e-3, 36)
-    for _ in range(20):
-        seen = np.sqrt(colour) * generator.standard_normal(36)
-        seen += size * answers * generator.standard_normal(36)
-        found = likely_size(answers, seen, colour)
-        assert 0.5 * size <= found <= 2.0 * size, (found, size)
-
-
-@pytest.mark.parametrize(("times", "sure"), [(3.60, False), (3.66, True)])
-def test_chance_makes_errors_likelier_in_one_session_of_a_thousand(times, sure):
-    """One number of many stands out; the rest settles the noise."""
-    answers = np.append(1.0, np.zeros(400))
-    seen = np.append(times, np.ones(400))
-    assert (likely_size(answers, seen, 1.0) > 0.0) == sure
 
 
 @cache
@@ -152,7 +132,7 @@ def test_a_question_that_fails_ends_no_result(kind, monkeypatch) -> None:
     def fails(_: object) -> WrongGeometry:
         raise kind("did not converge")
 
-    monkeypatch.setattr(room, "wrong_geometry", fails)
+    monkeypatch.setattr(room, "doubts", fails)
     runs = swings(2, 5, duration_s=2.4)
     found = identify(runs, ROBOT, IdentifySettings(predict=False)).estimates
     for name in ("ml_full", "ml_free"):
