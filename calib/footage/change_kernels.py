@@ -11,24 +11,34 @@ Image = NDArray[np.uint8]
 
 
 @kernel
-def largest_tile_change(before: Image, image: Image, tile: int) -> int:
-    """Largest sum over a tile of the absolute change of every second pixel of every second row."""
-    across = image.shape[1] // tile
-    sums = np.empty(across, dtype=np.int32)
-    line = np.empty(across * tile, dtype=np.int32)
-    largest = 0
-    for top in range(0, image.shape[0] // tile * tile, tile):
+def largest_tile_change(
+    before: Image, image: Image, tile: int, enough: int, first: int
+) -> tuple[np.int64, np.int64, np.int64]:
+    """Largest sum over a tile of the absolute change of every second pixel of every second row.
+
+    And row and column of that tile. Rows are gone through from number `first` on; the first tile
+    that changed by `enough` ends the search.
+    """
+    across, down = image.shape[1] // tile, image.shape[0] // tile
+    line = np.empty(across * tile, dtype=np.uint16)  # up to 16 rows of 255
+    largest = at_row = at_column = np.int64(0)
+    for k in range(down):
+        row = (first + k) % down
         line[:] = 0
-        for v in range(top, top + tile, 2):
+        for v in range(row * tile, (row + 1) * tile, 2):
             old, new = before[v], image[v]
             for u in range(across * tile):
-                line[u] += abs(np.int32(new[u]) - np.int32(old[u]))
-        sums[:] = 0
-        for k in range(across):
-            for u in range(k * tile, (k + 1) * tile, 2):
-                sums[k] += line[u]
-        largest = max(largest, sums.max())
-    return largest
+                change = np.uint8(max(new[u], old[u])) - np.uint8(min(new[u], old[u]))
+                line[u] += np.uint16(change)
+        for left in range(0, across * tile, tile):
+            total = np.int64(0)
+            for u in range(left, left + tile, 2):
+                total += line[u]
+            if total > largest:
+                largest, at_row, at_column = total, np.int64(row), np.int64(left // tile)
+        if largest >= enough:
+            break
+    return largest, at_row, at_column
 
 
 @kernel

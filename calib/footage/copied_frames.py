@@ -6,8 +6,10 @@ A recorder that runs faster than its source repeats frames; a lossy codec then s
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -33,9 +35,24 @@ _LEAST_GREY = 3.0
 _AROUND = 2
 
 
-def largest_change(before: Image, image: Image) -> float:
-    """Mean absolute change of the tile that changed most."""
-    return largest_tile_change(before, image, _TILE) / (_TILE // 2) ** 2
+_LARGEST = 255.0  # change of a grey value
+
+
+def largest_change(
+    before: Image, image: Image, enough: float = _LARGEST, first: int = 0
+) -> tuple[float, tuple[int, int]]:
+    """Mean absolute change of the tile that changed most, and its row and column.
+
+    Args:
+        before: grey, (h, w).
+        image: the frame after it.
+        enough: a tile that changed by so much ends the search, whatever the others did.
+        first: the row of tiles to begin with.
+    """
+    pixels = (_TILE // 2) ** 2
+    enough = math.ceil(enough * pixels)
+    most, row, column = largest_tile_change(before, image, _TILE, enough, first)
+    return float(most) / pixels, (int(row), int(column))
 
 
 Frame = tuple[int, str, Image]
@@ -59,17 +76,61 @@ def largest_shift_px(before: Image, image: Image) -> float:
     return float((moved[told] / steep[told]).max(initial=0.0))
 
 
+def tile_shift_px(before: Image, image: Image, tile: tuple[int, int]) -> float:
+    """How far the edges of the tile in this row and column went: no more than the largest."""
+    near = tuple(
+        slice(max(_TILE * at - 1, 0), min(_TILE * (at + 1) + 1, size // _TILE * _TILE))
+        for at, size in zip(tile, image.shape, strict=True)
+    )
+    inner = tuple(slice(min(at, 1), min(at, 1) + _TILE) for at in tile)
+    old = before[near].astype(np.float32)
+    change = (image[near].astype(np.float32) - old)[inner]
+    down, right = (np.asarray(slope)[inner] for slope in np.gradient(old))
+    steep = float((down**2 + right**2).sum())
+    if not steep > (_TILE * _EDGE_GREY) ** 2:
+        return 0.0
+    return math.hypot(float((down * change).sum()), float((right * change).sum())) / steep
+
+
+@dataclass(slots=True)
+class _Change:
+    """From the frame before to a frame: a copy is told by the whole of it, others by less.
+
+    Attributes:
+        before: the frame before; None where there is none.
+        image: the frame.
+        least: the change is at least so large.
+        tile: row and column of a tile that changed so much.
+        is_whole: whether that is the change.
+    """
+
+    before: Image | None
+    image: Image
+    least: float
+    tile: tuple[int, int]
+    is_whole: bool
+
+    def whole(self) -> float:
+        """The change, which is looked for now if it was not."""
+        if not self.is_whole and self.before is not None:
+            self.least, self.is_whole = largest_change(self.before, self.image)[0], True
+        return self.least
+
+
 def with_copies(frames: Iterable[Frame]) -> Iterator[tuple[Frame, bool]]:
     """Every frame, and whether it only repeats the one before; two frames are looked ahead.
 
     The first `WARM_UP` frames after any other start than the recording's may be judged otherwise.
     """
-    held: deque[tuple[Frame, Image | None, float]] = deque()  # not yet given, and their changes
-    past: deque[float] = deque(maxlen=_AROUND)  # changes of the frames given
+    held: deque[tuple[Frame, _Change]] = deque()  # not yet given, and their changes
+    past: deque[_Change] = deque(maxlen=_AROUND)  # changes of the frames given
     before: Image | None = None
+    tile = 0, 0  # where much changed, much will
     for frame in frames:
-        change = np.inf if before is None else largest_change(before, frame[2])
-        held.append((frame, before, change))
+        change, enough = np.inf, COPY_SHARE * _LARGEST
+        if before is not None:
+            change, tile = largest_change(before, frame[2], enough, tile[0])
+        held.append((frame, _Change(before, frame[2], change, tile, change < enough)))
         before = frame[2]
         if len(held) > _AROUND:
             yield _judged(held, past)
@@ -80,17 +141,19 @@ def with_copies(frames: Iterable[Frame]) -> Iterator[tuple[Frame, bool]]:
 WARM_UP = _AROUND + 1
 
 
-def _judged(
-    held: deque[tuple[Frame, Image | None, float]], past: deque[float]
-) -> tuple[Frame, bool]:
-    frame, before, change = held.popleft()
-    around = [c for c in (*past, *(c for _, _, c in held)) if np.isfinite(c)]
-    past.append(change)
-    if before is None or change == 0.0:
-        return frame, change == 0.0
-    usual = max(around, default=0.0)
-    alike = usual > _LEAST_GREY and change < COPY_SHARE * usual
-    return frame, alike and largest_shift_px(before, frame[2]) < COPY_SHIFT_PX
+def _judged(held: deque[tuple[Frame, _Change]], past: deque[_Change]) -> tuple[Frame, bool]:
+    frame, own = held.popleft()
+    around = [one for one in (*past, *(one for _, one in held)) if one.before is not None]
+    past.append(own)
+    if own.before is None or not own.is_whole or own.least == 0.0:
+        return frame, own.least == 0.0
+    if tile_shift_px(own.before, frame[2], own.tile) >= COPY_SHIFT_PX:
+        return frame, False  # whatever is around
+    usual = max((one.least for one in around), default=0.0)
+    if not own.least < COPY_SHARE * usual:
+        usual = max((one.whole() for one in around), default=0.0)
+    alike = usual > _LEAST_GREY and own.least < COPY_SHARE * usual
+    return frame, alike and largest_shift_px(own.before, frame[2]) < COPY_SHIFT_PX
 
 
 def are_many(copies: int, frames: int) -> bool:

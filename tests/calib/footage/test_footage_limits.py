@@ -31,10 +31,25 @@ def test_a_copy_changes_by_less_than_a_seventh_of_its_neighbours(change, is_copy
     assert told[2][1] == is_copy
 
 
+@pytest.mark.parametrize(("elsewhere", "is_copy"), [(130, False), (140, True)])
+def test_what_is_around_is_looked_at_whole_where_it_decides(
+    monkeypatch, elsewhere, is_copy
+) -> None:
+    """The first tile changes by enough to be no copy; another one decides what is a copy."""
+    monkeypatch.setattr(copied_frames, "largest_shift_px", lambda *_: 0.0)
+    monkeypatch.setattr(copied_frames, "tile_shift_px", lambda *_: 0.0)
+    images = [grey(0), grey(0), grey(20), grey(20)]
+    for image, more in zip(images, (0, 1, 1, 0), strict=True):
+        image[:16] += np.uint8(40 * more)
+        image[16:] += np.uint8(elsewhere * more)
+    told = list(with_copies((k, "", image) for k, image in enumerate(images)))
+    assert [copy for _, copy in told] == [False, False, is_copy, False]
+
+
 @pytest.mark.parametrize(("usual", "is_copy"), [(2.8, False), (3.2, True)])
 def test_where_nothing_moves_nothing_is_a_copy(monkeypatch, usual, is_copy) -> None:
     changes = iter([usual, 0.01, usual])
-    monkeypatch.setattr(copied_frames, "largest_change", lambda *_: next(changes))
+    monkeypatch.setattr(copied_frames, "largest_change", lambda *_: (next(changes), (0, 0)))
     told = list(with_copies((k, "", grey(0)) for k in range(4)))
     assert told[2][1] == is_copy
 
