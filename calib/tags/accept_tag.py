@@ -125,3 +125,38 @@ def fit_guess(
     found[BLACK], found[CONTRAST], found[BLUR] = fitted.state[0], fitted.state[1], blur
     found[NOISE], found[EXPLAINED], found[PIXELS] = fitted.noise, fitted.explained, fitted.pixels
     return found
+
+
+@kernel
+def fit_guesses(
+    image: NDArray[np.uint8],
+    rays: Rays,
+    guesses: Array,
+    cells: Array,
+    before: Array,
+    limits: Array,
+    tables: Array,
+) -> Array:
+    """`fit_guess` of tags with as many cells, each from a good prediction, (n, NUMBERS).
+
+    Args:
+        image: grey, (h, w).
+        rays: undistorted coordinates of every pixel, (h, w, 2).
+        guesses: rays and pixels of the corners, (n, 2, 4, 2).
+        cells: (n, m + 2, m + 2).
+        before: black, contrast, blur in px and noise, (n, 4).
+        limits: as of `fit_guess`.
+        tables: of the Gaussian.
+
+    Source:
+        Lucas, Kanade 1981, An Iterative Image Registration Technique, sec. 4.
+    """
+    found = np.empty((len(guesses), NUMBERS))
+    levels = np.empty(3)
+    for k in range(len(guesses)):
+        levels[0], levels[1], levels[2] = before[k, 0], before[k, 1], before[k, 3]
+        blurs = before[k, 2:3]
+        fit = fit_guess(image, rays, guesses[k], cells[k], blurs, levels, limits, tables)
+        for i in range(NUMBERS):
+            found[k, i] = fit[i]
+    return found

@@ -22,6 +22,7 @@ from freeswing.calib.tags.accept_tag import (
     PIXELS,
     RAYS,
     fit_guess,
+    fit_guesses,
 )
 from freeswing.calib.tags.corner_kernels import Rays
 from freeswing.calib.tags.gaussian_tables import TABLES
@@ -137,6 +138,37 @@ def fit_tag(
         np.array([noise, most_pixels], dtype=np.float64),
         TABLES,
     )
+    return _tag_fit(found)
+
+
+def fit_predicted(
+    image: Image,
+    rays: Rays,
+    guesses: Array,
+    cells: Array,
+    before: Array,
+    *,
+    noise: float = 1.0,
+    most_pixels: int = ALL_PIXELS,
+) -> list[TagFit | None]:
+    """`fit_tag` of several tags that have as many cells, from good predictions, at one call.
+
+    Args:
+        image: grey, (h, w).
+        rays: `lens_rays` of the camera.
+        guesses: corners in the coordinates of `rays` and in pixels, (n, 2, 4, 2).
+        cells: `rimmed_cells` of each tag, (n, m + 2, m + 2).
+        before: black, contrast, blur in px and noise of each in the frame before, (n, 4).
+        noise: as of `fit_tag`.
+        most_pixels: as of `fit_tag`.
+    """
+    limits = np.array([noise, most_pixels], dtype=np.float64)
+    found = fit_guesses(image, rays, guesses, cells, before, limits, TABLES)
+    return [_tag_fit(one) for one in found]
+
+
+def _tag_fit(found: Array) -> TagFit | None:
+    """From what `fit_guess` gives."""
     pixels = int(found[PIXELS])
     if not pixels:
         return None

@@ -18,6 +18,7 @@ from freeswing.calib.tags.corner_kernels import Rays
 from freeswing.calib.tags.corners import (
     FIRST_BLURS_PX,
     TagFit,
+    fit_predicted,
     fit_tag,
     lens_rays,
     rimmed_cells,
@@ -32,6 +33,7 @@ from freeswing.vision.look.watched_target import Watch
 
 Array = NDArray[np.float64]
 Image = NDArray[np.uint8]
+Mask = NDArray[np.bool_]
 
 Look = tuple[float, float, float, float]
 """Black, contrast, blur in px and noise of a tag when it was last seen."""
@@ -89,14 +91,17 @@ class Follower:
     count: int = 0
     _rays: Rays = field(init=False, repr=False)
     _finder: TagFinder = field(init=False, repr=False)
+    _cells: list[tuple[NDArray[np.int64], Array]] = field(init=False, repr=False)
     _plates: Plates = field(init=False, repr=False)
     _lens: tuple[bool, Array, Array] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         self._rays = lens_rays(self.camera)
         self._lens = _lens_numbers(self.camera)
-        cells = [rimmed_cells(family, number).shape[0] - 2 for family, number in self.watch.tags]
-        self._plates = Plates.of(self.watch.tag_corners_m, np.array(cells, dtype=float))
+        patterns = [rimmed_cells(family, number) for family, number in self.watch.tags]
+        self._cells = _by_size(patterns)
+        counts = np.array([len(cells) - 2 for cells in patterns], dtype=float)
+        self._plates = Plates.of(self.watch.tag_corners_m, counts)
         self._finder = TagFinder.of((*self.watch.tags, *self.watch.base_tags))
 
     def look(self, image: Image, time_s: float) -> FrameView:
@@ -131,35 +136,54 @@ class Follower:
             self.watch.tag_corners_m, pose[0], pose[1], *self._lens, _FACING
         )
         seen &= ~self._plates.hidden(*pose)
-        found: dict[int, TagFit] = {}
-        near = len(self.past) >= _KEPT_POSES
+        found: dict[int, TagFit | None] = {}
+        if len(self.past) >= _KEPT_POSES:
+            found = self._fit_predicted(image, seen, guesses)
         for k in np.flatnonzero(seen).tolist():
-            fit = self._fit(image, k, guesses[k, 0], guesses[k, 1], near=near)
-            if fit is not None:
-                found[k] = fit
+            if k not in found:
+                found[k] = self._fit(image, k, guesses[k, 0], guesses[k, 1], near=False)
+        return {k: fit for k, fit in found.items() if fit is not None}
+
+    def _fit_predicted(self, image: Image, seen: Mask, guesses: Array) -> dict[int, TagFit | None]:
+        """Tags that were seen in the frame before, those with as many cells at one call."""
+        found: dict[int, TagFit | None] = {}
+        for places, cells in self._cells:
+            things = [k for k in self.before if k < len(seen) and seen[k] and places[k] >= 0]
+            if not things:
+                continue
+            before = np.array([self.before[k] for k in things])
+            patterns = cells[places[things]]
+            fits = fit_predicted(
+                image, self._rays, guesses[things], patterns, before, most_pixels=MOST_PIXELS
+            )
+            found |= zip(things, fits, strict=True)
+        for thing, fit in found.items():
+            self._remember(thing, fit)
         return found
 
     def _fit(
         self, image: Image, thing: int, guess: Array, guess_px: Array, *, near: bool
     ) -> TagFit | None:
         family, tag_id = (*self.watch.tags, *self.watch.base_tags)[thing]
-        cells = rimmed_cells(family, tag_id)
         before = self.before.get(thing) if near else None
         fit = fit_tag(
             image,
             self._rays,
             guess,
             guess_px,
-            cells,
+            rimmed_cells(family, tag_id),
             blurs_px=FIRST_BLURS_PX if before is None else (before[2],),
             most_pixels=MOST_PIXELS,
             before=before,
         )
+        self._remember(thing, fit)
+        return fit
+
+    def _remember(self, thing: int, fit: TagFit | None) -> None:
         if fit is None:
             self.before.pop(thing, None)
         else:
             self.before[thing] = (fit.black, fit.contrast, fit.blur_px, fit.noise)
-        return fit
 
     def _search(self, image: Image) -> dict[int, TagFit]:
         names = self.watch.tags
@@ -237,6 +261,17 @@ class Follower:
         if is_covered(coarse):
             return COVERED
         return NOTHING
+
+
+def _by_size(patterns: list[Array]) -> list[tuple[NDArray[np.int64], Array]]:
+    """For each size of patterns: which place of the row each has, -1 for others, and the row."""
+    sizes = np.array([len(cells) for cells in patterns], dtype=np.int64)
+    rows = []
+    for size in np.unique(sizes):
+        mine = sizes == size
+        places = np.where(mine, np.cumsum(mine) - 1, -1)
+        rows.append((places, np.array([patterns[k] for k in np.flatnonzero(mine)])))
+    return rows
 
 
 def _lens_numbers(camera: Camera) -> tuple[bool, Array, Array]:

@@ -72,25 +72,62 @@ def _hidden(
 ) -> NDArray[np.bool_]:
     """Walks along the edges of what is read; see `Plates.hidden`."""
     found = np.zeros(len(read), dtype=np.bool_)
-    plate, corners, point = np.empty((4, 3)), np.empty((4, 3)), np.empty(3)
+    if len(pairs) == 0:
+        return found
+    edges, plates = _placed(read, rotation, position), _placed(whole, rotation, position)
+    edge_sides, plate_sides = _sides(edges), _sides(plates)
+    point = np.empty(3)
     for m in range(len(pairs)):
         i, j = pairs[m]
-        if found[i]:
+        if found[i] or _apart(edge_sides, i, plate_sides, j):
             continue
-        for k in range(4):
-            for a in range(3):
-                plate[k, a] = corners[k, a] = position[a]
-                for b in range(3):
-                    plate[k, a] += rotation[a, b] * whole[j, k, b]
-                    corners[k, a] += rotation[a, b] * read[i, k, b]
         for k in range(4):
             for step in range(_EDGE_POINTS):
                 share = step / _EDGE_POINTS
                 for a in range(3):
-                    point[a] = corners[k, a] + share * (corners[(k + 1) % 4, a] - corners[k, a])
-                if _covers(plate, point):
+                    first = edges[i, k, a]
+                    point[a] = first + share * (edges[i, (k + 1) % 4, a] - first)
+                if _covers(plates[j], point):
                     found[i] = True
     return found
+
+
+@kernel
+def _placed(corners: Array, rotation: Array, position: Array) -> Array:
+    """Corners (n, 4, 3) in the camera's frame."""
+    placed = np.empty_like(corners)
+    for i in range(len(corners)):
+        for k in range(4):
+            for a in range(3):
+                placed[i, k, a] = position[a]
+                for b in range(3):
+                    placed[i, k, a] += rotation[a, b] * corners[i, k, b]
+    return placed
+
+
+@kernel
+def _sides(corners: Array) -> Array:
+    """Least and largest x/z and y/z of each four corners, (n, 4); all where one is not ahead."""
+    sides = np.empty((len(corners), 4))
+    for i in range(len(corners)):
+        sides[i, 0] = sides[i, 2] = np.inf
+        sides[i, 1] = sides[i, 3] = -np.inf
+        for k in range(4):
+            if not corners[i, k, 2] > 0.0:
+                sides[i, 0] = sides[i, 2] = -np.inf
+                sides[i, 1] = sides[i, 3] = np.inf
+                break
+            x, y = corners[i, k, 0] / corners[i, k, 2], corners[i, k, 1] / corners[i, k, 2]
+            sides[i, 0], sides[i, 1] = min(sides[i, 0], x), max(sides[i, 1], x)
+            sides[i, 2], sides[i, 3] = min(sides[i, 2], y), max(sides[i, 3], y)
+    return sides
+
+
+@kernel
+def _apart(one: Array, i: int, other: Array, j: int) -> bool:
+    """Whether two boxes of `_sides` have nothing in common: then neither covers the other."""
+    across = one[i, 1] < other[j, 0] or other[j, 1] < one[i, 0]
+    return across or one[i, 3] < other[j, 2] or other[j, 3] < one[i, 2]
 
 
 @kernel

@@ -8,7 +8,7 @@ import pytest
 from freeswing.calib.tags.corners import lens_rays
 from freeswing.cdpr.measured.target import Tag, Target
 from freeswing.vision.look.detect import TagFinder, detect_tags
-from freeswing.vision.look.follow import COVERED, NOTHING, OVEREXPOSED, USED, Follower
+from freeswing.vision.look.follow import COVERED, NOTHING, OVEREXPOSED, USED, Follower, FrameView
 from freeswing.vision.look.watched_target import Watch
 from freeswing.vision.render.patterns import plain_patch, tag_patch
 from freeswing.vision.render.render_scene import Look, Renderer, Scene, still
@@ -29,15 +29,37 @@ def positions_in_camera(times_s) -> np.ndarray:
     return VIEW.to_camera(swing(times_s)[0])
 
 
+def place_of(view: FrameView) -> np.ndarray:
+    assert view.pose is not None
+    return view.pose[1]
+
+
 def test_every_tag_is_followed_and_the_pose_is_right(frames) -> None:
     follower = Follower(VIEW, WATCH)
     views = [follower.look(image, t) for image, t in zip(frames, TIMES, strict=True)]
     seen = [len(view.sightings) for view in views]
-    error = np.array([v.pose[1] for v in views]) - positions_in_camera(TIMES)
+    places = [place_of(view) for view in views]
+    error = np.array(places) - positions_in_camera(TIMES)
     assert min(seen) == 6, f"tags seen {seen}"
     assert {view.status for view in views} == {USED}
     assert np.abs(error).max() < 3e-4, f"{1e3 * np.abs(error).max():.3f} mm"
     assert len(follower.past) == 3, "the motion is predicted from three poses"
+
+
+def test_tags_of_several_sizes_are_followed_as_if_alone() -> None:
+    """Eight cells a side and six: those of one size are fitted at one call."""
+    tags = list(platform_tags())
+    tags[1:4:2] = (Tag("4x4_50", k, 0.09, tags[k].T_platform_tag) for k in (1, 3))
+    renderer = Renderer(VIEW, scene_of(tuple(tags)), Look(), seed=4)
+    images = list(renderer.frames(TIMES[:6]))
+    together = Follower(VIEW, Watch.of(Target(tuple(tags))))
+    apart = [Follower(VIEW, Watch.of(Target((tag,)))) for tag in tags]
+    for image, t in zip(images, TIMES, strict=False):
+        rays = {s.thing: s.rays for s in together.look(image, t).sightings}
+        alone = [one.look(image, t).sightings[0] for one in apart]
+        assert sorted(rays) == list(range(len(tags)))
+        off = max(np.abs(rays[k] - one.rays).max() for k, one in enumerate(alone)) * 1300.0
+        assert off < 0.01, f"{off:.4f} px"
 
 
 def test_it_searches_only_when_lost(frames, monkeypatch) -> None:
@@ -80,10 +102,9 @@ def test_hidden_and_half_hidden_tags_are_left_out() -> None:
     )
     renderer = Renderer(VIEW, scene_of(tags, extra=hiding), Look())
     follower = Follower(VIEW, WATCH)
-    for k, t in enumerate(TIMES[:5]):
-        view = follower.look(renderer.frame(t, k), t)
-    things = {s.thing for s in view.sightings}
-    error = np.abs(view.pose[1] - positions_in_camera(TIMES[4:5])[0]).max()
+    views = [follower.look(renderer.frame(t, k), t) for k, t in enumerate(TIMES[:5])]
+    things = {s.thing for s in views[-1].sightings}
+    error = np.abs(place_of(views[-1]) - positions_in_camera(TIMES[4:5])[0]).max()
     assert 2 not in things, things
     assert error < 4e-4, f"{1e3 * error:.3f} mm"
 
