@@ -1,5 +1,8 @@
 """A budget of time for the full tier: the most telling tests first, none started once it is spent.
 
+Then the longest files: a file is run by one process, and one that began last would leave the other
+core idle to its end.
+
     python -m pytest -p tests.budget --minutes 40 -m slow -n 2 --dist loadfile
 
 What was not started is skipped by name and counted in the last lines. Without --minutes there is
@@ -30,6 +33,16 @@ TELLING = (
     "tests/ident/test_identify.py",
 )
 
+# Processor seconds of their slow tests; all others take less than 45.
+LONG = (
+    "tests/ident/drive/test_drive_diagnosis.py",  # 160
+    "tests/vision/untagged/test_untagged_identified.py",  # 160
+    "tests/ident/bench/test_bench_diagnosis.py",  # 135
+    "tests/samples/test_driven.py",  # 70
+    "tests/vision/footage/test_phones.py",  # 60
+)
+FIRST = (*TELLING, *LONG)
+
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--minutes", type=float, help="start no test after so many minutes")
@@ -47,7 +60,7 @@ def pytest_configure(config: pytest.Config) -> None:
 def rank(nodeid: str) -> int:
     """Where a test's file stands; those that are not named come last, in their own order."""
     path = nodeid.partition("::")[0]
-    return TELLING.index(path) if path in TELLING else len(TELLING)
+    return FIRST.index(path) if path in FIRST else len(FIRST)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
