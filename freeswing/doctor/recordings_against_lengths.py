@@ -170,8 +170,13 @@ def _orders(part: Trajectory, robot: Robot) -> Iterator[_Reading]:
 
 
 def _slips(part: Trajectory, robot: Robot) -> Iterator[_Reading]:
-    """One end of one cable with a sign turned, two numbers exchanged or a decimal point moved."""
+    """One end of one cable with a sign turned, two numbers exchanged or a decimal point moved.
+
+    None where cables keep their length: what is stated may be wrong by what one of many slips does.
+    """
     part = _thinned(part)
+    if _lengths_off(build_model(robot), part, None) < LENGTHS_OFF_M:
+        return
     model = build_model(robot, tuple(ENDS))
     for effect, (key, _) in ENDS.items():
         for k, cable in enumerate(robot.cables):
