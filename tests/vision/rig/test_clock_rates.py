@@ -58,6 +58,18 @@ def test_quartz_is_no_farther_off(apart, refused) -> None:
         refuse_far_apart(views, rates)
 
 
+def test_a_camera_that_hardly_tells_refuses_none() -> None:
+    """It had been named beside the one whose rate is sure, and is put right by nothing."""
+    values, deviations = np.array([5e-5, 0.0, -4e-4]), np.array([1e-6, 1e-6, 3e-4])
+    rates = Rates(values, deviations, 5.0, 3.0)
+    views = [stub(camera=stub(name=name)) for name in ("left", "middle", "right")]
+    assert rates.real.tolist() == [True, False, False]
+    refuse_far_apart(views, rates)
+    sure = Rates(np.array([3e-4, 0.0, -4e-4]), deviations, 5.0, 3.0)
+    with pytest.raises(DataError, match=r"cameras left and middle: .* 0\.030 % longer"):
+        refuse_far_apart(views, sure)
+
+
 def test_what_shows_frames_takes_their_stamps_put_right(monkeypatch) -> None:
     numbers = (("rate", 1e-3, 1e-6), ("about_s", 2.0, 0.0))
     rate = rate_by([stub(effect="clock_rate", parameters=numbers)])
