@@ -40,7 +40,7 @@ from freeswing.vision.track_run import RunTrack, track_run
 from freeswing.vision.tracking_report import tracking_document
 
 _LAYOUT_ROUNDS = 3
-_NEVER = "seen in no run beside another tag of target.toml: hidden, or its id is another"
+_NEVER = "seen in no run: hidden, or its id is another"
 _FOLLOWING = 0.85  # share of the time that goes into the images
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,11 +11,14 @@ import pytest
 from freeswing.calib.board.recordings import Recording
 from freeswing.calib.footage.frame_times import frame_times
 from freeswing.cdpr.files.problems import InputError
-from freeswing.vision.fuse.tag_layout import LayoutSums, never_seen
+from freeswing.vision.fuse.fuse_cameras import fuse
+from freeswing.vision.fuse.run_views import instants_of
+from freeswing.vision.fuse.tag_layout import LayoutSums, layout_sums, never_seen
 from freeswing.vision.look.video import write_stamps, write_video
 from freeswing.vision.look.watched_target import Watch
 from freeswing.vision.track_run import CameraCount, left_out_text
 from tests.vision.loops import TARGET
+from tests.vision.rig.made_views import Recorded, made_views
 
 STAMPS_S = np.arange(30) / 20.0
 
@@ -57,10 +61,21 @@ def test_what_is_left_out_mostly_is_not_as_stated(number: int, wrong: bool) -> N
 def test_a_tag_that_no_run_shows_is_named() -> None:
     watch = Watch.of(TARGET)
     n = len(watch.tags)
-    shown = [np.ones(6 * n), np.ones(6 * n)]
-    for one in shown:
-        one[6:12] = 0.0
-    sums = [LayoutSums(np.diag(one), np.zeros(6 * n)) for one in shown]
-    assert never_seen(sums, watch) == [watch.name(1)]
-    shown[1][6:12] = 1.0
-    assert never_seen([LayoutSums(np.diag(one), np.zeros(6 * n)) for one in shown], watch) == []
+    shown = np.ones((2, n), dtype=bool)
+    shown[:, 1] = False
+    told = [LayoutSums(np.zeros((6 * n, 6 * n)), np.zeros(6 * n), one) for one in shown]
+    assert never_seen(told, watch) == [watch.name(1)]
+    shown[1, 1] = True
+    assert never_seen(told, watch) == []
+
+
+def test_a_tag_far_off_its_place_is_not_called_hidden(tmp_path: Path) -> None:
+    """What is left out, or seen alone, had been said to be seen in no run."""
+    views, watch = made_views(tmp_path, (Recorded(), Recorded()), seconds=1.0)
+    corners = watch.tag_corners_m.copy()
+    corners[0] += 0.02
+    watch = replace(watch, tag_corners_m=corners)
+    poses, fit = fuse(views, watch, instants_of(views))
+    sums = layout_sums(poses, fit, views, watch)
+    assert not sums.normal[:6].any()
+    assert never_seen([sums], watch) == []

@@ -29,10 +29,11 @@ _REJECT = 400.0  # mean square: 20 deviations; a tag some millimetres off its pl
 
 @dataclass(frozen=True, slots=True)
 class LayoutSums:
-    """Normal matrix (6 n, 6 n) and right side (6 n,) of the tags' shifts and turns."""
+    """Normal matrix (6 n, 6 n), right side (6 n,) of tags' shifts, turns; which are seen (n,)."""
 
     normal: Array
     right: Array
+    seen: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,9 +54,11 @@ def layout_sums(poses: Poses, fit: Fit, views: Sequence[CameraViews], watch: Wat
     """What one run says about the layout."""
     size = 6 * len(watch.tags)
     normal, right = np.zeros((size, size)), np.zeros(size)
+    seen = np.zeros(len(watch.tags), dtype=bool)
     for block in blocks(views, watch, poses.times_s, poses):
         _add_block(block, poses, views, watch, fit.noise, normal, right)
-    return LayoutSums(normal, right)
+        seen |= np.isin(np.arange(len(seen)), block.things)
+    return LayoutSums(normal, right, seen)
 
 
 def layout_change(sums: Sequence[LayoutSums], watch: Watch) -> LayoutChange:
@@ -82,9 +85,9 @@ def layout_change(sums: Sequence[LayoutSums], watch: Watch) -> LayoutChange:
 
 
 def never_seen(sums: Sequence[LayoutSums], watch: Watch) -> list[str]:
-    """Names of the tags that no run shows beside another one, where there are two or more."""
-    seen = np.diag(np.sum([s.normal for s in sums], axis=0))[::6] > 0.0
-    return [watch.name(k) for k in range(len(seen)) if len(seen) > 1 and not seen[k]]
+    """Names of the tags that no run shows, wherever it has them."""
+    seen = np.any([one.seen for one in sums], axis=0)
+    return [watch.name(int(k)) for k in np.flatnonzero(~seen)]
 
 
 def with_layout(watch: Watch, corners_m: Array) -> Watch:
