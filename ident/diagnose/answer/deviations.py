@@ -63,10 +63,13 @@ def with_ways(covariance: Array, final: LikelihoodFit, told: Exchange) -> Array:
         both = np.all([one.free[k] for one, k in zip(fits, where, strict=True)], axis=0)
         mine, here, there = (k[both] for k in where)
         away = _values(other, common)[both] - _values(stands, common)[both]
-        more = other.covariance[np.ix_(there, there)] - stands.covariance[np.ix_(here, here)]
-        sizes, axes = np.linalg.eigh(more)
-        more = (axes * np.maximum(sizes, 0.0)) @ axes.T
-        wider[np.ix_(mine, mine)] += probability * (np.outer(away, away) + more)
+        known = other.covariance[np.ix_(there, there)], stands.covariance[np.ix_(here, here)]
+        more = np.outer(away, away)
+        # Where runs leave anything open no number has a finite variance: there is no difference.
+        if np.isfinite(known).all():
+            sizes, axes = np.linalg.eigh(known[0] - known[1])
+            more += (axes * np.maximum(sizes, 0.0)) @ axes.T
+        wider[np.ix_(mine, mine)] += probability * more
     return wider
 
 

@@ -129,6 +129,19 @@ def test_deviations_hold_what_other_ways_make_of_it(chance: float) -> None:
     np.testing.assert_array_equal(with_ways(stands.covariance, stands, without), np.eye(10))
 
 
+@pytest.mark.parametrize(("mine", "others"), [(1.0, np.inf), (np.inf, np.inf), (np.inf, 1.0)])
+def test_what_runs_leave_open_counts_by_its_values_alone(mine: float, others: float) -> None:
+    """All deviations had been NaN where one of both fits lacks rank."""
+    stands, other = stub(0.0, 1.0, (), 0.0), stub(3.0, 1.0, (), 0.0)
+    for one, variance in ((stands, mine), (other, others)):
+        np.fill_diagonal(one.covariance, variance)
+    exchange = Exchange(
+        (), 0.9, (SimpleNamespace(fit=stands),), (Way(AXES, 0.1, SimpleNamespace(fit=other)),)
+    )
+    wider = with_ways(stands.covariance, stands, exchange)
+    assert np.diag(wider) == pytest.approx([mine + 0.1 * 9.0] * 9)
+
+
 def test_an_anchor_that_another_way_does_not_have_keeps_its_deviation() -> None:
     stands, other = stub(0.0, 1.0, ("anchor_offset",), 5.0), stub(1.0, 1.0, (), 0.0)
     ways = (Way(("marker_offset",), 0.5, SimpleNamespace(fit=other)),)
