@@ -179,7 +179,8 @@ def widened_by_stamps(
     along_s = along_the_motion_s(poses)
     if along_s == 0.0:
         return poses, ()
+    alike = " in all cameras alike" if len(views) > 1 else ""
     return widened_along(poses, along_s), (
         f"poses lie along their motion as stamps would put them that jitter by {1e3 * along_s:.2f} "
-        "ms (standard deviation) in all cameras alike: their deviations count it",
+        f"ms (standard deviation){alike}: their deviations count it",
     )

@@ -163,8 +163,11 @@ def in_noise(numbers: Ints, values: Array) -> Array:
     Source:
         Rousseeuw, Croux 1993, Alternatives to the median absolute deviation, for the scale.
     """
-    pattern = np.arange(6)
-    alike = Stretches(numbers, values, NO_STEPS).alike(pattern)
+    stretches = Stretches(numbers, values, NO_STEPS)
+    rows = np.arange(len(numbers) - 5)[:, None] + np.arange(6)
+    patterns, often = np.unique(stretches.pattern(rows), axis=0, return_counts=True)
+    pattern = patterns[often.argmax()]  # of a film that repeats every fifth frame not six on end
+    alike = stretches.alike(pattern)
     left = np.einsum("cp,bpx->bcx", contrasts(pattern, 3), values[alike])
     noise = _NORMAL_BY_MAD * np.median(np.abs(left), axis=(0, 1))
     return np.asarray((values - values.mean(axis=0)) / np.maximum(noise, 1e-12))

@@ -84,6 +84,17 @@ def test_a_gap_in_the_stamps_is_none() -> None:
     assert not lost_frames(OwnTrack(times, track.rotations, track.positions_m)).losses
 
 
+@pytest.mark.parametrize(("every", "count"), [(5, 0), (5, 3), (4, 1)])
+def test_a_film_of_which_every_so_many_frames_is_a_copy(every: int, count: int) -> None:
+    """No six frames stand on end: noise had been NaN with a warning, and nothing was told."""
+    frames = np.arange(160)
+    kept = frames[(frames % every != every - 1) & ~((frames >= 60) & (frames < 60 + count))]
+    stamps = kept - np.where(kept >= 60 + count, count, 0)
+    track = swing(kept)
+    found = lost_frames(OwnTrack(stamps / RATE_HZ, track.rotations, track.positions_m))
+    assert [loss.frames for loss in found.losses] == ([(count,)] if count else [])
+
+
 def test_of_stretches_that_are_all_of_their_own_nothing_is_told() -> None:
     """A gap in the stamps every few frames: none lies to its neighbours as twenty others do."""
     kept = np.cumsum(np.random.default_rng(2).choice([1, 1, 1, 1, 2], size=90))
