@@ -121,7 +121,7 @@ def correct_rig(
         current[index] = views[index].believed(
             repose_by_base_tags(views[index], watch, survey_std_m)
         )
-    found = _estimate(current, watch, instants, moved, survey_std_m, poses)
+    found = _estimate(current, watch, instants, moved, survey_std_m, poses, lags != 0.0)
     clocks, lines, last, jitter, rates = found
     if rates.real.any() and not rated:
         refuse_far_apart(views, rates)
@@ -270,10 +270,12 @@ def _estimate(
     moved: dict[int, float],
     survey_std_m: float,
     poses: Poses,
+    searched: NDArray[np.bool_],
 ) -> tuple[Array, Array, RigStep, Array, Rates]:
     """Changes of clock and line time that are real, (n_c,) each; moved cameras in place.
 
-    With the last step, and the jitter and rates of the cameras' stamps.
+    With the last step, and the jitter and rates of the cameras' stamps. Clocks of cameras whose
+    start was `searched`, (n_c,), have nothing that they would rather keep.
     """
     n_c = len(current)
     clock_free = np.arange(n_c) != _reference(current)
@@ -303,7 +305,9 @@ def _estimate(
     step = widened_step(step, current, jitter)
     clocks = total[:, CLOCK] - (np.median(total[:, CLOCK]) if n_c > 2 else 0.0)
     deviation = np.where(clock_free, step.deviations[:, CLOCK], step.deviations[:, CLOCK].max())
-    sure = is_real(clocks, deviation, LEAST_CLOCK_S)
+    sure = is_real(clocks, deviation, LEAST_CLOCK_S) | searched
+    if real.any():  # when the middle of a picture was taken is told by both together
+        sure[:] = True
     return np.where(sure, clocks, 0.0), np.where(real, total[:, LINE], 0.0), step, jitter, rates
 
 
