@@ -106,8 +106,9 @@ def refuse_far_apart(views: Sequence[CameraViews], rates: Rates) -> None:
         raise DataError(
             f"cameras {names[fast]} and {names[slow]}: of what they saw the stamps of "
             f"{names[fast]} take {100.0 * apart:.3f} % longer: one of them has wrong times, and "
-            "inertia would be off by up to twice as much. Give the frames' own times (a csv with "
-            "frame,t_s beside each video), or the rate that each camera really has"
+            "inertia would be off by up to twice as much. Its rate is another than stated, or "
+            f"frames of {names[slow]} were lost while its stamps were counted on. Give the frames' "
+            "own times (a csv with frame,t_s beside each video), or the rate that each camera has"
         )
 
 

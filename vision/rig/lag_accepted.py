@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.rotation import invert
 from freeswing.vision.fuse.run_views import CameraViews
+from freeswing.vision.look.follow import REPEATED
 from freeswing.vision.rig.gross_faults import stand_elsewhere
 from freeswing.vision.rig.lag_search import OwnTrack, Pair, pair_of, sigmas_more
 
@@ -100,6 +101,7 @@ def aligned(views: Sequence[CameraViews], reference: int, misfit: Misfit) -> Ali
                 f"cameras {there} and {here} were started apart, and the swing does not tell by "
                 f"how much: {lag:+.3f} s leaves {best_px:.3f} px, another start {rival_px:.3f} px. "
                 "Record the release too, or stamps of one clock"
+                + _suspects((views[known], views[new]))
             )
         lags[new] = lag
         current[new] = later(views[new], lag)
@@ -109,6 +111,22 @@ def aligned(views: Sequence[CameraViews], reference: int, misfit: Misfit) -> Ali
             f"{_mm(pair.at_zero_m)} apart)"
         )
     return Aligned(lags, pairs, tuple(remarks))
+
+
+def _suspects(views: Sequence[CameraViews]) -> str:
+    """What else leaves no start that fits, as far as what is seen points to it."""
+    copies = {v.camera.name: int(np.sum(v.status == REPEATED)) for v in views}
+    repeated = " and ".join(f"{name} repeats {n} frames" for name, n in copies.items() if n)
+    if not repeated:
+        return (
+            ". Where every start leaves more than a tenth of a pixel, frames of one were lost "
+            "while its stamps were counted on, or the cameras filmed different swings"
+        )
+    return (
+        f". {repeated}, as a recorder does that falls behind: where every start leaves more than a "
+        "tenth of a pixel, frames were lost besides while stamps were counted on. Put the frames' "
+        "own times beside the videos (a csv with frame,t_s each)"
+    )
 
 
 def _chosen(

@@ -37,7 +37,7 @@ def started(
 ) -> lag_accepted.Aligned:
     """Two cameras of 10 Hz, the second so much later."""
     pair = stub(lag_s=lag_s, at_zero_m=0.1, miss_m=0.001, known_m=known_m)
-    view = stub(camera=VIEW, believed=lambda moved: moved)
+    view = stub(status=np.zeros(3), camera=VIEW, believed=lambda moved: moved)
     monkeypatch.setattr(lag_accepted, "own_track", lambda _: stub(step_s=0.1))
     monkeypatch.setattr(lag_accepted, "_next", lambda *_: (0, 1, pair))
     monkeypatch.setattr(lag_accepted, "_needed", lambda _: True)

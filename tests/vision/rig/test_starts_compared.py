@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from freeswing.cdpr.files.trajectory_files import read_trajectory
 from freeswing.cdpr.rotation import invert
+from freeswing.vision.look.follow import REPEATED, USED
 from freeswing.vision.render.render_scene import motion_of
 from freeswing.vision.rig.correct_rig import _missed
-from freeswing.vision.rig.lag_accepted import SURE_SIGMAS, deviations_apart, own_track
+from freeswing.vision.rig.lag_accepted import (
+    SURE_SIGMAS,
+    _suspects,
+    deviations_apart,
+    own_track,
+)
 from freeswing.vision.rig.lag_search import pair_of
 from tests.vision.footage.sessions import FILMED, START_S
 from tests.vision.rig.made_views import NOISE_PX, Recorded, made_views
@@ -56,3 +64,18 @@ def test_a_start_by_a_whole_period_is_looked_for(tmp_path, turned_rad, late_s, l
     assert pair is not None
     assert (pair.at_zero_sigmas > SURE_SIGMAS) == looked_for, pair.at_zero_sigmas
     assert min(abs(lag - late_s) for lag in (pair.lag_s, *(at for at, _ in pair.rivals))) < 0.02
+
+
+@pytest.mark.parametrize(
+    ("copies", "said"), [(0, "filmed different swings"), (3, "repeats 3 frames")]
+)
+def test_where_no_start_fits_what_else_it_may_be_is_said(copies, said) -> None:
+    status = np.full(40, USED)
+    status[:copies] = REPEATED
+    views: Any = [
+        SimpleNamespace(camera=SimpleNamespace(name=name), status=own)
+        for name, own in (("left", np.full(40, USED)), ("right", status))
+    ]
+    text = _suspects(views)
+    assert said in text, text
+    assert "lost" in text, text
