@@ -172,7 +172,8 @@ def _confronted(
 
 def _offset(model: Model, prediction: Prediction | None) -> tuple[float, float] | None:
     """Root mean squares over the axes of what nuisances of the measurement were fitted to."""
-    nuisances = [name for name in model.effects if effect_named(name).nuisance]
+    effects = [effect_named(name) for name in model.effects]
+    nuisances = [one.name for one in effects if one.nuisance and one.stage == "measurement"]
     if prediction is None or not nuisances:
         return None
     places = [k for n in nuisances for k in range(len(model.names))[model.place_of(n)]]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from freeswing.cdpr.model.elastic_motion import SPRUNG, lengths_of
 from freeswing.cdpr.model.equations import build_model
 from freeswing.cdpr.robot import POSE_COORDINATES
 from freeswing.cdpr.simulation.free_swing import Motion, simulate
+from freeswing.ident.diagnose import heldout
 from freeswing.ident.diagnose.own_values import OwnValues
 from freeswing.ident.diagnose.refit import Refit, rescored, without
 from freeswing.ident.diagnose.springs import full_motion as module
@@ -103,6 +105,16 @@ def test_a_start_at_ease_plucks_nothing() -> None:
     rest = plucked_start(vibrating(0.0)[0])
     assert np.abs(rest).max() < 1e-6, rest
     assert plucked_start(swing(2, duration_s=1.0)).shape == (0,)
+
+
+def test_unstretched_lengths_are_no_offset_of_the_measured_frame() -> None:
+    """They had been told as `frame_shift_m`: two metres."""
+    motion = vibrating(0.0)[0]
+    told: Any = SimpleNamespace(values=motion.values)
+    assert heldout._offset(motion.model, told) is None
+    framed = build_model(motion.model.robot, (*SPRUNG, "platform_frame"))
+    told.values = np.append(motion.values, [3e-3, 0.0, 0.0, 0.0, 6e-3, 0.0])
+    assert heldout._offset(framed, told) == pytest.approx((3e-3 / 3**0.5, 6e-3 / 3**0.5))
 
 
 def test_without_stretch_nothing_vibrates() -> None:
