@@ -9,7 +9,7 @@ evidence in closed form: those that it drops are led back to nothing.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -108,7 +108,7 @@ class LinearSets:
         triangles, known, rows = one.triangles.copy(), self.known.copy(), one.prior_rows.copy()
         for matrix in (triangles, known, rows):
             matrix[..., -1] = matrix @ back
-        moved = Evidence(one.runs, triangles, one.counts, rows, one.common, one.own)
+        moved = replace(one, triangles=triangles, prior_rows=rows)
         mine = np.concatenate([self.stays, *(self.columns[key] for key in places)])
         return moved, known, np.unique(mine)
 
