@@ -212,6 +212,11 @@ class Effect:
     springs: bool = False
 
     @property
+    def stretches(self) -> bool:
+        """Whether it changes cable lengths with their tension."""
+        return self.needs_tension and type(self).length_change is not Effect.length_change
+
+    @property
     def changes_measurement(self) -> bool:
         """Whether what is measured is another pose than the platform's."""
         return type(self).measured is not Effect.measured

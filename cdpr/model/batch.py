@@ -324,47 +324,53 @@ def moved_columns(
 
 
 @_built_once(16)
-def jacobians_about(
-    function: Any, still: tuple[float, ...], among: tuple[int, ...] | None = None
-) -> tuple[Any, Any]:
-    """Jacobians of a function where its last values stand still: by all before them, and by them.
+def jacobian_by_others(function: Any, still: tuple[float, ...], among: tuple[int, ...]) -> Any:
+    """Jacobian of a function by all inputs but time, its last values standing still.
 
-    What effects that do nothing there would cost falls away: a screen needs their slopes alone.
+    What effects that do nothing there would cost falls away.
 
     Args:
         function: a casadi Function of SX expressions, of time, columns and, last, values.
         still: the last values' numbers.
         among: columns that are asked for, of all inputs but time one after another, ascending;
-            None: all.
+            those of the values that stand still are passed over.
 
     Returns:
-        Two functions of the same inputs without these values: Jacobians of the first output by all
-        inputs but time, (m, p), and by the values that stand still, (m, q).
+        A function of the same inputs without these values: of its first output, (m, p).
+    """
+    symbols = [ca.SX.sym(f"x{i}", function.size1_in(i)) for i in range(function.n_in())]
+    known = ca.SX.sym("known", symbols[-1].numel() - len(still))
+    there = function.call([*symbols[:-1], ca.vertcat(known, ca.DM(still))])[0]
+    others = ca.vertcat(*symbols[1:-1], known)
+    slopes = ca.densify(ca.jacobian(there, others[[k for k in among if k < others.numel()]]))
+    inputs, name = [*symbols[:-1], known], f"{function.name()}_by_others"
+    return ca.Function(name, inputs, [slopes], function.name_in(), ["matrix_jacobian"])
+
+
+@_built_once(16)
+def jacobian_about(function: Any, still: tuple[float, ...], among: tuple[int, ...]) -> Any:
+    """Jacobian of a function by its last values about where they stand still.
+
+    Their expressions fall away there: a screen needs the slopes of effects that do nothing alone.
+
+    Args:
+        function: a casadi Function of SX expressions, of time, columns and, last, values.
+        still: the last values' numbers.
+        among: which of these are asked for, ascending; numbers below zero are passed over.
+
+    Returns:
+        A function of the same inputs without these values: of its first output, (m, q).
     """
     symbols = [ca.SX.sym(f"x{i}", function.size1_in(i)) for i in range(function.n_in())]
     first = symbols[-1].numel() - len(still)
-    moving, fixed, numbers = symbols[-1][:first], symbols[-1][first:], ca.DM(still)
+    moving, fixed = symbols[-1][:first], symbols[-1][first:]
     # A symbol of its own: slices of one cannot be inputs.
     known = ca.SX.sym("known", first)
-    there = function.call([*symbols[:-1], ca.vertcat(known, numbers)])[0]
-    others = ca.vertcat(*symbols[1:-1], known)
-    size = others.numel()
-    asked = range(size + len(still)) if among is None else among
-    by_others = ca.jacobian(there, others[[k for k in asked if k < size]])
-    moved = fixed[[k - size for k in asked if k >= size]]
-    by_fixed = ca.jacobian(function.call(symbols)[0], moved)
-    by_fixed = ca.substitute(by_fixed, ca.vertcat(moving, fixed), ca.vertcat(known, numbers))
-    one, other = (
-        ca.Function(
-            f"{function.name()}_{name}",
-            [*symbols[:-1], known],
-            [ca.densify(slopes)],
-            function.name_in(),
-            ["matrix_jacobian"],
-        )
-        for name, slopes in (("by_others", by_others), ("by_fixed", by_fixed))
-    )
-    return one, other
+    slopes = ca.jacobian(function.call(symbols)[0], fixed[[k for k in among if k >= 0]])
+    there = ca.vertcat(known, ca.DM(still))
+    slopes = ca.densify(ca.substitute(slopes, ca.vertcat(moving, fixed), there))
+    inputs, name = [*symbols[:-1], known], f"{function.name()}_by_still"
+    return ca.Function(name, inputs, [slopes], function.name_in(), ["matrix_jacobian"])
 
 
 @_built_once(256)

@@ -248,10 +248,7 @@ def held_motion(robot: Robot, platform: Platform, geometry: Geometry, owned: Own
 
 def stretches(owned: Owned) -> bool:
     """Whether an effect changes cable lengths with their tension."""
-    return any(
-        effect.needs_tension and type(effect).length_change is not Effect.length_change
-        for effect, _ in owned
-    )
+    return any(effect.stretches for effect, _ in owned)
 
 
 def length_rates(instant: Instant) -> Expression:

@@ -12,7 +12,12 @@ from functools import cache
 import numpy as np
 from scipy.linalg import get_lapack_funcs
 
-from freeswing.cdpr.model.batch import evaluate, jacobians_about, moved_columns
+from freeswing.cdpr.model.batch import (
+    evaluate,
+    jacobian_about,
+    jacobian_by_others,
+    moved_columns,
+)
 from freeswing.cdpr.robot import Array
 from freeswing.cdpr.simulation.collocation import interpolation, of_segments, table
 from freeswing.cdpr.simulation.free_swing import Motion
@@ -101,24 +106,16 @@ class Linearised:
         return of_segments(weights, parts, index).reshape(len(index), 6, -1)
 
 
-def linearise(motion: Motion, still: int = 0, wanted: np.ndarray | None = None) -> Linearised:
+def linearise(motion: Motion, wanted: np.ndarray | None = None, still: int = 0) -> Linearised:
     """Derivatives of a motion that obeys its equations.
 
     Args:
         motion: the motion.
-        still: how many of the last values do nothing where they stand, which is quicker.
         wanted: by which of the inertia and the values, (9 + k,) booleans; None: by all. What is
             held costs nothing then.
+        still: how many of the last values do nothing where they stand, which is quicker.
     """
-    t = table(motion.accelerations.shape[1])
-    step = motion.steps_s[:, None, None]
-    zetas = (
-        motion.zetas[:, None]
-        + step * t.nodes[:, None] * motion.rates[:, None]
-        + step**2 * (t.twice @ motion.accelerations)
-    )
-    rates = motion.rates[:, None] + step * (t.once @ motion.accelerations)
-    times = motion.starts_s[:, None] + motion.steps_s[:, None] * t.nodes
+    times, zetas, rates = _at_nodes(motion)
     asked = columns = np.arange(STATE + motion.inertia.size + motion.values.size)
     if wanted is not None:
         asked = asked[np.concatenate([np.ones(STATE, dtype=bool), wanted])]
@@ -139,6 +136,67 @@ def linearise(motion: Motion, still: int = 0, wanted: np.ndarray | None = None) 
     return Linearised(motion, asked, columns, states, accelerations, factors, by_start, ends)
 
 
+def _at_nodes(motion: Motion) -> tuple[Array, Array, Array]:
+    """Times (s, m), pose coordinates and rates (s, m, 6) at the Gauss nodes of all segments."""
+    t, step = table(motion.accelerations.shape[1]), motion.steps_s[:, None, None]
+    zetas = (
+        motion.zetas[:, None]
+        + step * t.nodes[:, None] * motion.rates[:, None]
+        + step**2 * (t.twice @ motion.accelerations)
+    )
+    rates = motion.rates[:, None] + step * (t.once @ motion.accelerations)
+    return motion.starts_s[:, None] + motion.steps_s[:, None] * t.nodes, zetas, rates
+
+
+def linearise_beside(known: Linearised, motion: Motion, wanted: np.ndarray) -> Linearised:
+    """Derivatives of a motion by more values that do nothing where they stand.
+
+    What they alone change is all that is left to do. Not for stretch, which leads lengths back
+    where it does nothing, too.
+
+    Args:
+        known: the motion without them, linearised by all else that is wanted.
+        motion: the motion with them, after all others.
+        wanted: by which of the inertia and the values, (9 + k,) booleans.
+
+    Raises:
+        ValueError: when `known` was asked for something else.
+    """
+    first = STATE + motion.inertia.size + known.motion.values.size
+    asked = np.append(np.arange(STATE), STATE + np.flatnonzero(wanted))
+    if not np.array_equal(known.asked, asked[asked < first]):
+        raise ValueError("a motion is known by others than what is asked for now")
+    still = motion.values.size - known.motion.values.size
+    slopes = _by_still(motion, asked, still, *_at_nodes(motion))
+    s, m = slopes.shape[:2]
+    changes = known.factors.solved(slopes.reshape(s, 6 * m, -1))
+    nodes, t, step = changes.reshape(s, m, -1), table(m), motion.steps_s[:, None, None]
+    gained = [step**2 * (t.twice_end @ nodes).reshape(s, 6, -1)]
+    gained.append(step * (t.once_end @ nodes).reshape(s, 6, -1))
+    states, kicks = np.zeros((s, STATE, slopes.shape[-1])), np.concatenate(gained, axis=1)
+    for k in range(s - 1):
+        states[k + 1] = known.ends[k] @ states[k] + kicks[k]
+    total = (known.by_start @ states + changes).reshape(slopes.shape)
+    return Linearised(
+        motion,
+        asked,
+        np.concatenate([known.columns, asked[asked >= first]]),
+        np.concatenate([known.states, states], axis=-1),
+        np.concatenate([known.accelerations, total], axis=-1),
+        known.factors,
+        known.by_start,
+        known.ends,
+    )
+
+
+def _by_still(motion: Motion, asked: np.ndarray, still: int, *instants: Array) -> Array:
+    """Of the accelerations by those asked for of the last values, standing still, (s, m, 6, q)."""
+    moving, numbers = np.split(motion.values, [len(motion.values) - still])
+    places = tuple((asked - STATE - motion.inertia.size - len(moving)).tolist())
+    function = jacobian_about(motion.model.acceleration, tuple(numbers.tolist()), places)
+    return evaluate(function, *instants, motion.inertia, moving)[0]
+
+
 def _slopes(
     motion: Motion, asked: np.ndarray, still: int, *instants: Array
 ) -> tuple[Array, np.ndarray]:
@@ -148,13 +206,11 @@ def _slopes(
     """
     force, places = motion.model.acceleration, tuple(asked.tolist())
     if still:
-        first = len(motion.values) - still
-        numbers = tuple(float(value) for value in motion.values[first:])
-        parts = [
-            evaluate(function, *instants, motion.inertia, motion.values[:first])[0]
-            for function in jacobians_about(force, numbers, places)
-        ]
-        return np.concatenate(parts, axis=-1), asked
+        moving, numbers = np.split(motion.values, [len(motion.values) - still])
+        others = jacobian_by_others(force, tuple(numbers.tolist()), places)
+        by_others = evaluate(others, *instants, motion.inertia, moving)[0]
+        by_still = _by_still(motion, asked, still, *instants)
+        return np.concatenate([by_others, by_still], axis=-1), asked
     function, moved = moved_columns(force, (1, 2, 3, 4), places)
     found = evaluate(function, *instants, motion.inertia, motion.values)[0]
     return found, np.array(moved, dtype=np.int64)

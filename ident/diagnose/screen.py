@@ -13,7 +13,7 @@ from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.model.known_values import prior_whitener, with_effects
 from freeswing.cdpr.robot import Array
 from freeswing.cdpr.simulation.free_swing import Motion
-from freeswing.cdpr.simulation.sensitivity import linearise
+from freeswing.cdpr.simulation.sensitivity import linearise, linearise_beside
 from freeswing.cdpr.system.threads import side_by_side
 from freeswing.ident.diagnose.leave_one_out import Evidence
 from freeswing.ident.diagnose.own_values import OwnValues
@@ -60,8 +60,6 @@ def screen(
 ) -> Screen:
     """Linearise a fit by its own unknowns and by the amplitudes of candidates.
 
-    The columns of the evidence by all others are zero.
-
     Args:
         fit: the current model's.
         keys: candidates: effects that are not in it, or parts that it holds.
@@ -71,6 +69,96 @@ def screen(
             that a model does not reach count that much less beside the priors.
         beside: further shared unknowns to linearise by, held though they are, (h,).
     """
+    return screens(fit, [(keys, shapes or {})], noise_scales, colour, beside)[0]
+
+
+Group = tuple[Sequence[str], dict[str, dict[str, float]]]
+
+
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    """Candidates that are screened together.
+
+    Attributes:
+        model: with them after the accepted effects.
+        values: at which it is linearised.
+        columns: of each candidate's amplitudes.
+        wanted: by which of the shared unknowns.
+        stretches: whether one of the candidates stretches cables.
+    """
+
+    model: Model
+    values: Array
+    columns: dict[str, np.ndarray]
+    wanted: np.ndarray
+    stretches: bool
+
+
+def screens(
+    fit: LikelihoodFit,
+    groups: Sequence[Group],
+    noise_scales: Array,
+    colour: float = 1.0,
+    beside: np.ndarray = NONE,
+) -> list[Screen]:
+    """Linearise a fit by its own unknowns once, and by the amplitudes of candidates by groups.
+
+    Args:
+        fit: the current model's.
+        groups: candidates, and values for shape parameters by effect and parameter name.
+        noise_scales: as of `screen`.
+        colour: as well.
+        beside: as well.
+    """
+    base, common = np.flatnonzero(fit.free), len(amplitudes_of(fit.samples))
+    asked = [_asked(fit, *group, np.concatenate([base, beside])) for group in groups]
+    size = shared_size(fit.model)
+    first = np.any([one.wanted[:size] for one in asked], axis=0)
+    for one in asked:
+        one.wanted[:size] = first
+
+    def reduced(
+        motion: Motion, samples: Samples
+    ) -> list[tuple[Array, OwnValues | None, OwnValues | None]]:
+        known = linearise(replace(motion, model=fit.model), first)
+        shifts = motion_shifts(motion, samples, common) if common else None
+        found = []
+        for one in asked:
+            mine = np.append(motion.values, one.values[len(motion.values) :])
+            moved = replace(motion, model=one.model, values=mine)
+            linear = known
+            if one.stretches:
+                linear = linearise(moved, one.wanted, len(one.values) - len(fit.values))
+            elif one.model is not fit.model:
+                linear = linearise_beside(known, moved, one.wanted)
+            run = reduce_run(linear, samples, noise_scales, shifts, float(np.sqrt(colour)))
+            found.append((run.rows, _own_values(run, moved, colour), _plucked(run, moved, colour)))
+        return found
+
+    by_run = list(side_by_side(reduced, fit.motions, fit.samples))
+    told = []
+    for one, runs in zip(asked, zip(*by_run, strict=True), strict=True):
+        triangles, own, plucked = zip(*runs, strict=True)
+        evidence = Evidence(
+            tuple(s.name for s in fit.samples),
+            np.array(triangles),
+            np.array([_count(samples, one.model) for samples in fit.samples], dtype=np.float64),
+            np.sqrt(colour) * known_rows(one.model, one.values, fit.samples),
+            common,
+            _together(own),
+            _together(plucked),
+        )
+        told.append(Screen(one.model, one.values, evidence, base, one.columns))
+    return told
+
+
+def _asked(
+    fit: LikelihoodFit,
+    keys: Sequence[str],
+    shapes: dict[str, dict[str, float]],
+    held: np.ndarray,
+) -> _Asked:
+    """What a group of candidates asks for, beside the columns of what is fitted."""
     fresh = [n for n in dict.fromkeys(map(effect_of, keys)) if n not in fit.model.effects]
     model = with_effects(fit.model, fresh) if fresh else fit.model
     values = model.start_values.copy()
@@ -79,41 +167,12 @@ def screen(
         where = model.place_of(name)
         for k in range(where.start, where.stop):
             parameter = model.parameters[k]
-            values[k] = (shapes or {}).get(name, {}).get(parameter.name, parameter.start)
-    common = len(amplitudes_of(fit.samples))
-    base = np.flatnonzero(fit.free)
+            values[k] = shapes.get(name, {}).get(parameter.name, parameter.start)
     columns = {key: _amplitudes(model, key) for key in keys}
     wanted = np.zeros(shared_size(model), dtype=bool)
     own = len(fit.inertia) + model.own_values
-    wanted[np.concatenate([base, own, beside, *columns.values()])] = True
-
-    def reduced(
-        motion: Motion, samples: Samples
-    ) -> tuple[Array, OwnValues | None, OwnValues | None]:
-        mine = values.copy()
-        mine[: len(fit.values)] = motion.values
-        moved = replace(motion, model=model, values=mine)
-        found = reduce_run(
-            linearise(moved, len(values) - len(fit.values), wanted),
-            samples,
-            noise_scales,
-            motion_shifts(motion, samples, common) if common else None,
-            prior_weight=float(np.sqrt(colour)),
-        )
-        return found.rows, _own_values(found, moved, colour), _plucked(found, moved, colour)
-
-    triangles, known, plucked = zip(*side_by_side(reduced, fit.motions, fit.samples), strict=True)
-    counts = [_count(samples, model) for samples in fit.samples]
-    evidence = Evidence(
-        tuple(s.name for s in fit.samples),
-        np.array(triangles),
-        np.array(counts, dtype=np.float64),
-        np.sqrt(colour) * known_rows(model, values, fit.samples),
-        common,
-        _together(known),
-        _together(plucked),
-    )
-    return Screen(model, values, evidence, base, columns)
+    wanted[np.concatenate([held, own, *columns.values()])] = True
+    return _Asked(model, values, columns, wanted, any(effect_named(n).stretches for n in fresh))
 
 
 def _count(samples: Samples, model: Model) -> int:

@@ -49,7 +49,7 @@ from freeswing.ident.diagnose.refit import (
     rescored,
     without,
 )
-from freeswing.ident.diagnose.screen import Screen, screen
+from freeswing.ident.diagnose.screen import Group, Screen, screens
 from freeswing.ident.diagnose.sets.exchange import decisions, exchange
 from freeswing.ident.diagnose.sets.ways import Places
 from freeswing.ident.diagnose.spectrum import Residual, too_small
@@ -181,13 +181,13 @@ class Search:
         if not left:
             return Round(current, Decision(()))
         colour = colour_of(current.fit, self.noise_scales)
-        screens = self._screens(current.fit, left, colour)
-        linear = {name: score(screens[name].with_candidate(name)) for name in left}
+        seen = self._screens(current.fit, left, colour)
+        linear = {name: score(seen[name].with_candidate(name)) for name in left}
         tried: dict[str, Refit] = {}
         asked: list[str] = []
         while True:
             more = promising(current, linear, colour, self.noise_scales, asked, bool(self.rounds))
-            tried |= self._refits(current, screens, more, index, colour)
+            tried |= self._refits(current, seen, more, index, colour)
             asked += more
             decision = decided(current, linear, tried, bool(self.rounds), colour, self.noise_scales)
             if not more or settles(decision, current, self.noise_scales):
@@ -265,29 +265,33 @@ class Search:
         clues = Residual(found, self.noise_scales)
         guesses = {n: effect_named(n).shape_guesses(clues) for n in map(effect_of, keys)}
         shapes = {name: guess[0] for name, guess in guesses.items() if guess}
-        screens: dict[str, Screen] = {}
         robot = found.model.robot
-        for kind in ((False, False), (True, False), (False, True)):
-            group = [n for n in keys if _kind(effect_of(n), robot) == kind]
-            if group:
-                together = screen(found, group, self.noise_scales, shapes, colour)
-                screens |= dict.fromkeys(group, together)
+        kinds = (
+            [n for n in keys if _kind(effect_of(n), robot) == kind]
+            for kind in ((False, False), (True, False), (False, True))
+        )
+        groups: list[Group] = [(group, shapes) for group in kinds if group]
         for key in keys:
-            for shape in guesses[effect_of(key)][1:]:
-                other = screen(found, [key], self.noise_scales, {effect_of(key): shape}, colour)
-                screens[key] = min(screens[key], other, key=partial(_cost, key))
-        return screens
+            name = effect_of(key)
+            groups += [([key], {name: shape}) for shape in guesses[name][1:]]
+        told: dict[str, Screen] = {}
+        for (group, _), one in zip(
+            groups, screens(found, groups, self.noise_scales, colour), strict=True
+        ):
+            for key in group:
+                told[key] = min(told[key], one, key=partial(_cost, key)) if key in told else one
+        return told
 
     def _refits(
         self,
         current: Refit,
-        screens: dict[str, Screen],
+        seen: dict[str, Screen],
         names: Sequence[str],
         index: int,
         colour: float,
     ) -> dict[str, Refit]:
         jobs = {
-            name: (current, name, _start_of(screens[name], name), self.noise_scales, colour)
+            name: (current, name, _start_of(seen[name], name), self.noise_scales, colour)
             for name in names
         }
         share = 1.0 / MOST_ROUNDS

@@ -1,5 +1,7 @@
 """Derivatives of motions by start, inertia, effects, geometry and lengths against differences."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -14,7 +16,7 @@ from freeswing.cdpr.model.free_motion import (
     free_basis,
 )
 from freeswing.cdpr.simulation.free_swing import simulate
-from freeswing.cdpr.simulation.sensitivity import Factors, linearise
+from freeswing.cdpr.simulation.sensitivity import Factors, linearise, linearise_beside
 from freeswing.cdpr.simulation.start_state import by_free_coordinates, start_slopes
 from tests.cdpr.model_cases import differences, swing_start
 
@@ -110,15 +112,21 @@ def test_values_that_do_nothing_are_quicker_and_the_same():
     start = np.array([0.2, 0.5, 0.0, 0.0, 0, 0, 0, 0, 0, 0, 1.5])
     model, inertia, zeta, rates = swing_start("bologna-4", effects, values=start, speed=0.0)
     motion = simulate(model, zeta, rates, (0.0, 1.5), inertia, start, TIGHT)
-    whole, quick = linearise(motion), linearise(motion, still=len(start) - 2)
-    for one, other in ((whole.states, quick.states), (whole.accelerations, quick.accelerations)):
-        np.testing.assert_allclose(other, one, atol=1e-9 * np.abs(one).max())
-    wanted = np.ones(9 + len(start), dtype=bool)
+    fewer = build_model(model.robot, effects[:1])
+    same = replace(motion, model=fewer, values=start[:2])
+    whole = linearise(motion)
+    slopes, wanted = whole.accelerations, np.ones(9 + len(start), dtype=bool)
     wanted[[3, 9, 12, -1]] = False
-    some = linearise(motion, still=len(start) - 2, wanted=wanted)
-    assert some.columns.tolist() == [*range(12), *(12 + np.flatnonzero(wanted))]
-    one = whole.accelerations[..., some.columns]
-    np.testing.assert_allclose(some.accelerations, one, atol=1e-9 * np.abs(one).max())
+    for asked in (np.ones_like(wanted), wanted):
+        beside = linearise_beside(linearise(same, asked[:11]), motion, asked)
+        for quick in (beside, linearise(motion, asked, len(start) - 2)):
+            assert quick.columns.tolist() == [*range(12), *(12 + np.flatnonzero(asked))]
+            states, nodes = (part[..., quick.columns] for part in (whole.states, slopes))
+            np.testing.assert_allclose(quick.states, states, atol=1e-9 * np.abs(states).max())
+            least = 1e-9 * np.abs(nodes).max()
+            np.testing.assert_allclose(quick.accelerations, nodes, atol=least)
+    with pytest.raises(ValueError, match="known by others"):
+        linearise_beside(linearise(same), motion, wanted)
 
 
 def test_factors_solve_for_one_right_side_and_for_many():

@@ -42,16 +42,15 @@ def test_of_several_lines_the_one_that_leaves_least_is_fitted(monkeypatch) -> No
     left = {1.4: 900.0, 2.3: 500.0, 0.8: 950.0}
     asked: list[float] = []
 
-    def screened(found, keys, scales, shapes, colour) -> Any:
-        hz = shapes[KEY]["frequency_hz"]
-        asked.append(hz)
-        return SimpleNamespace(with_candidate=lambda _: left[hz], hz=hz)
+    def screened(found, groups, scales, colour) -> Any:
+        asked.extend(shapes[KEY]["frequency_hz"] for _, shapes in groups)
+        return [SimpleNamespace(with_candidate=lambda _, hz=hz: left[hz], hz=hz) for hz in asked]
 
     def clues(*_) -> Any:
         return SimpleNamespace(common_frequencies_hz=lambda: LINES_HZ)
 
     monkeypatch.setattr(module, "Residual", clues)
-    monkeypatch.setattr(module, "screen", screened)
+    monkeypatch.setattr(module, "screens", screened)
     monkeypatch.setattr(module, "score", lambda cost: SimpleNamespace(cost=cost))
     fit: Any = SimpleNamespace(model=SimpleNamespace(robot=declared_robot("three-cable")))
     chosen: Any = Search(np.ones(2), (KEY,), workers=1)._screens(fit, [KEY], 1.0)[KEY]
@@ -66,12 +65,15 @@ def test_a_drag_is_looked_for_where_the_platform_turns_and_where_it_does_not(
     """A quadratic drag at P took 75 of the squares, midway 11, and was not fitted."""
     left = {0.5: 1000.0, 0.0: 935.0}
 
-    def screened(found, keys, scales, shapes, colour) -> Any:
-        place = shapes[name]["centre_fraction"]
-        return SimpleNamespace(with_candidate=lambda _: left[place], place=place)
+    def screened(found, groups, scales, colour) -> Any:
+        places = [shapes[name]["centre_fraction"] for _, shapes in groups]
+        return [
+            SimpleNamespace(with_candidate=lambda _, place=place: left[place], place=place)
+            for place in places
+        ]
 
     monkeypatch.setattr(module, "Residual", lambda *_: None)
-    monkeypatch.setattr(module, "screen", screened)
+    monkeypatch.setattr(module, "screens", screened)
     monkeypatch.setattr(module, "score", lambda cost: SimpleNamespace(cost=cost))
     fit: Any = SimpleNamespace(model=SimpleNamespace(robot=declared_robot("three-cable")))
     chosen: Any = Search(np.ones(2), (name,), workers=1)._screens(fit, [name], 1.0)[name]
