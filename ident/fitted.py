@@ -13,7 +13,7 @@ from freeswing.ident.judge.missing_forces import (
     with_missing_forces,
 )
 from freeswing.ident.judge.prediction import Prediction
-from freeswing.ident.judge.wrong_geometry import WrongGeometry
+from freeswing.ident.judge.wrong_geometry import WrongGeometry, with_wrong_geometry
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,11 +36,12 @@ class Fitted:
 
 
 def with_missing(fitted: dict[str, Fitted]) -> dict[str, Fitted]:
-    """Fits whose deviations hold what forces do that any of them asks for."""
+    """Fits whose deviations hold what geometry and forces do that any of them asks for."""
     sizes = together([one.missing for one in fitted.values()])
-    told = {}
+    size, told = max((one.wrong.size for one in fitted.values()), default=0.0), {}
     for name, one in fitted.items():
-        wider = with_missing_forces(one.estimate, one.missing, sizes)
+        off = with_wrong_geometry(one.estimate, one.wrong.as_large_as(size))
+        wider = with_missing_forces(off, one.missing, sizes)
         said = tuple(filter(None, [unreliable(one.missing)]))
         told[name] = replace(one, estimate=replace(wider, notes=(*said, *wider.notes)))
     return told

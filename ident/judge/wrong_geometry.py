@@ -37,14 +37,25 @@ class WrongGeometry:
             where residuals need none.
         covariance: what errors of that size do to the inertia, (9, 9).
         stated: those deviations, by effect.
+        unit: what errors of size one do to the inertia, (9, 9).
     """
 
     size: float
     covariance: Array
     stated: dict[str, float] = field(default_factory=dict)
+    unit: Array = field(default_factory=lambda: np.zeros((9, 9)))
 
     def __post_init__(self) -> None:
-        freeze(self, "covariance")
+        freeze(self, "covariance", "unit")
+
+    def as_large_as(self, size: float) -> WrongGeometry:
+        """The same where another fit of the session asks for errors of a size.
+
+        Free coordinates do not show all that they are moved by.
+        """
+        if size <= self.size or not self.unit.any():
+            return self
+        return replace(self, size=size, covariance=size**2 * self.unit)
 
 
 NOTHING_WRONG = WrongGeometry(0.0, np.zeros((9, 9)))
@@ -62,10 +73,8 @@ def doubts(found: LikelihoodFit) -> tuple[WrongGeometry, MissingForces]:
     moved = {name: asked.moved[:, where] for name, where in asked.causes.items()}
     of_geometry, size = moved.pop(GEOMETRY), sizes.pop(GEOMETRY, 0.0)
     missing = MissingForces(sizes, moved, left)
-    if size == 0.0:
-        return NOTHING_WRONG, missing
-    covariance = size**2 * of_geometry @ of_geometry.T
-    return WrongGeometry(size, covariance, _stated(found.model)), missing
+    unit = of_geometry @ of_geometry.T
+    return WrongGeometry(size, size**2 * unit, _stated(found.model), unit), missing
 
 
 def geometry_of(robot: Robot, priors: GeometryPriors) -> Model:
@@ -106,9 +115,9 @@ def with_wrong_geometry(entry: Estimate, wrong: WrongGeometry) -> Estimate:
 def with_doubts(
     entry: Estimate, found: LikelihoodFit
 ) -> tuple[Estimate, WrongGeometry, MissingForces]:
-    """A fit's estimate with what a wrong robot file does, or the word that it cannot be told.
+    """A fit's estimate, what a wrong robot file and missing forces do, or that it cannot be told.
 
-    What forces that it lacks do is told beside it, for the fits of the session together.
+    They are counted for the fits of the session together (`ident.fitted.with_missing`).
     """
     try:
         wrong, missing = doubts(found)
@@ -118,7 +127,7 @@ def with_doubts(
             f"to the inertia: the residuals could not be asked for them ({error})"
         )
         return replace(entry, notes=(*entry.notes, note)), NOTHING_WRONG, MissingForces()
-    return with_wrong_geometry(entry, wrong), wrong, missing
+    return entry, wrong, missing
 
 
 def _sentence(wrong: WrongGeometry, wider: float) -> str:

@@ -12,6 +12,7 @@ import pytest
 
 from freeswing.ident.estimate import Estimate
 from freeswing.ident.fidim.ends_share import missing_share
+from freeswing.ident.fitted import Fitted, with_missing
 from freeswing.ident.judge import wrong_geometry as room
 from freeswing.ident.judge.asked_errors import Asked
 from freeswing.ident.judge.missing_forces import (
@@ -20,8 +21,9 @@ from freeswing.ident.judge.missing_forces import (
     unreliable,
     with_missing_forces,
 )
+from freeswing.ident.judge.wrong_geometry import WrongGeometry
 from freeswing.main import main
-from tests.ident.swings import TRUE_INERTIA
+from tests.ident.swings import TRUE_INERTIA, paper_model
 from tests.oracle.recorded.sessions import make_session
 
 TILT, DRAG = np.zeros((9, 2)), np.zeros((9, 1))
@@ -69,6 +71,7 @@ def test_what_nothing_follows_is_not_relied_on(monkeypatch, colour, relied_on) -
     causes = {"geometry": np.arange(36), "gravity_tilt": np.arange(36, 38)}
     asked = Asked(answers, seen, moved, causes, 10.0)
     monkeypatch.setattr(room, "asked_errors", lambda _: asked)
+    monkeypatch.setattr(room, "_stated", lambda _: {})
     found: Any = SimpleNamespace(model=None)
     wrong, missing = room.doubts(found)
     assert (unreliable(missing) == "") == relied_on
@@ -88,6 +91,20 @@ def test_more_than_twice_white_noise_is_of_the_model(monkeypatch, colour, asks) 
     found: Any = SimpleNamespace(model=None)
     wrong, missing = room.doubts(found)
     assert (wrong.size > 0.0 or bool(missing.sizes)) == asks
+
+
+def test_geometry_that_poses_show_counts_for_free_coordinates_too() -> None:
+    full = WrongGeometry(4.0, 16.0 * np.eye(9), {}, np.eye(9))
+    free = WrongGeometry(0.0, np.zeros((9, 9)), {}, 1e-8 * np.eye(9))
+    fits = {
+        name: Fitted(estimate(), paper_model().robot, (), wrong)
+        for name, wrong in {"ml_full": full, "ml_free": free}.items()
+    }
+    told = with_missing(fits)
+    assert told["ml_full"].estimate.extra["geometry_std"] == pytest.approx([4.0] * 9)
+    assert told["ml_free"].estimate.extra["geometry_std"] == pytest.approx([4e-4] * 9)
+    exact = with_missing({"ml_free": fits["ml_free"]})["ml_free"]
+    assert exact.estimate.std == pytest.approx(estimate().std)
 
 
 def test_fidim_counts_the_same() -> None:

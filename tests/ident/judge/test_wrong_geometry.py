@@ -65,6 +65,16 @@ def test_deviations_hold_diameters_given_for_radii():
     assert any("times their tolerances" in note for note in told.notes)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("factor", [0.5, 2.0])
+def test_deviations_hold_them_beside_ends_that_may_be_anywhere(factor: float) -> None:
+    """By x and y alone residuals ask for nothing, which full poses of the same runs do."""
+    settings = IdentifySettings(predict=False, geometry=GeometryPriors(0.02))
+    for name, one in identify(swings(2, 5, 7), with_radii(factor), settings).estimates.items():
+        z = (one.values - TRUE_INERTIA) / one.std
+        assert np.abs(z).max() < 3.0, f"{name}: {np.round(z, 1)}"
+
+
 def test_a_robot_file_that_is_right_widens_nothing():
     for name, one in identified(1.0).estimates.items():
         assert "geometry_std" not in one.extra, name
