@@ -81,3 +81,19 @@ def test_lost_frames_that_cannot_be_counted_are_refused_by_name(tmp_path, capsys
     assert track(folder) == 1
     said = capsys.readouterr().err
     assert "frames were lost while the stamps were counted on" in said, said
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("gone", [[50, 51, 52], [20, 33, 34, 47, 58, 71, 90]])
+def test_copies_beside_lost_frames_name_what_was_lost(tmp_path, capsys, gone) -> None:
+    """A recorder that falls behind repeats frames and loses others; told as started apart."""
+    folder = filmed(tmp_path, {"left": [], "right": []})
+    frames = frames_of("right")
+    kept = [frames[k] for k in range(len(frames)) if k not in gone]
+    kept = [kept[k - 1] if k % 8 == 7 else kept[k] for k in range(len(kept))]
+    path = folder / "runs" / "swing-01" / "right.mp4"
+    write_frames(path, kept, np.arange(len(kept)) / RATE_HZ)
+    assert track(folder) == 1
+    said = capsys.readouterr().err
+    assert "were lost" in said, said
+    assert "stamps were counted on" in said, said
