@@ -81,7 +81,7 @@ class Named:
             reader.add(
                 key,
                 f"{np.abs(point).max():g} m from the origin, more than {LARGEST_FRAME_M:g} m: "
-                "this looks like mm; write metres",
+                "this looks like mm or cm; write metres",
             )
         return tuple(formula for formula, _ in pairs), point
 

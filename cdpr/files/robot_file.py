@@ -167,7 +167,7 @@ def _read_gravity(reader: Reader) -> Array:
     if size == 0.0:
         reader.add("gravity_m_s2", "is zero; a suspended platform swings only under gravity")
     elif size > LARGEST_GRAVITY_M_S2:
-        reader.add("gravity_m_s2", f"{size:g} m/s2 are no gravity: this looks like mm/s2")
+        reader.add("gravity_m_s2", f"{size:g} m/s2 are no gravity: this looks like mm/s2 or cm/s2")
     return gravity
 
 

@@ -316,7 +316,7 @@ def _read_run(reader: Reader, paths: _Paths) -> Run:
     if lengths is not None and (not len(lengths) or (lengths <= 0.0).any()):
         reader.add("cable_lengths_m", f"{lengths.tolist()} must all be > 0")
     elif lengths is not None and lengths.max() > LARGEST_FRAME_M:
-        said = f"{lengths.max():g} m, more than {LARGEST_FRAME_M:g} m: this looks like mm"
+        said = f"{lengths.max():g} m, more than {LARGEST_FRAME_M:g} m: this looks like mm or cm"
         reader.add("cable_lengths_m", f"{said}; write metres")
     if window is not None and not window[0] < window[1]:
         reader.add("window_s", f"{window.tolist()}: its end must follow its start")

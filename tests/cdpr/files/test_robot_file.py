@@ -121,6 +121,7 @@ def test_a_published_geometry_reads():
         ("mass_kg = 8", "mesh_unit = 'm'", "platform.mesh: missing"),
         ("-9.80665", "0.0", "gravity_m_s2: is zero"),
         ("-9.80665", "-9806.65", "9806.65 m/s2 are no gravity: this looks like mm/s2"),
+        ("-9.80665", "-980.665", "980.665 m/s2 are no gravity: this looks like mm/s2 or cm/s2"),
     ],
 )
 def test_each_mistake_is_named(tmp_path, old, new, message):

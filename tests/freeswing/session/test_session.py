@@ -165,7 +165,7 @@ def test_lengths_in_millimetres_are_named(tmp_path: Path, length: float, refused
     run = f'name = "a"\nrole = "identify"\ntrajectory = "a.csv"\ncable_lengths_m = [1.5, {length}]'
     text = f'format = "freeswing-session/1"\nname = "s"\nrobot = "r.toml"\n[[runs]]\n{run}\n'
     path = written(tmp_path, text)
-    with pytest.raises(InputError, match="looks like mm") if refused else contextlib.nullcontext():
+    with pytest.raises(InputError, match="like mm or cm") if refused else contextlib.nullcontext():
         read_session(path)
 
 
