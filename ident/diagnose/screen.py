@@ -193,15 +193,8 @@ def _own_values(reduced: Reduced, motion: Motion, colour: float) -> OwnValues | 
     Its triangle over its own unknowns holds what is known of them beforehand, raised by the
     residual's colour as everything that is weighed against its samples.
     """
-    model = motion.model
-    nuisances = {
-        k
-        for name in model.effects
-        if effect_named(name).nuisance
-        for k in range(len(model.names))[model.place_of(name)]
-    }
+    model, mine = motion.model, _claimed(motion.model)
     first = len(reduced.own) - len(reduced.own_columns)
-    mine = [i for i, k in enumerate(model.own_values) if k not in nuisances]
     if not mine:
         return None
     places = model.own_values[mine]
@@ -217,14 +210,35 @@ def _own_values(reduced: Reduced, motion: Motion, colour: float) -> OwnValues | 
     return OwnValues(known - np.eye(len(mine)), known @ (values / size), np.array(1.0))
 
 
+def _claimed(model: Model) -> list[int]:
+    """Which of the values that each run has for itself are of no nuisance."""
+    nuisances = {
+        k
+        for name in model.effects
+        if effect_named(name).nuisance
+        for k in range(len(model.names))[model.place_of(name)]
+    }
+    return [i for i, k in enumerate(model.own_values) if k not in nuisances]
+
+
 def _plucked(reduced: Reduced, motion: Motion, colour: float) -> OwnValues | None:
-    """What a run knows of how its start plucks cables, in the whole weight; None: they are held."""
+    """What a run knows of how its start plucks cables, in the whole weight; None: they are held.
+
+    Values of effects that the run has for itself stand where they are: these are charged with the
+    start eliminated (`_own_values`), and what both say alike is charged once.
+
+    Source:
+        Bishop 2006, Pattern Recognition and Machine Learning, sec. 1.2: the product rule.
+    """
     if not len(reduced.plucked):
         return None
     count, model = len(reduced.own), motion.model
     usual = float(motion.values[model.place_of(SPRUNG[1])][0])
-    own, right = reduced.own[:, :count], reduced.own[:, -1]
-    by_own, start = reduced.plucked[:, :-1], reduced.plucked[:, -1]
+    first = count - len(reduced.own_columns)
+    free = np.setdiff1d(np.arange(count), first + np.array(_claimed(model), dtype=np.int64))
+    square = np.asarray(np.linalg.qr(reduced.own[:, [*free, -1]], mode="r"))[: len(free)]
+    own, right = square[:, :-1], square[:, -1]
+    by_own, start = reduced.plucked[:, free], reduced.plucked[:, -1]
     values = usual * (start - by_own @ np.linalg.solve(own, right))
     root = usual * np.linalg.solve(own.T, by_own.T)
     known = np.linalg.inv(root.T @ root) / colour

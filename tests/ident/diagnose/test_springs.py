@@ -15,7 +15,7 @@ from freeswing.cdpr.model.elastic_motion import SPRUNG, lengths_of
 from freeswing.cdpr.model.equations import build_model
 from freeswing.cdpr.robot import POSE_COORDINATES
 from freeswing.cdpr.simulation.free_swing import Motion, simulate
-from freeswing.ident.diagnose import heldout
+from freeswing.ident.diagnose import heldout, screen
 from freeswing.ident.diagnose.own_values import OwnValues
 from freeswing.ident.diagnose.refit import Refit, rescored, without
 from freeswing.ident.diagnose.springs import full_motion as module
@@ -23,7 +23,7 @@ from freeswing.ident.diagnose.springs.full_motion import fully
 from freeswing.ident.likelihood.blocks import eased, first_unknowns
 from freeswing.ident.likelihood.fit import fit
 from freeswing.ident.likelihood.fit_swings import ONWARD, Swings
-from freeswing.ident.likelihood.run_residuals import plucked_start
+from freeswing.ident.likelihood.run_residuals import Reduced, plucked_start
 from freeswing.ident.likelihood.samples_and_noise import UNIT_NOISE_M, prepare
 from tests.ident.swings import TRUE_INERTIA, paper_model, recorded, swing
 
@@ -136,6 +136,23 @@ def test_tensions_are_those_of_the_stretch() -> None:
     rest = values[lengths_of(motion.model)]
     pull = (lengths[1] - rest + DAMPING / COMPLIANCE * slopes) / (COMPLIANCE * rest)
     np.testing.assert_allclose(motion.tensions(times)[1], pull, rtol=1e-6)
+
+
+def test_what_a_fan_and_plucks_say_alike_is_charged_once() -> None:
+    """Charged twice less, a fan at 31 Hz stood beside stretch where runs began plucked."""
+    joint = np.array([[101.0, 99.0], [99.0, 101.0]])  # a pluck, and a fan's part
+    own = np.column_stack([np.linalg.cholesky(joint).T, np.zeros(2)])
+    places = {"harmonic_force": slice(0, 1), SPRUNG[1]: slice(1, 2)}
+    model: Any = SimpleNamespace(
+        effects=tuple(places), names=("a", "b"), own_values=np.array([0]),
+        parameters=(SimpleNamespace(prior_std=1.0),) * 2, place_of=places.get,
+    )  # fmt: skip
+    motion: Any = SimpleNamespace(model=model, values=np.ones(2))
+    nothing = np.zeros((0, 0))
+    run = Reduced(nothing, own, nothing, np.array([0]), np.array([[1.0, 0.0, 0.0]]))
+    found = (part(run, motion, 1.0) for part in (screen._own_values, screen._plucked))
+    charges = [np.log(one.curves[0, 0] + 1.0) for one in found if one is not None]
+    assert sum(charges) == pytest.approx(np.linalg.slogdet(joint)[1])
 
 
 @pytest.mark.parametrize(("chance", "taken"), [(0.49, False), (0.51, True)])
