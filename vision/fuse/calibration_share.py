@@ -83,7 +83,7 @@ def read_calibration_noise(path: Path, *, tied: bool = True) -> CalibrationNoise
     except InputError:
         return None
     if layout is not None and layout.covariance is not None:
-        told = layout.covariance
+        told = layout.covariance if np.isfinite(layout.covariance.matrix).all() else told
     return CalibrationNoise(told.names, told.matrix) if np.isfinite(told.matrix).all() else None
 
 

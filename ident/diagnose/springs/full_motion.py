@@ -58,7 +58,7 @@ def fully(slow: Refit, key: str, noise_scales: Array, colour: float) -> Refit:
             values[place.start] = size
             unknowns = with_effect_values(moving.unknowns, model, values)
             moving = ranked(moving.swings, unknowns, moving.cost)
-    except ValueError:
+    except ValueError:  # no full motion follows the runs as well
         return slow
     # A line of the noise is as good as a vibration that rings for ever, and settles values by it.
     return full if included(slow, full, key, noise_scales) > MORE_LIKELY else slow

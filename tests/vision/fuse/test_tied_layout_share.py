@@ -100,3 +100,9 @@ def test_a_layout_joins_the_cameras_in_what_poses_share(swing, tmp_path) -> None
     untied = run_share(poses, fit, views, watch, read_calibration_noise(path, tied=False))
     assert untied is not None
     assert not untied.std.any(), untied.std
+    matrix[0, 0] = np.nan
+    layout["covariance"] = {"names": [camera, *tags], "matrix": matrix.tolist()}
+    path.write_text(json.dumps(document), encoding="utf-8")
+    own = read_calibration_noise(path)
+    assert own is not None, "what a layout does not tell took the cameras' share with it"
+    assert own.names == (camera,)
