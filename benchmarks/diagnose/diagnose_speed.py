@@ -67,7 +67,10 @@ def sealed(key: str, scratch: Path) -> Path:
 
 
 def first_screen(folder: Path) -> Row:
-    """Seconds of one processor that screening all candidates takes, first call of a process."""
+    """Seconds of one processor that screening all candidates takes, first call of a process.
+
+    One thread for linear algebra, as every command has it: idle ones spin and are counted.
+    """
     code = f"""
 import time
 from freeswing.ident.diagnose import search
@@ -89,8 +92,14 @@ try:
 except Done as seconds:
     print(seconds)
 """
+    one = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
     said = subprocess.run(
-        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
+        [sys.executable, "-c", code],
+        cwd=ROOT,
+        env={**os.environ, **one},
+        capture_output=True,
+        text=True,
+        check=True,
     )
     return Row("first screen of all candidates", float(said.stdout), "s", FIRST_SCREEN_S)
 
