@@ -9,14 +9,14 @@ deviations. Which one it is `diagnose` finds by fits in earnest; here none is na
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from freeswing.cdpr.effects import effect_named
 from freeswing.cdpr.robot import Array
 from freeswing.ident.estimate import Estimate
-from freeswing.ident.fidim.essential_parameters import undetermined
+from freeswing.ident.judge.wider_estimate import wider
 
 # Power over white noise's that errors of measurement may leave where platforms swing; what is more
 # is of the model. Clean films, markers and lab days leave 0.8 to 1.1, a bob on a string 5 and 6:
@@ -63,19 +63,7 @@ def with_missing_forces(
     changes = missing.changes(sizes)
     if not len(changes):
         return entry
-    before = entry.consistency.sentence()
-    share = changes.T @ changes
-    covariance = entry.covariance + share
-    wider = float(np.sqrt(np.diag(covariance) / np.diag(entry.covariance)).max())
-    told = replace(
-        entry,
-        covariance=covariance,
-        essential=~undetermined(entry.values, np.sqrt(np.diag(covariance))),
-        notes=(*(note for note in entry.notes if note != before), _sentence(sizes, wider)),
-        extra={**entry.extra, "forces_std": np.sqrt(np.diag(share)).tolist()},
-    )
-    said = told.consistency.sentence()
-    return replace(told, notes=(*told.notes, said)) if said else told
+    return wider(entry, changes.T @ changes, "forces_std", lambda growth: _sentence(sizes, growth))
 
 
 def unreliable(missing: MissingForces) -> str:
@@ -93,10 +81,10 @@ def unreliable(missing: MissingForces) -> str:
     )
 
 
-def _sentence(sizes: Mapping[str, float], wider: float) -> str:
+def _sentence(sizes: Mapping[str, float], growth: float) -> str:
     told = ", ".join(f"{name} ({effect_named(name).summary})" for name in sizes)
     return (
         f"the residuals are as if there were {told}: standard deviations hold what that would do "
-        f"to the inertia, and are up to {wider:.1f} times as large for it; freeswing diagnose asks "
-        "what it is"
+        f"to the inertia, and are up to {growth:.1f} times as large for it; freeswing diagnose "
+        "asks what it is"
     )

@@ -17,10 +17,10 @@ from freeswing.cdpr.frozen import freeze
 from freeswing.cdpr.model.equations import Model, build_model
 from freeswing.cdpr.robot import Array, Robot
 from freeswing.ident.estimate import Estimate
-from freeswing.ident.fidim.essential_parameters import undetermined
 from freeswing.ident.judge.asked_errors import GEOMETRY, asked_errors, shown, tolerance
 from freeswing.ident.judge.likely_sizes import likely_sizes
 from freeswing.ident.judge.missing_forces import FAR_FROM_WHITE, MissingForces
+from freeswing.ident.judge.wider_estimate import wider
 from freeswing.ident.likelihood.blocks import columns_of
 from freeswing.ident.likelihood.cable_ends import GeometryPriors
 from freeswing.ident.likelihood.fit_swings import LikelihoodFit
@@ -98,18 +98,7 @@ def with_wrong_geometry(entry: Estimate, wrong: WrongGeometry) -> Estimate:
     """The estimate with deviations that hold what a wrong robot file does."""
     if wrong.size == 0.0:
         return entry
-    before = entry.consistency.sentence()
-    covariance = entry.covariance + wrong.covariance
-    wider = float(np.sqrt(np.diag(covariance) / np.diag(entry.covariance)).max())
-    told = replace(
-        entry,
-        covariance=covariance,
-        essential=~undetermined(entry.values, np.sqrt(np.diag(covariance))),
-        notes=(*(note for note in entry.notes if note != before), _sentence(wrong, wider)),
-        extra={**entry.extra, "geometry_std": np.sqrt(np.diag(wrong.covariance)).tolist()},
-    )
-    said = told.consistency.sentence()
-    return replace(told, notes=(*told.notes, said)) if said else told
+    return wider(entry, wrong.covariance, "geometry_std", lambda growth: _sentence(wrong, growth))
 
 
 def with_doubts(
@@ -130,13 +119,13 @@ def with_doubts(
     return entry, wrong, missing
 
 
-def _sentence(wrong: WrongGeometry, wider: float) -> str:
+def _sentence(wrong: WrongGeometry, growth: float) -> str:
     told = ", ".join(f"{1e3 * std:.3g} mm of {ENDS[name]}" for name, std in wrong.stated.items())
     unit = f" (as such count {told}, as stated)" if told else ""
     return (
         "the residuals are as if cable ends and pulleys of robot.toml were off by "
         f"{wrong.size:.2g} times their tolerances{unit}: standard deviations hold what errors of "
-        f"that size do to the inertia, and are up to {wider:.1f} times as large for it; see what "
+        f"that size do to the inertia, and are up to {growth:.1f} times as large for it; see what "
         "freeswing check and freeswing diagnose say"
     )
 
