@@ -879,6 +879,11 @@ HELD = (
     ),
     Held("vision/planar/fit_plane.py", ("FOCAL_STD", "BEND_STD", "LEAN_STD"), PLANAR),
     Held("vision/planar/fit_plane.py", ("PRINT_STD_M", "DOT_STD_M"), PLANAR),
+    Held(
+        "vision/rig/standing_still.py",
+        ("NO_COURSE", "AT_THE_NOISE"),
+        "tests/vision/rig/test_standing_still.py",
+    ),
     Held("vision/track_run.py", ("LEFT_OUT_MOSTLY",), "tests/vision/test_seen_wrong.py"),
     Held("vision/planar/track_planar.py", ("LEAST_FRAMES", "FARTHEST_M"), PLANAR),
 )  # fmt: skip

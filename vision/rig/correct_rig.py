@@ -41,6 +41,7 @@ from freeswing.vision.rig.stamp_jitter import (
     widened_by_stamps,
     widened_step,
 )
+from freeswing.vision.rig.standing_still import nothing_asked, stands_still
 from freeswing.vision.rig.untied_cameras import untied_shifts
 
 Array = NDArray[np.float64]
@@ -121,7 +122,10 @@ def correct_rig(
         current[index] = views[index].believed(
             repose_by_base_tags(views[index], watch, survey_std_m)
         )
-    found = _estimate(current, watch, instants, moved, survey_std_m, poses, lags != 0.0)
+    if not moved and stands_still(poses):
+        found = nothing_asked(len(views))
+    else:
+        found = _estimate(current, watch, instants, moved, survey_std_m, poses, lags != 0.0)
     clocks, lines, last, jitter, rates = found
     if rates.real.any() and not rated:
         refuse_far_apart(views, rates)
