@@ -25,6 +25,9 @@ from freeswing.ident.likelihood.blocks import columns_of
 from freeswing.ident.likelihood.cable_ends import GeometryPriors
 from freeswing.ident.likelihood.fit_swings import LikelihoodFit
 
+# In m and rad. What simulated swings without noise leave is rounding, 1e-7, and no cause's;
+# trackers and cameras are off by 1e-5 and more.
+LEAST_NOISE = 1e-6
 ENDS = {"anchor_offset": "entry points", "attachment_offset": "attachment points"}
 
 
@@ -67,6 +70,8 @@ def doubts(found: LikelihoodFit) -> tuple[WrongGeometry, MissingForces]:
     Args:
         found: the fit.
     """
+    if np.nanmax(found.noise) < LEAST_NOISE:
+        return NOTHING_WRONG, MissingForces()
     asked = asked_errors(found)
     colour = min(asked.colour, FAR_FROM_WHITE)
     sizes, left = likely_sizes(asked.answers, asked.seen, asked.causes, colour)

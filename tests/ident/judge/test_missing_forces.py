@@ -72,7 +72,7 @@ def test_what_nothing_follows_is_not_relied_on(monkeypatch, colour, relied_on) -
     asked = Asked(answers, seen, moved, causes, 10.0)
     monkeypatch.setattr(room, "asked_errors", lambda _: asked)
     monkeypatch.setattr(room, "_stated", lambda _: {})
-    found: Any = SimpleNamespace(model=None)
+    found: Any = SimpleNamespace(model=None, noise=np.full(2, 1e-4))
     wrong, missing = room.doubts(found)
     assert (unreliable(missing) == "") == relied_on
     assert (wrong.size, missing.sizes) == (0.0, {})
@@ -88,7 +88,7 @@ def test_more_than_twice_white_noise_is_of_the_model(monkeypatch, colour, asks) 
     asked = Asked(answers, seen, moved, causes, colour)
     monkeypatch.setattr(room, "asked_errors", lambda _: asked)
     monkeypatch.setattr(room, "_stated", lambda _: {})
-    found: Any = SimpleNamespace(model=None)
+    found: Any = SimpleNamespace(model=None, noise=np.full(2, 1e-4))
     wrong, missing = room.doubts(found)
     assert (wrong.size > 0.0 or bool(missing.sizes)) == asks
 

@@ -7,6 +7,8 @@ import re
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -149,6 +151,29 @@ def test_a_question_that_fails_ends_no_result(kind, monkeypatch) -> None:
         said = [note for note in found[name].notes if "(did not converge)" in note]
         assert said, name
         assert "deviations hold nothing of what errors of robot.toml" in said[0]
+
+
+@pytest.mark.parametrize(("noise", "asked"), [(0.9e-6, False), (1.1e-6, True)])
+def test_what_rounding_leaves_is_no_cause_s(noise: float, asked: bool, monkeypatch) -> None:
+    """Swings simulated without noise: another frame had 2.8 um of a clock that is not there."""
+    told = []
+
+    def ask(found):
+        told.append(found)
+        return SimpleNamespace(
+            answers=np.zeros((9, 3)),
+            seen=np.zeros(9),
+            causes={room.GEOMETRY: np.arange(3)},
+            moved=np.zeros((9, 3)),
+            colour=1.0,
+        )
+
+    monkeypatch.setattr(room, "asked_errors", ask)
+    monkeypatch.setattr(room, "_stated", lambda _: {})
+    fit: Any = SimpleNamespace(noise=np.array([noise, np.nan]), model=None)
+    wrong, missing = room.doubts(fit)
+    assert (wrong.size, missing.sizes) == (0.0, {})
+    assert bool(told) == asked
 
 
 def test_geometry_that_cannot_be_moved_leaves_fidim_there(monkeypatch) -> None:
