@@ -81,8 +81,9 @@ def mistaken_recording(run: SwingRun, robot: Robot) -> tuple[str, str]:
     found = _lengths_off(model, part, run.lengths_m)
     if found < LENGTHS_OFF_M:
         return "", ""
-    readings = [*_readings(part, model), *_orders(part, robot), *_turns(part, model)]
-    readings += _slips(part, robot)
+    few = part.take(np.arange(len(part))[:: max(1, len(part) // SAMPLES_TRIED)])
+    readings = [*_readings(few, model), *_orders(few, robot), *_turns(few, model)]
+    readings += _slips(few, robot)
     stated = run.lengths_m
     off = np.array([_lengths_off(one.model, one.poses, stated, one.values) for one in readings])
     # An end that is really elsewhere may come near one of many slips, but not that near.
@@ -100,13 +101,8 @@ def mistaken_recording(run: SwingRun, robot: Robot) -> tuple[str, str]:
     return f"{said}: {told} as recorded, by {1e3 * off[best]:.1f} mm so", remedy
 
 
-def _thinned(part: Trajectory) -> Trajectory:
-    return part.take(np.arange(len(part))[:: max(1, len(part) // SAMPLES_TRIED)])
-
-
 def _readings(part: Trajectory, model: Model) -> Iterator[_Reading]:
     """All other ways to read some of a run's poses."""
-    part = _thinned(part)
     q = quaternion_from_matrix(part.rotations())
     # q and -q are one turn, but not once w stands elsewhere: signs follow the sample before.
     signs = np.cumprod(np.where(np.sum(q[1:] * q[:-1], axis=1) < 0.0, -1.0, 1.0))
@@ -141,7 +137,6 @@ def _readings(part: Trajectory, model: Model) -> Iterator[_Reading]:
 
 def _turns(part: Trajectory, model: Model) -> Iterator[_Reading]:
     """The platform's frame turned by quarters: attachments turned alike are poses turned back."""
-    part = _thinned(part)
     said = "robot.toml has all attachment_m in a frame that is turned against the recorded one"
     do = "give them in the frame of the platform that the poses are of"
     for turn in QUARTERS:
@@ -152,7 +147,7 @@ def _turns(part: Trajectory, model: Model) -> Iterator[_Reading]:
 
 def _orders(part: Trajectory, robot: Robot) -> Iterator[_Reading]:
     """The cables with ends of each other."""
-    part, cables = _thinned(part), robot.cables
+    cables = robot.cables
     if len(cables) > MOST_ORDERED:
         return
     model = build_model(robot, tuple(ENDS))
@@ -162,8 +157,7 @@ def _orders(part: Trajectory, robot: Robot) -> Iterator[_Reading]:
             moved = [k for k, own in enumerate(order) if k != own]
             if not moved:
                 continue
-            values = np.zeros(len(model.parameters))
-            values[model.place_of(effect)] = (ends[list(order)] - ends).ravel()
+            values = _moved(model, effect, ends[list(order)] - ends)
             names = ", ".join(cables[k].name for k in moved)
             said = f"robot.toml has {key} of cables {names} in each other's place"
             yield _Reading(part, model, (said,), (do,), values)
@@ -174,7 +168,6 @@ def _slips(part: Trajectory, robot: Robot) -> Iterator[_Reading]:
 
     None where cables keep their length: what is stated may be wrong by what one of many slips does.
     """
-    part = _thinned(part)
     if _lengths_off(build_model(robot), part, None) < LENGTHS_OFF_M:
         return
     model = build_model(robot, tuple(ENDS))
@@ -184,10 +177,16 @@ def _slips(part: Trajectory, robot: Robot) -> Iterator[_Reading]:
             for said, meant in _slipped(own):
                 moved = np.zeros((robot.n_cables, 3))
                 moved[k] = meant - own
-                values = np.zeros(len(model.parameters))
-                values[model.place_of(effect)] = moved.ravel()
+                values = _moved(model, effect, moved)
                 said = f"robot.toml has {said} in {key} of cable {cable.name}"
                 yield _Reading(part, model, (said,), ("correct it",), values, is_slip=True)
+
+
+def _moved(model: Model, effect: str, ends_m: Array) -> Array:
+    """A model's values where ends of cables are moved by so much, (n, 3), and all else is right."""
+    values = np.zeros(len(model.parameters))
+    values[model.place_of(effect)] = ends_m.ravel()
+    return values
 
 
 def _slipped(point: Array) -> Iterator[tuple[str, Array]]:
