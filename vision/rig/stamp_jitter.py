@@ -182,5 +182,6 @@ def widened_by_stamps(
     alike = " in all cameras alike" if len(views) > 1 else ""
     return widened_along(poses, along_s), (
         f"poses lie along their motion as stamps would put them that jitter by {1e3 * along_s:.2f} "
-        f"ms (standard deviation){alike}: their deviations count it",
+        f"ms (standard deviation){alike}: their deviations count it; a motion that is faster than "
+        "these frames follow looks alike",
     )
