@@ -1,8 +1,9 @@
-"""What leaves the model again: effects made superfluous by later ones, and mere stand-ins."""
+"""What leaves again: effects made superfluous by later ones, stand-ins, leaders of a group."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -88,6 +89,16 @@ def would_explain(decision: Decision, tried: Mapping[str, Refit]) -> str:
     if not leader or chances[leader] < ACCEPTED:
         return ""
     return f"{leader} would explain it with values that cannot be ({why})"
+
+
+def turned(decision: Decision) -> Decision:
+    """A decision led by the one of its group that left-out runs predict far better."""
+    if decision.ahead is None:
+        return decision
+    key, fit = decision.ahead
+    first = effect_of(key)
+    group = (first, *(name for name in decision.group if name != first))
+    return replace(decision, winner=fit, key=key, group=group, rival=decision.winner, ahead=None)
 
 
 def _likeliest_refused(

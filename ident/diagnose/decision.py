@@ -89,6 +89,7 @@ class Decision:
         key: the winner's, or "".
         group: effects that held-out runs cannot tell from it, its own among them.
         rival: the fit with the likeliest other effect of the group, or None.
+        ahead: key of one of the group that left-out runs speak for far more, with its fit, or None.
         instead: those of the group that may be wrong instead by other parts than are in the model.
         exchange: what may be there instead of the winner, or although nothing won.
     """
@@ -98,6 +99,7 @@ class Decision:
     key: str = ""
     group: tuple[str, ...] = ()
     rival: Refit | None = None
+    ahead: tuple[str, Refit] | None = None
     instead: tuple[str, ...] = ()
     exchange: Exchange | None = None
 
@@ -231,7 +233,8 @@ def decided(
     rival = max(others, key=lambda n: chances[n], default="")
     unsure = None if key else _unsure(current, tried, chances)
     winner, rival_fit = passed.get(key), passed.get(rival)
-    return Decision(tuple(candidates), winner, key, group, rival_fit, exchange=unsure)
+    ahead = _ahead(key, {n: passed[n] for n in (key, *others) if key}, runs)
+    return Decision(tuple(candidates), winner, key, group, rival_fit, ahead, exchange=unsure)
 
 
 def _unsure(current: Refit, tried: dict[str, Refit], chances: dict[str, float]) -> Exchange | None:
@@ -343,21 +346,26 @@ def _winner(
     """The best of those that passed, and all effects that the runs cannot tell from it.
 
     These are the ones that left-out runs predict as well but for the noise, and those that may
-    well be it instead. Of those about as probable as any, the one with fewest unknowns leads, then
-    the one that predicts best.
+    well be it instead. Of those about as probable as any that predict as well, the one with fewest
+    unknowns leads, then the one that predicts best.
     """
     if not passed:
         return "", ()
     gains = {name: float(runs.gains(one.score).sum()) for name, one in passed.items()}
     best = max(gains.values())
-    group = [
-        name
-        for name in passed
-        if 2.0 * (best - gains[name]) < CONFOUNDED_DIFFERENCE or chances[name] > RIVAL
-    ]
+    behind = {n: 2.0 * (best - gain) >= CONFOUNDED_DIFFERENCE for n, gain in gains.items()}
+    group = [name for name in passed if not behind[name] or chances[name] > RIVAL]
     likely = CLEARLY_LIKELIER * max(chances[n] for n in group)
-    group.sort(key=lambda n: (chances[n] < likely, sum(unknowns(current, n)), -gains[n]))
+    group.sort(key=lambda n: (chances[n] < likely, behind[n], sum(unknowns(current, n)), -gains[n]))
     return group[0], tuple(dict.fromkeys(map(effect_of, group)))
+
+
+def _ahead(key: str, group: dict[str, Refit], runs: LeftOut) -> tuple[str, Refit] | None:
+    """Who of a group is predicted better than its leader by more than the noise, with its fit."""
+    gains = {name: float(runs.gains(one.score).sum()) for name, one in group.items()}
+    best = max(gains, key=lambda name: gains[name], default=key)
+    is_ahead = best != key and 2.0 * (gains[best] - gains[key]) >= CONFOUNDED_DIFFERENCE
+    return (best, group[best]) if is_ahead else None
 
 
 def _scatter(gains: Array) -> float:

@@ -24,6 +24,7 @@ from freeswing.ident.diagnose.backward_removal import (
     is_no_worse,
     outdone,
     superfluous,
+    turned,
     would_explain,
 )
 from freeswing.ident.diagnose.decision import (
@@ -110,16 +111,42 @@ class Search:
         current = rescored(base, self.noise_scales, colour_of(base, self.noise_scales))
         current = self._freed(self._geometry(current))
         with self.pool_of() as self.pool:
-            for index in range(MOST_ROUNDS):
-                if index and (lacks_little(current) or too_small(current.fit)):
-                    break
-                done = self._round(current, index)
-                self.rounds += self._instead(done, index)
-                done = self.rounds[-1]
-                if done.decision.winner is None:
-                    break
-                current = done.after
+            current = self._other_way(self._followed(current, 0))
         return self._without_stand_ins(current)
+
+    def _followed(self, current: Refit, first: int) -> Refit:
+        """The last fit of the rounds from `first` on, until none adds anything."""
+        for index in range(first, MOST_ROUNDS):
+            if index and (lacks_little(current) or too_small(current.fit)):
+                break
+            done = self._round(current, index)
+            self.rounds += self._instead(done, index)
+            done = self.rounds[-1]
+            if done.decision.winner is None:
+                break
+            current = done.after
+        return current
+
+    def _other_way(self, current: Refit) -> Refit:
+        """The end of the way that left-out runs would have gone, where this one ends far off.
+
+        While others are missing, evidence is in few numbers: what is likelier then may be the worse
+        start. Where the search has ended with much missing and a group had one that left-out runs
+        predict far better, that one is followed too, and stands where it ends near the noise.
+        """
+        forks = [k for k, one in enumerate(self.rounds) if one.decision.ahead]
+        if not forks or excess_of(current) <= LARGEST_EXCESS_LEFT:
+            return current
+        taken, fork = self.rounds, self.rounds[forks[0]]
+        self.rounds = taken[: forks[0]]
+        index = sum(not one.by_lengths for one in self.rounds)
+        done = self._ended(fork.before, turned(fork.decision), index, fork.stand_in)
+        self.rounds += self._instead(done, index)
+        other = self._followed(self.rounds[-1].after, index + 1)
+        if excess_of(other) <= LARGEST_EXCESS_LEFT:
+            return other
+        self.rounds = taken
+        return current
 
     def _without_stand_ins(self, current: Refit) -> Refit:
         """The last fit without what came last and stood in for something else.
@@ -194,6 +221,13 @@ class Search:
                 break
         if decision.winner is None:
             return Round(current, decision, stand_in=would_explain(decision, tried))
+        return self._ended(current, decision, index, outdone(decision, tried))
+
+    def _ended(self, current: Refit, decision: Decision, index: int, stand_in: str) -> Round:
+        """A round whose winner is fitted to its end, without what it makes superfluous."""
+        if decision.winner is None:
+            return Round(current, decision, stand_in=stand_in)
+        share = 1.0 / MOST_ROUNDS
         # Ranking stopped early: the winner goes on to convergence.
         found, removed = self._freed(polished(decision.winner.fit, self.noise_scales)), []
         while name := superfluous(found, decision.group):
@@ -203,7 +237,6 @@ class Search:
                 break
             found = fewer
             removed.append(name)
-        stand_in = outdone(decision, tried)
         return Round(current, replace(decision, winner=found), tuple(removed), stand_in=stand_in)
 
     def _instead(self, done: Round, index: int) -> list[Round]:

@@ -22,6 +22,7 @@ from freeswing.ident.diagnose import (
 from freeswing.ident.diagnose import unexplained as rest
 from freeswing.ident.diagnose.decision import (
     Decision,
+    _ahead,
     _complaint,
     _winner,
     left_out,
@@ -221,6 +222,26 @@ def group_of(lead: float, chance: float) -> tuple[str, ...]:
 def test_leads_that_are_none(lead, chance, told_apart) -> None:
     """Twelve in squares of left-out runs, or what is more probable than 5 %."""
     assert group_of(lead, chance) == (("best",) if told_apart else ("best", "one"))
+
+
+@pytest.mark.parametrize(("lead", "leads"), [(11.2, "one"), (12.8, "best")])
+def test_fewer_unknowns_lead_only_where_runs_left_out_are_predicted_as_well(
+    monkeypatch, lead, leads
+) -> None:
+    """A constant force with 0.26 left nine times the noise where a tether with 0.74 left 0.17."""
+    monkeypatch.setattr(decision, "unknowns", lambda _, key: ({"best": 8, "one": 3}[key], 0))
+    assert group_of(lead, 0.6)[0] == leads
+
+
+@pytest.mark.parametrize(("lead", "is_ahead"), [(11.2, False), (12.8, True)])
+def test_who_left_out_runs_speak_for_is_told_where_a_likelier_one_leads(lead, is_ahead) -> None:
+    count = 12e3
+    before, best = fitted([1000.0] * 12, 1e4, count), fitted([500.0] * 12, 100.0, count)
+    passed = {"best": best, "one": fitted(500.0 + np.full(12, lead / 12), 99.0, count)}
+    runs = left_out(before, np.ones(2))
+    assert (_ahead("one", passed, runs) == ("best", best)) == is_ahead
+    assert _ahead("best", passed, runs) is None
+    assert _ahead("", {}, runs) is None
 
 
 @pytest.mark.parametrize(("chance", "leads"), [(0.74, "best"), (0.76, "one")])

@@ -105,3 +105,37 @@ def test_a_stand_in_that_came_last_is_taken_back_and_one_that_made_way_is_not(wh
     assert [(one.verdict, one.reason) for one in told] == (
         [("rejected", "the nearest")] if left == 0 else []
     )
+
+
+@pytest.mark.parametrize(
+    ("first", "other", "ends"), [(0.47, 0.0, "a"), (0.53, 0.47, "b"), (0.53, 0.53, "a")]
+)
+def test_the_way_that_left_out_runs_speak_for_stands_where_only_it_ends_near_the_noise(
+    monkeypatch, first, other, ends
+) -> None:
+    """Beside viscous swivels a constant force led (0.26), and ended at nine times the noise."""
+    fits: Any = {name: SimpleNamespace(fit=None, name=name) for name in ("base", "a", "b")}
+    excess = {"base": 50.0, "a": first, "b": other}
+    led: Any = Decision((), fits["a"], "a", ("a", "b"), fits["b"], ("b", fits["b"]))
+
+    def rounds(self, current, index):
+        return Round(current, led) if current is fits["base"] else Round(current, Decision(()))
+
+    monkeypatch.setattr(Search, "_round", rounds)
+    monkeypatch.setattr(Search, "_instead", lambda self, done, index: [done])
+    monkeypatch.setattr(Search, "_geometry", lambda self, current: current)
+    monkeypatch.setattr(Search, "_freed", lambda self, current: current)
+    monkeypatch.setattr(module, "colour_of", lambda *_: 1.0)
+    monkeypatch.setattr(module, "rescored", lambda *_: fits["base"])
+    monkeypatch.setattr(module, "polished", lambda *_: fits["b"])
+    monkeypatch.setattr(module, "superfluous", lambda *_: "")
+    monkeypatch.setattr(module, "excess_of", lambda current: excess[current.name])
+    monkeypatch.setattr(module, "lacks_little", lambda _: False)
+    monkeypatch.setattr(module, "too_small", lambda _: False)
+    monkeypatch.setattr(backward_removal, "effect_of", lambda key: key)
+    search = Search(np.ones(2), (), workers=1)
+    last: Any = search.run(fits["base"])
+    won = [one.decision for one in search.rounds if one.decision.winner is not None]
+    assert (last.name, [one.key for one in won]) == (ends, [ends])
+    assert set(won[0].group) == {"a", "b"}
+    assert won[0].rival is fits["a" if ends == "b" else "b"]
