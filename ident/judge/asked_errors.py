@@ -23,6 +23,7 @@ from freeswing.ident.likelihood.run_residuals import Samples, reduce_run
 # What robot.toml says of a cable, each with a tolerance (`cdpr.tolerances`).
 OF_CABLES = ("anchor_offset", "attachment_offset", "pulley_radius", "pulley_axis")
 GEOMETRY = "geometry"  # the cause that all of these are together
+NONE = np.zeros(0, dtype=np.int64)
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +33,7 @@ class Asked:
     Attributes:
         answers: what they make of the numbers that the fit leaves of them, (k, q).
         seen: these numbers, in units of the residuals, (k,).
-        moved: what they do to the inertia, (9, q).
+        moved: what they do to the fit's shared unknowns, the inertia's nine first, (p, q).
         causes: columns of each cause; all errors of the cables' geometry are one, in tolerances,
             of other effects of their typical size.
         colour: power of the residuals where platforms swing over that of white noise.
@@ -48,13 +49,15 @@ class Asked:
         freeze(self, "answers", "seen", "moved")
 
 
-def asked_errors(found: LikelihoodFit) -> Asked:
+def asked_errors(found: LikelihoodFit, settled: np.ndarray = NONE) -> Asked:
     """What errors of the cables' geometry and missing effects would do, to first order about a fit.
 
     Args:
         found: the fit.
+        settled: places among its effects' values of geometry that is known by itself, (g,): no
+            error of the robot file.
     """
-    rows, unknown, causes = _equations(found)
+    rows, unknown, causes = _equations(found, settled)
     errors = np.concatenate(list(causes.values()))
     scale = np.linalg.norm(rows[:, unknown], axis=0)
     scale[scale == 0.0] = 1.0
@@ -62,8 +65,8 @@ def asked_errors(found: LikelihoodFit) -> Asked:
     triangle = np.asarray(np.linalg.qr(stacked, mode="r"))
     first, last = len(unknown), len(unknown) + len(errors)
     change = np.linalg.lstsq(triangle[:first, :first], triangle[:first, first:last], rcond=None)[0]
-    moved = np.zeros((9, len(errors)))
-    moved[unknown[unknown < 9]] = (change / scale[:, None])[unknown < 9]
+    moved = np.zeros((len(found.free), len(errors)))
+    moved[np.flatnonzero(found.free)] = change / scale[:, None]
     starts = np.cumsum([0, *map(len, causes.values())])
     places = {
         name: np.arange(begin, begin + len(columns))
@@ -91,7 +94,9 @@ def missing_names(found: LikelihoodFit) -> tuple[str, ...]:
     return tuple(names)
 
 
-def _equations(found: LikelihoodFit) -> tuple[Array, np.ndarray, dict[str, np.ndarray]]:
+def _equations(
+    found: LikelihoodFit, settled: np.ndarray
+) -> tuple[Array, np.ndarray, dict[str, np.ndarray]]:
     """The fit to first order over [shared unknowns; modes; errors of size one; residual].
 
     Returns:
@@ -120,7 +125,7 @@ def _equations(found: LikelihoodFit) -> tuple[Array, np.ndarray, dict[str, np.nd
     rows = np.vstack(parts)
     estimated = _estimated(found, problem, modes)
     known = len(parts[-1])
-    blocks = {GEOMETRY: _error_columns(rows, model, found, known)}
+    blocks = {GEOMETRY: _error_columns(rows, model, found, known, settled)}
     blocks |= {name: _force_columns(rows, model, name, known) for name in forces}
     causes, place = {}, rows.shape[1] - 1
     for name, block in blocks.items():
@@ -172,18 +177,22 @@ def _estimated(found: LikelihoodFit, problem: Problem, modes: int) -> np.ndarray
     return np.concatenate(places)[found.free]
 
 
-def _error_columns(rows: Array, model: Model, found: LikelihoodFit, known: int) -> Array:
+def _error_columns(
+    rows: Array, model: Model, found: LikelihoodFit, known: int, settled: np.ndarray
+) -> Array:
     """What errors of one tolerance do to rows, the last `known` of which are priors, (n, q).
 
     A cable end that is estimated is off its prior, as far as that is wide: the prior's row errs.
     """
     columns = []
     for name in shown(model.robot):
-        where, stated = columns_of(model, name), name in found.model.effects
         size = tolerance(model.robot, name)
-        for column in where:
+        for column in columns_of(model, name):
+            if column - 9 in settled:
+                continue
+            stated = name in found.model.effects and found.free[column]
             error = rows[:, column] * (model.parameters[column - 9].prior_std if stated else size)
             part = slice(None, -known) if stated else slice(len(rows) - known, None)
             error[part] = 0.0
             columns.append(error)
-    return np.array(columns).T
+    return np.array(columns).T.reshape(len(rows), -1)

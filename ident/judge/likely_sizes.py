@@ -40,7 +40,11 @@ class Sizes(NamedTuple):
 
 
 def likely_sizes(
-    answers: Array, seen: Array, causes: Mapping[str, np.ndarray], colour: float
+    answers: Array,
+    seen: Array,
+    causes: Mapping[str, np.ndarray],
+    colour: float,
+    most: Mapping[str, float] | None = None,
 ) -> Sizes:
     """The sizes of errors that make what is seen of them likeliest; without those that chance does.
 
@@ -49,6 +53,7 @@ def likely_sizes(
         seen: the numbers, in units of the residuals, (k,).
         causes: columns of each cause's errors.
         colour: power of the residuals where platforms swing over that of white noise, at least 1.
+        most: sizes that causes have at most, where something else tells.
 
     Source:
         MacKay 1994, Bayesian non-linear modelling for the prediction competition (automatic
@@ -58,8 +63,10 @@ def likely_sizes(
         zero.
     """
     limit = float(chdtri(1, 2.0 * CHANCE / len(causes)))
+    counts = {one: len(SIZES) for one in causes}
+    counts |= {one: int(np.sum(size >= SIZES)) for one, size in (most or {}).items()}
     found = [
-        _greedy(answers, seen, causes, rest, limit)
+        _greedy(answers, seen, causes, rest, limit, counts)
         for rest in np.geomspace(LEAST_REST, colour, RESTS)
     ]
     _, sizes, rest = min(found, key=lambda one: one[0])
@@ -67,9 +74,17 @@ def likely_sizes(
 
 
 def _greedy(
-    answers: Array, seen: Array, causes: Mapping[str, np.ndarray], rest: float, limit: float
+    answers: Array,
+    seen: Array,
+    causes: Mapping[str, np.ndarray],
+    rest: float,
+    limit: float,
+    counts: Mapping[str, int],
 ) -> tuple[float, dict[str, float], float]:
-    """Surprise with a limit for each cause, the sizes, and the rest that these stand beside."""
+    """Surprise with a limit for each cause, the sizes, and the rest that these stand beside.
+
+    Of `SIZES` each cause has one of so many.
+    """
     sizes: dict[str, float] = {}
     for _ in range(4 * len(causes)):
         whole = _whitener(answers, causes, sizes, rest)
@@ -77,7 +92,7 @@ def _greedy(
         for one, columns in causes.items():
             others = {other: value for other, value in sizes.items() if other != one}
             white = _whitener(answers, causes, others, rest) if one in sizes else whole
-            gains = _gains(white @ answers[:, columns], white @ seen)
+            gains = _gains(white @ answers[:, columns], white @ seen)[: counts[one]]
             place = int(gains.argmax())
             more = gains[place] - limit
             if one in sizes:

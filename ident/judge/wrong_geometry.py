@@ -75,7 +75,7 @@ def doubts(found: LikelihoodFit) -> tuple[WrongGeometry, MissingForces]:
     asked = asked_errors(found)
     colour = min(asked.colour, FAR_FROM_WHITE)
     sizes, left = likely_sizes(asked.answers, asked.seen, asked.causes, colour)
-    moved = {name: asked.moved[:, where] for name, where in asked.causes.items()}
+    moved = {name: asked.moved[:9, where] for name, where in asked.causes.items()}
     of_geometry, size = moved.pop(GEOMETRY), sizes.pop(GEOMETRY, 0.0)
     missing = MissingForces(sizes, moved, left)
     unit = of_geometry @ of_geometry.T

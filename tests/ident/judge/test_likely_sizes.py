@@ -62,3 +62,11 @@ def test_what_none_follows_is_left():
     found = likely_sizes(answers, seen, {"one": np.arange(4)}, 6.0)
     assert not found.sizes
     assert found.rest > 4.0
+
+
+@pytest.mark.parametrize(("most", "size"), [(3.0, 3.0), (40.0, 10.0)])
+def test_a_size_that_something_else_tells_is_at_most_that(most: float, size: float) -> None:
+    answers = 100.0 * np.eye(60)[:, :40]
+    seen = np.append(1000.0 * np.ones(40), np.ones(20))
+    found = likely_sizes(answers, seen, {"one": np.arange(40)}, 2.0, {"one": most})
+    assert found.sizes["one"] == pytest.approx(size, rel=0.05)

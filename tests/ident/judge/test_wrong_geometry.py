@@ -19,8 +19,13 @@ from freeswing.ident import identify as whole
 from freeswing.ident.fidim import fidim_stage
 from freeswing.ident.identify import Identification, IdentifySettings, identify
 from freeswing.ident.judge import wrong_geometry as room
+from freeswing.ident.judge.asked_errors import GEOMETRY, asked_errors
 from freeswing.ident.judge.wrong_geometry import WrongGeometry, with_wrong_geometry
+from freeswing.ident.likelihood.blocks import first_unknowns
 from freeswing.ident.likelihood.cable_ends import GeometryPriors
+from freeswing.ident.likelihood.fit import fit
+from freeswing.ident.likelihood.fit_swings import ONWARD, Swings
+from freeswing.ident.likelihood.samples_and_noise import prepare
 from freeswing.ident.runs import SwingRun
 from freeswing.main import main
 from tests.ident.swings import (
@@ -222,3 +227,29 @@ def test_no_number_of_a_wrong_robot_file_is_wrong_and_sure(tmp_path: Path, robot
         rows = one["parameters"][:9]
         z = [(row["value"] - at) / row["std"] for row, at in zip(rows, true, strict=True)]
         assert np.abs(z).max() < 3.5, f"{name}: {np.round(z, 1)}"
+
+
+def test_geometry_that_is_known_by_itself_is_no_error_of_the_robot_file() -> None:
+    """Held attachments err by their tolerance, but for those that cable lengths have settled."""
+    models = (build_model(ROBOT), build_model(ROBOT, ("attachment_offset",)))
+    runs = [prepare(run, (0.0, 1.0)) for run in swings(2, 5, 7, duration_s=1.0)]
+    motions = [tilted_release(models[0], PAPER_LENGTHS_M[k], 0.08, 1.0) for k in (2, 5, 7)]
+    starts = np.array([np.append(one.zetas[0], one.rates[0]) for one in motions])
+    held = first_unknowns(models[1], TRUE_INERTIA, starts, [None] * 3)
+    block = held.block("attachment_offset")
+    held = held.exchanged(replace(block, estimated=np.zeros(12, dtype=bool)))
+    bare = first_unknowns(models[0], TRUE_INERTIA, starts, [None] * 3)
+    asked = []
+    for model, unknowns, settled in (
+        (models[0], bare, []),
+        (models[1], held, []),
+        (models[1], held, [3, 4, 5]),
+    ):
+        found = fit(Swings(model, tuple(runs), np.full(2, 10.0)), unknowns, ONWARD)
+        asked.append(asked_errors(found, np.array(settled, dtype=np.int64)))
+        assert asked[-1].moved.shape[0] == len(found.free)
+    of_bare, of_held, of_some = (one.answers[:, one.causes[GEOMETRY]] for one in asked)
+    assert of_held.shape == of_bare.shape
+    sizes = (np.linalg.norm(one, axis=0) for one in (of_bare, of_held))
+    np.testing.assert_allclose(*map(np.sort, sizes), rtol=1e-3)
+    assert of_some.shape[1] == of_held.shape[1] - 3
