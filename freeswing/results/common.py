@@ -65,6 +65,7 @@ class FoundEffect(Entry):
         camera: that it was found on, likewise.
         parameters: its numbers.
         confounded_with: what the data cannot tell it from.
+        motion: of stretching cables, whether they were fitted with their vibration.
         directions: along which data see a displaced point, best first.
         evidence: of a driven robot's: where it is seen, most telling first.
         before: agreement without it, for effects of cameras.
@@ -78,6 +79,7 @@ class FoundEffect(Entry):
     camera: str = absent(default="")
     parameters: tuple[Parameter, ...] = ()
     confounded_with: tuple[str, ...] | None = absent(default=None)
+    motion: str = absent(default="")
     directions: tuple[SeenDirection, ...] = absent(default=())
     evidence: tuple[Evidence, ...] = absent(default=())
     before: Agreement | None = absent(default=None)

@@ -87,11 +87,19 @@ class Candidate(Entry):
 
 @entry
 class Unexplained(Entry):
-    """What no candidate explains: which coordinate, which frequency, how large."""
+    """What no candidate explains: which coordinate, which frequency, how large.
+
+    Attributes:
+        present: whether a structured residual remains.
+        signature: what it looks like.
+        evidence: the numbers behind it.
+        reliance: that the values are not to be relied on, or how far.
+    """
 
     present: bool = False
     signature: str = ""
     evidence: Mapping[str, Any] = empty(default_factory=dict)
+    reliance: str = absent(default="")
 
 
 @entry

@@ -7,10 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from freeswing.cdpr.effects import Recorded, catalogue
 from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.measured.slow_errors import BESIDE_STATED
 from freeswing.cdpr.model.equations import Model, build_model
-from freeswing.cdpr.robot import Array, Robot
+from freeswing.cdpr.robot import POSE_COORDINATES, Array, Robot
 from freeswing.cdpr.system.progress import Progress
 from freeswing.ident.diagnose.outstanding_runs import tempered
 from freeswing.ident.diagnose.spectrum import residual_powers
@@ -24,6 +25,7 @@ from freeswing.ident.likelihood.fit_swings import (
     LikelihoodFit,
     Swings,
 )
+from freeswing.ident.likelihood.samples_and_noise import UNIT_NOISE_M, UNIT_NOISE_RAD
 from freeswing.ident.likelihood.session_estimates import astray, begun
 from freeswing.ident.signals.usable_runs import PreparedRun
 
@@ -172,3 +174,30 @@ def _is_same(one: LikelihoodFit, other: LikelihoodFit) -> bool:
 def _follows(found: LikelihoodFit, noise_scales: Array) -> bool:
     near = astray(found) < SMALL_BESIDE_SWINGS
     return near or bool(residual_powers(found, noise_scales).mean() < AT_THE_NOISE)
+
+
+def white_noise_scales(runs: list[PreparedRun], free: tuple[str, ...] | None) -> Array:
+    """White noise of the samples over what their covariance (or the unit noise) states, (2,)."""
+    ratios: list[list[float]] = [[], []]
+    for run in runs:
+        trajectory = run.run.trajectory
+        stated = trajectory.standard_deviations()
+        names = POSE_COORDINATES if free is None else free
+        for name in names:
+            group = int(name not in POSE_COORDINATES[:3])
+            noise = run.signals.noise_std[run.signals.coordinates.index(name)]
+            unit = UNIT_NOISE_RAD if group else UNIT_NOISE_M
+            if stated is not None:
+                unit = float(np.nanmedian(stated[:, trajectory.coordinates.index(name)]))
+            ratios[group].append(float(noise / unit))
+    return np.array([np.sqrt(np.mean(np.square(group))) if group else 1.0 for group in ratios])
+
+
+def barred_effects(runs: list[PreparedRun], robot: Robot) -> dict[str, str]:
+    """Effects that these data cannot show, and why."""
+    recorded = Recorded(
+        lengths=any(run.run.lengths_m is not None for run in runs),
+        slow_errors=any(run.run.trajectory.slow is not None for run in runs),
+    )
+    why = {name: effect.cannot_show(robot, recorded) for name, effect in catalogue().items()}
+    return {name: words for name, words in why.items() if words}

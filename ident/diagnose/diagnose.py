@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-import numpy as np
-
-from freeswing.cdpr.effects import Recorded, catalogue, effect_named
+from freeswing.cdpr.effects import catalogue, effect_named
 from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.model.equations import build_model
 from freeswing.cdpr.robot import POSE_COORDINATES, Array, Robot
@@ -36,7 +34,9 @@ from freeswing.ident.diagnose.answer.not_the_cause import (
     unless_validated,
     without_forces,
 )
+from freeswing.ident.diagnose.answer.open_exchanges import open_exchanges
 from freeswing.ident.diagnose.answer.settled_geometry import cut, settled_places, with_settled
+from freeswing.ident.diagnose.answer.still_missing import still_missing
 from freeswing.ident.diagnose.answer.taken_back import taken_back
 from freeswing.ident.diagnose.answer.unmet_validation import with_unmet
 from freeswing.ident.diagnose.decision import (
@@ -46,7 +46,13 @@ from freeswing.ident.diagnose.decision import (
     excess_of,
     left_out,
 )
-from freeswing.ident.diagnose.declared_model import base_fit, refuse_few, with_frames
+from freeswing.ident.diagnose.declared_model import (
+    barred_effects,
+    base_fit,
+    refuse_few,
+    white_noise_scales,
+    with_frames,
+)
 from freeswing.ident.diagnose.heldout import HeldOut, held_out
 from freeswing.ident.diagnose.lengths.wrong_places import Kinematics
 from freeswing.ident.diagnose.refit import Refit
@@ -61,7 +67,6 @@ from freeswing.ident.judge.prediction import Stage
 from freeswing.ident.likelihood.calibration_modes import amplitudes_of, with_calibration
 from freeswing.ident.likelihood.fit import fit
 from freeswing.ident.likelihood.fit_swings import FreeSwing, LikelihoodFit
-from freeswing.ident.likelihood.samples_and_noise import UNIT_NOISE_M, UNIT_NOISE_RAD
 from freeswing.ident.runs import SwingRun
 from freeswing.ident.signals.derivatives import SignalSettings
 from freeswing.ident.signals.usable_runs import PreparedRun, prepare_runs
@@ -101,6 +106,8 @@ class Diagnosis:
         notes: sentences about the session.
         apart: for each effect of the final model that has rivals, the swing that would part it
             from the likeliest.
+        slowly: for effects of the final model that have their slow part alone, why.
+        reliance: that the values are not to be relied on, or how far; empty where they are.
     """
 
     ladder: tuple[Rung, ...]
@@ -113,6 +120,8 @@ class Diagnosis:
     unexplained: Unexplained
     notes: tuple[str, ...]
     apart: dict[str, NextSwing]
+    slowly: dict[str, str]
+    reliance: str = ""
 
     def document(self) -> dict[str, Any]:
         """results/diagnosis.json."""
@@ -121,7 +130,7 @@ class Diagnosis:
             "format": FORMAT,
             "before": before,
             "candidates": [candidate_entry(one, self.apart) for one in self.candidates],
-            "accepted": accepted_entries(self.final, self.spreads[1], self.groups),
+            "accepted": accepted_entries(self.final, self.spreads[1], self.groups, self.slowly),
             "after": after,
             "share_closed": share_closed(before, after),
             "parameters_before": parameter_entries(self.first, self.spreads[0]),
@@ -134,6 +143,7 @@ class Diagnosis:
                 "present": self.unexplained.present,
                 "signature": self.unexplained.signature,
                 "evidence": self.unexplained.evidence,
+                **({"reliance": self.reliance} if self.reliance else {}),
             },
             "decay": swing_decay(self.first, self.final),
             **({} if self.kinematics is None else {"lengths": self.kinematics.document()}),
@@ -177,8 +187,8 @@ def diagnose(
     refuse_few(fitted)
     if not checked:
         raise DataError(NOTHING_TO_CHECK)
-    noise_scales = _noise_scales([*fitted, *checked], free)
-    barred = _barred(fitted, robot)
+    noise_scales = white_noise_scales([*fitted, *checked], free)
+    barred = barred_effects(fitted, robot)
     nuisances = tuple(n for n, one in catalogue().items() if one.nuisance and n not in barred)
     names = tuple(catalogue()) if candidates is None else candidates
     names = tuple(name for name in names if not effect_named(name).nuisance)
@@ -211,6 +221,8 @@ def diagnose(
         found.rest,
         tuple(notes),
         _next_swings(accepted, noise_scales),
+        {effect_of(one.decision.key): one.after.slowly for one in accepted if one.after.slowly},
+        found.reliance,
     )
 
 
@@ -224,6 +236,7 @@ class _Told(NamedTuple):
     first: LikelihoodFit
     final: LikelihoodFit
     spreads: tuple[Array, Array]
+    reliance: str
 
 
 def _told(
@@ -266,17 +279,15 @@ def _told(
     is_missing = won or _follows_badly(last, rest)
     check = check or gravity_unasked(accepted, last, is_missing, scales)
     rest = with_unmet(suspected(rest, check) if check else rest, rungs[-1].held_out)
-    told = [one.decision.exchange for one in _counting(search.rounds, accepted)]
-    for exchange in filter(None, told):
+    for exchange in open_exchanges(search.rounds, accepted, scales):
         spread = with_ways(spread, final, exchange)
         notes += filter(None, [sentence(exchange)])
-    spreads = honest_covariance(first, begun), with_settled(spread, last) if held else spread
-    return _Told(last, accepted, rest, rungs, first, final, spreads)
-
-
-def _counting(rounds: Sequence[Round], accepted: Sequence[Round]) -> list[Round]:
-    """Those that count, and the last one where nothing won in it."""
-    return [*accepted, *(one for one in rounds[-1:] if one.decision.winner is None)]
+    spread = with_settled(spread, last) if held else spread
+    left = still_missing(final, not all_settled(accepted), search.kinematics is not None)
+    notes += filter(None, [left.note(spread)])
+    before = still_missing(first, False, False) if accepted else left
+    spreads = before.widened(honest_covariance(first, begun)), left.widened(spread)
+    return _Told(last, accepted, rest, rungs, first, final, spreads, left.reliance)
 
 
 def _kept_from_dynamics(
@@ -336,33 +347,6 @@ def _part(progress: Progress | None, low: float, high: float) -> Progress | None
 
 def _of_role(runs: tuple[PreparedRun, ...] | list[PreparedRun], role: str) -> list[PreparedRun]:
     return [run for run in runs if run.run.role == role and run.run.payload is None]
-
-
-def _noise_scales(runs: list[PreparedRun], free: tuple[str, ...] | None) -> Array:
-    """White noise of the samples over what their covariance (or the unit noise) states, (2,)."""
-    ratios: list[list[float]] = [[], []]
-    for run in runs:
-        trajectory = run.run.trajectory
-        stated = trajectory.standard_deviations()
-        names = POSE_COORDINATES if free is None else free
-        for name in names:
-            group = int(name not in POSE_COORDINATES[:3])
-            noise = run.signals.noise_std[run.signals.coordinates.index(name)]
-            unit = UNIT_NOISE_RAD if group else UNIT_NOISE_M
-            if stated is not None:
-                unit = float(np.nanmedian(stated[:, trajectory.coordinates.index(name)]))
-            ratios[group].append(float(noise / unit))
-    return np.array([np.sqrt(np.mean(np.square(group))) if group else 1.0 for group in ratios])
-
-
-def _barred(runs: list[PreparedRun], robot: Robot) -> dict[str, str]:
-    """Effects that these data cannot show, and why."""
-    recorded = Recorded(
-        lengths=any(run.run.lengths_m is not None for run in runs),
-        slow_errors=any(run.run.trajectory.slow is not None for run in runs),
-    )
-    why = {name: effect.cannot_show(robot, recorded) for name, effect in catalogue().items()}
-    return {name: words for name, words in why.items() if words}
 
 
 def _with_own_noise(found: LikelihoodFit) -> LikelihoodFit:

@@ -48,11 +48,13 @@ class Refit:
         fit: the fit.
         evidence: linear, at the fit, over inertia and effect values.
         score: of that evidence over what is estimated: its held-out costs count.
+        slowly: why it has an effect's slow part alone, where that has another; empty elsewhere.
     """
 
     fit: LikelihoodFit
     evidence: Evidence
     score: Score
+    slowly: str = ""
 
     @property
     def effects(self) -> tuple[str, ...]:

@@ -237,6 +237,7 @@ class Search:
                 break
             found = fewer
             removed.append(name)
+        found = replace(found, slowly=decision.winner.slowly)
         return Round(current, replace(decision, winner=found), tuple(removed), stand_in=stand_in)
 
     def _instead(self, done: Round, index: int) -> list[Round]:
@@ -376,7 +377,7 @@ def _job(
         found = refit(current.fit, name, values, noise_scales, colour)
     except ValueError:
         return None
-    return found if lacks_little(found) else fully(found, name, noise_scales, colour)
+    return fully(found, name, noise_scales, colour)
 
 
 def _of_set(

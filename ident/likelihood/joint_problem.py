@@ -110,6 +110,10 @@ class Step:
     priors: Array
 
 
+class NotFollowedError(ValueError):
+    """A run that cannot be simulated from where it should start: names it, and why."""
+
+
 class Problem:
     """What does not change while the unknowns do.
 
@@ -218,15 +222,15 @@ class Problem:
         zeta, span = start[:6], samples.span_s
         inertia = self.loads.inertia(run, state.inertia, self.loads_of(state))
         values = state.values_of(run, self.model.own_values)
-        rates = admissible_rates(self.model, zeta, start[6:], inertia, values, span[0])
         try:
+            rates = admissible_rates(self.model, zeta, start[6:], inertia, values, span[0])
             if near is not None:
                 moved = near.motion_at(zeta, rates, inertia, values, self.tolerance_m)
                 if moved is not None:
                     return moved
             return simulate(self.model, zeta, rates, span, inertia, values, self.tolerance_m)
         except (ValueError, np.linalg.LinAlgError) as error:
-            raise ValueError(f"run {samples.name}: {error}") from error
+            raise NotFollowedError(f"run {samples.name}: {error}") from error
 
     def cost(self, state: State) -> float:
         """Sum of squared whitened residuals, lengths and priors included."""

@@ -116,6 +116,8 @@ def _summarise(document: Diagnosis, console: Console) -> None:
     for entry in document.accepted:
         values = ", ".join(f"{p.name} {number(p.value, 4)}" for p in entry.parameters)
         console.say(f"  accepted: {plain(entry.effect)} ({values})")
+        if entry.motion:
+            console.say(f"    fitted {entry.motion}")
         for sentence in seen_directions(entry.directions):
             console.say(f"    {sentence}")
     for place in document.lengths.wrong if document.lengths else ():

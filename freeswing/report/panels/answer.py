@@ -152,6 +152,8 @@ def verdict(diagnosis: Diagnosis | None) -> list[str]:
     unexplained = diagnosis.unexplained
     if unexplained is not None and unexplained.present:
         sentences.append(f"Something remains unexplained: {unexplained.signature}")
+    if unexplained is not None and unexplained.reliance:
+        sentences.append(f"{unexplained.reliance[:1].upper()}{unexplained.reliance[1:]}.")
     untold = _untold(diagnosis)
     if untold:
         return [*sentences, untold]

@@ -65,6 +65,8 @@ def effect_rows(effect: FoundEffect) -> list[dict[str, str]]:
         row = parameter_row(parameter, effect.effect)
         size = f"{row['value']} ± {row['half_width']} {row['unit']}"
         rows.append({"effect": name, "number": row["name"], "value ± 95 %": size})
+    if effect.motion:
+        rows.append({"effect": name, "number": "motion", "value ± 95 %": effect.motion})
     return rows
 
 

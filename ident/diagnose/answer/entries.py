@@ -43,7 +43,10 @@ def candidate_entry(one: Candidate, apart: dict[str, NextSwing]) -> dict[str, An
 
 
 def accepted_entries(
-    final: LikelihoodFit, covariance: Array, groups: dict[str, tuple[str, ...]]
+    final: LikelihoodFit,
+    covariance: Array,
+    groups: dict[str, tuple[str, ...]],
+    slowly: dict[str, str],
 ) -> list[dict[str, Any]]:
     """`accepted` of results/diagnosis.json: values that were estimated, or settled by lengths.
 
@@ -51,6 +54,7 @@ def accepted_entries(
         final: the fit with all accepted effects.
         covariance: of the shared unknowns as it is told, (p, p).
         groups: for each effect, those that stand in its group.
+        slowly: why effects have their slow part alone, of those that have another.
     """
     settled = settled_places(final.model)
     entries, unknowns = [], final.unknowns
@@ -76,8 +80,16 @@ def accepted_entries(
         group = [other for other in groups.get(name, ()) if other != name]
         seen = directions(final.model, where[told], together[np.ix_(told, told)])
         entry = {"effect": name, "parameters": rows, "confounded_with": group}
-        entries.append(entry | ({"directions": seen} if seen else {}))
+        motion = {"motion": _motion(final, name, slowly)} if effect_named(name).fully else {}
+        entries.append(entry | motion | ({"directions": seen} if seen else {}))
     return entries
+
+
+def _motion(final: LikelihoodFit, name: str, slowly: dict[str, str]) -> str:
+    """Whether an effect that has a slow part and another was fitted with both."""
+    if effect_named(name).fully in final.model.effects:
+        return "with vibration"
+    return f"quasi-static: {slowly[name]}" if name in slowly else "quasi-static"
 
 
 def std_of_rms(values: Array) -> Array:

@@ -10,11 +10,12 @@ from freeswing.cdpr.effects import effect_named
 from freeswing.cdpr.model.elastic_motion import lengths_of
 from freeswing.cdpr.model.known_values import with_effects
 from freeswing.cdpr.robot import Array
-from freeswing.ident.diagnose.decision import included
+from freeswing.ident.diagnose.decision import included, lacks_little
 from freeswing.ident.diagnose.refit import Refit, ranked, rescored
 from freeswing.ident.diagnose.variants import effect_of
 from freeswing.ident.likelihood.blocks import STARTS, eased, effect_blocks, with_effect_values
 from freeswing.ident.likelihood.fit_swings import Swings
+from freeswing.ident.likelihood.joint_problem import NotFollowedError
 
 # Starts that pluck cables by so many times what they were held to are fitted again, held to that.
 PLUCKED_MORE = 2.0
@@ -36,8 +37,12 @@ def fully(slow: Refit, key: str, noise_scales: Array, colour: float) -> Refit:
     """
     found = slow.fit
     name, where = effect_named(effect_of(key)).fully, found.model.place_of(effect_of(key))
-    if not name or not found.values[where][0] > 0.0:
+    if not name:
         return slow
+    if not found.values[where][0] > 0.0:
+        return replace(slow, slowly="cables that do not stretch do not vibrate")
+    if lacks_little(slow):
+        return replace(slow, slowly="stretch that follows its tension leaves nothing but noise")
     model = with_effects(found.model, (name,))
     place, start = model.place_of(name), model.start_values
     values = np.array([np.append(one.values, start[place]) for one in found.motions])
@@ -58,7 +63,10 @@ def fully(slow: Refit, key: str, noise_scales: Array, colour: float) -> Refit:
             values[place.start] = size
             unknowns = with_effect_values(moving.unknowns, model, values)
             moving = ranked(moving.swings, unknowns, moving.cost)
-    except ValueError:  # no full motion follows the runs as well
-        return slow
+    except NotFollowedError as error:
+        return replace(slow, slowly=f"no motion with vibration follows the runs: {error}")
     # A line of the noise is as good as a vibration that rings for ever, and settles values by it.
-    return full if included(slow, full, key, noise_scales) > MORE_LIKELY else slow
+    chance = included(slow, full, key, noise_scales)
+    if chance > MORE_LIKELY:
+        return full
+    return replace(slow, slowly=f"the runs do not show a vibration (probability {chance:.2g})")

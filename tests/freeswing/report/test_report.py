@@ -17,9 +17,10 @@ from freeswing.report.page import PANELS, render_page
 from freeswing.report.panels.advice import steps
 from freeswing.report.panels.answer import verdict
 from freeswing.report.panels.cameras import Cameras
-from freeswing.report.panels.ladder import EffectLadder
+from freeswing.report.panels.ladder import EffectLadder, effect_rows
 from freeswing.report.space import enlargement
-from freeswing.results.diagnosis import Candidate, Diagnosis
+from freeswing.results.common import FoundEffect
+from freeswing.results.diagnosis import Candidate, Diagnosis, Unexplained
 from tests.freeswing.report.report_material import whole_material
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
@@ -277,6 +278,21 @@ def test_effects_that_replace_each_other_are_told_of_once() -> None:
     said = verdict(Diagnosis(candidates=candidates))
     assert len(said) == 2
     assert all(said[0].count(name) == 1 for name in ("quadratic drag", "translational drag"))
+
+
+def test_how_far_values_are_to_be_relied_on_is_said() -> None:
+    rest = Unexplained(present=True, signature="1 mrad rms in theta")
+    left = dataclasses.replace(rest, reliance="do not rely on these values: why")
+    said = verdict(Diagnosis(unexplained=left))
+    assert said[-1] == "Do not rely on these values: why."
+    assert len(verdict(Diagnosis(unexplained=rest))) == 1
+
+
+def test_how_stretching_cables_were_fitted_is_a_row() -> None:
+    found = FoundEffect(effect="cable_elasticity", motion="with vibration")
+    row = {"effect": "cable elasticity", "number": "motion", "value ± 95 %": "with vibration"}
+    assert effect_rows(found) == [row]
+    assert not effect_rows(FoundEffect(effect="gravity_tilt"))
 
 
 def test_rivals_are_sentences_and_told_of_once_below_the_bars_and_in_the_advice() -> None:

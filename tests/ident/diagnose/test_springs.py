@@ -16,13 +16,15 @@ from freeswing.cdpr.model.equations import build_model
 from freeswing.cdpr.robot import POSE_COORDINATES
 from freeswing.cdpr.simulation.free_swing import Motion, simulate
 from freeswing.ident.diagnose import heldout, screen
+from freeswing.ident.diagnose.answer.entries import accepted_entries
 from freeswing.ident.diagnose.own_values import OwnValues
 from freeswing.ident.diagnose.refit import Refit, rescored, without
 from freeswing.ident.diagnose.springs import full_motion as module
 from freeswing.ident.diagnose.springs.full_motion import fully
-from freeswing.ident.likelihood.blocks import eased, first_unknowns
+from freeswing.ident.likelihood.blocks import STARTS, eased, first_unknowns
 from freeswing.ident.likelihood.fit import fit
 from freeswing.ident.likelihood.fit_swings import ONWARD, Swings
+from freeswing.ident.likelihood.joint_problem import NotFollowedError
 from freeswing.ident.likelihood.run_residuals import Reduced, plucked_start
 from freeswing.ident.likelihood.samples_and_noise import UNIT_NOISE_M, prepare
 from tests.ident.swings import TRUE_INERTIA, paper_model, recorded, swing
@@ -161,6 +163,43 @@ def test_vibration_must_be_likelier_than_none(monkeypatch, chance, taken) -> Non
     monkeypatch.setattr(module, "included", lambda *_: chance)
     found = fully(slow(0.0), SPRUNG[0], SCALES, 1.0)
     assert (SPRUNG[1] in found.effects) == taken
+    assert ("do not show a vibration (probability 0.49)" in found.slowly) == (not taken)
+
+
+def test_a_motion_that_cannot_be_followed_is_said(monkeypatch) -> None:
+    def stuck(*_: Any) -> Any:
+        raise NotFollowedError("run 2: no motion from there")
+
+    monkeypatch.setattr(module, "ranked", stuck)
+    found = fully(slow(0.0), SPRUNG[0], SCALES, 1.0)
+    assert found.fit is slow(0.0).fit
+    assert found.slowly == "no motion with vibration follows the runs: run 2: no motion from there"
+
+
+def test_other_errors_of_that_fit_are_not_taken_for_it(monkeypatch) -> None:
+    """Any ValueError had been, and slow stretch stood without a word."""
+
+    def wrong(*_: Any) -> Any:
+        raise ValueError("unknown starts: bounds, prior or mask are not the model's")
+
+    monkeypatch.setattr(module, "ranked", wrong)
+    with pytest.raises(ValueError, match="unknown starts"):
+        fully(slow(0.0), SPRUNG[0], SCALES, 1.0)
+
+
+def test_what_cannot_be_followed_is_told_by_its_run() -> None:
+    found = slow(0.0).fit
+    starts = replace(found.unknowns.block(STARTS), value=np.full((len(found.samples), 12), 9.0))
+    swings = replace(found.swings, motions=())
+    with pytest.raises(NotFollowedError, match="run run 0: "):
+        fit(swings, found.unknowns.exchanged(starts), ONWARD)
+
+
+def test_the_result_says_whether_stretch_was_fitted_with_its_vibration() -> None:
+    for found, said in ((full(0.0), "with vibration"), (slow(0.0), "quasi-static: at the noise")):
+        told = np.eye(len(found.fit.covariance))
+        (entry,) = accepted_entries(found.fit, told, {}, {SPRUNG[0]: "at the noise"})
+        assert entry["motion"] == said
 
 
 @pytest.mark.parametrize(("times", "held"), [(1.95, [0.01, 0.01]), (2.05, [0.01, 0.01, 0.0205])])
