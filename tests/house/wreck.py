@@ -388,6 +388,11 @@ HELD = (
         ("AS_DECLARED",),
         "tests/ident/diagnose/answer/test_still_missing.py",
     ),
+    Held(
+        "ident/diagnose/answer/unseen_vibration.py",
+        ("SAME_STRETCH",),
+        "tests/ident/diagnose/answer/test_unseen_vibration.py",
+    ),
     Held("ident/diagnose/outstanding_runs.py", ("OUTSTANDING",), DECISION),
     Held("ident/diagnose/refit.py", ("REWEIGHED",), DECISION),
     Held("ident/diagnose/springs/full_motion.py", ("PLUCKED_MORE", "MORE_LIKELY"), SPRINGS),

@@ -1,0 +1,54 @@
+"""Stretch that is told by its slow part, beside a vibration that the runs do not show."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from freeswing.cdpr.effects import effect_named
+from freeswing.cdpr.robot import Array
+from freeswing.ident.diagnose.refit import Refit, colour_of
+from freeswing.ident.diagnose.sets.ways import Exchange, Way
+from freeswing.ident.diagnose.springs.full_motion import vibrating
+
+# Both motions have one stretch and one damping. Where these differ by more of their deviations the
+# full motion rings with a line of the noise: that was thirteen off, those that are right below two.
+SAME_STRETCH = 3.0
+
+
+def unseen_vibration(last: Refit, noise_scales: Array) -> Exchange | None:
+    """What the vibration of stretching cables makes of a fit with their slow part alone.
+
+    Cables that stretch vibrate whether runs show it or not, and the slow part is a little off for
+    it where it leaves nothing but noise: by up to three of its deviations. So it counts as if it
+    were sure, and not by its probability.
+
+    Args:
+        last: the fit.
+        noise_scales: of metres and radians, (2,).
+
+    Returns:
+        None where no effect of the fit has its slow part alone, or no vibration goes with it.
+    """
+    for name in last.effects:
+        fuller = effect_named(name).fully
+        if fuller and fuller not in last.effects:
+            colour = colour_of(last.fit, noise_scales)
+            full = vibrating(last, name, noise_scales, colour).fit
+            if full is not None and _is_same(last, full, name):
+                return Exchange((name,), 0.0, (last,), (Way((fuller,), 1.0, full),))
+    return None
+
+
+def vibration_note(told: Exchange) -> str:
+    """What deviations hold of it."""
+    return (
+        f"{told.leader[0]} is told by its slow part, since these runs do not show that cables "
+        "vibrate beside it; deviations hold what that would make of the values"
+    )
+
+
+def _is_same(slow: Refit, full: Refit, name: str) -> bool:
+    """Whether two fits tell an effect's values alike, each by its deviations."""
+    away = full.fit.value(name) - slow.fit.value(name)
+    spread = np.hypot(full.fit.std(name), slow.fit.std(name))
+    return bool((np.abs(away) <= SAME_STRETCH * spread).all())

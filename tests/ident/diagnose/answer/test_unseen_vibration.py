@@ -1,0 +1,47 @@
+"""Cables that stretch vibrate: what that makes of values counts where runs do not show it."""
+# Stubs stand for what is not looked at.
+# pyright: reportArgumentType=false
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from freeswing.ident.diagnose.answer import unseen_vibration as room
+from freeswing.ident.diagnose.answer.unseen_vibration import unseen_vibration, vibration_note
+from freeswing.ident.diagnose.springs.full_motion import Vibrating
+
+STRETCH, VIBRATION = "cable_elasticity", "cable_vibration"
+
+
+def found(value: float, std: float, *effects: str) -> SimpleNamespace:
+    """A fit with a compliance and a damping known so well."""
+    fit = SimpleNamespace(
+        value=lambda _: np.array([1.0, value]), std=lambda _: np.array([1.0, std])
+    )
+    return SimpleNamespace(fit=fit, effects=effects)
+
+
+@pytest.mark.parametrize(("away", "counts"), [(2.9, True), (-2.9, True), (3.1, False)])
+def test_the_same_stretch_with_its_vibration_counts_as_sure(monkeypatch, away, counts) -> None:
+    """One that rings with a line of the noise was 13 deviations off."""
+    slow, full = found(0.0, 3.0, STRETCH), found(5.0 * away, 4.0, STRETCH, VIBRATION)
+    monkeypatch.setattr(room, "vibrating", lambda *_: Vibrating(full, 0.3, "not seen"))
+    monkeypatch.setattr(room, "colour_of", lambda *_: 1.0)
+    told = unseen_vibration(slow, np.ones(2))
+    assert (told is not None) == counts
+    for one in filter(None, [told]):
+        assert [(way.places, way.probability, way.fit) for way in one.ways] == [
+            ((VIBRATION,), 1.0, full)
+        ]
+        assert one.fits == (slow,)
+        assert "cable_elasticity is told by its slow part" in vibration_note(one)
+
+
+def test_what_cannot_be_followed_or_is_in_the_model_does_not(monkeypatch) -> None:
+    monkeypatch.setattr(room, "vibrating", lambda *_: Vibrating(None, 0.0, "no motion"))
+    monkeypatch.setattr(room, "colour_of", lambda *_: 1.0)
+    for effects in ((STRETCH,), (STRETCH, VIBRATION), ("gravity_tilt",), ()):
+        assert unseen_vibration(found(0.0, 1.0, *effects), np.ones(2)) is None
