@@ -237,7 +237,8 @@ class Search:
                 break
             found = fewer
             removed.append(name)
-        found = replace(found, slowly=decision.winner.slowly)
+        if decision.winner.slowly:
+            found = replace(found, slowly=decision.winner.slowly)
         return Round(current, replace(decision, winner=found), tuple(removed), stand_in=stand_in)
 
     def _instead(self, done: Round, index: int) -> list[Round]:

@@ -114,7 +114,8 @@ def test_the_way_that_left_out_runs_speak_for_stands_where_only_it_ends_near_the
     monkeypatch, first, other, ends
 ) -> None:
     """Beside viscous swivels a constant force led (0.26), and ended at nine times the noise."""
-    fits: Any = {name: SimpleNamespace(fit=None, name=name) for name in ("base", "a", "b")}
+    fits: Any = {name: SimpleNamespace(fit=None, name=name, slowly="") for name in "ab"}
+    fits["base"] = SimpleNamespace(fit=None, name="base")
     excess = {"base": 50.0, "a": first, "b": other}
     led: Any = Decision((), fits["a"], "a", ("a", "b"), fits["b"], ("b", fits["b"]))
 
