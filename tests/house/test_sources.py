@@ -23,6 +23,7 @@ NO_FORMULA = {
     "cdpr/measured/marker_recording.py:marker_position": "picks a column",
     "homing/rest_readings.py:evaluate_evenly": "pads a batch",
     "ident/bench/noise.py:column_residuals": "splits an array",
+    "ident/diagnose/declared_model.py:white_noise_scales": "a root mean square of ratios",
     "ident/bench/priors/motion_priors.py:loose_coordinates": "widths by coordinate",
     "ident/drive/second_start.py:away": "numbers five per cent off",
     "servo/design/pid.py:slowest_filters": "a number times modes",
