@@ -852,10 +852,16 @@ HELD = (
         "tests/vision/rig/lost/test_lost_frames.py",
     ),
     Held("vision/rig/lost/kinks.py", ("MEETS",), "tests/vision/rig/lost/test_lost_frames.py"),
-    Held("vision/rig/stamp_jitter.py", ("LEAST_JITTER_S", "_LEAST_FRAMES", "_FLOOR_PX"), START),
+    Held(
+        "vision/rig/stamp_jitter.py",
+        ("LEAST_JITTER_S", "_LEAST_FRAMES", "_FLOOR_PX", "_SURE_SIGMAS"),
+        START,
+    ),
     Held("vision/rig/clock_rates.py", ("MOST_APART",), "tests/vision/rig/test_clock_rates.py"),
     Held(
-        "vision/rig/stamp_jitter.py", ("_SURE_SIGMAS",), "tests/vision/rig/test_shared_jitter.py"
+        "vision/rig/shared_jitter.py",
+        ("FASTEST", "FAST", "_LEAST_POSES", "_SURE_SIGMAS", "_BEYOND"),
+        "tests/vision/rig/test_shared_jitter.py",
     ),
     Held("vision/rig/untied_cameras.py", ("_LEAST_TAGS", "_LEAST_KNOWN"), START),
     Held("calib/rig/bundle_adjustment.py", ("_COMMON_FREEDOM", "_LEAST_FREEDOM"), RIG_START),

@@ -35,12 +35,8 @@ from freeswing.vision.rig.moved_cameras import moved_cameras, repose_by_base_tag
 from freeswing.vision.rig.real_effects import LEAST_CLOCK_S, LEAST_LINE_S, is_real
 from freeswing.vision.rig.rig_kernels import CLOCK, LINE, PER_CAMERA, POSE
 from freeswing.vision.rig.rig_step import Finding, RigStep, frame_squares_px2, iterated, rig_step
-from freeswing.vision.rig.stamp_jitter import (
-    lateness,
-    stamp_jitter_s,
-    widened_by_stamps,
-    widened_step,
-)
+from freeswing.vision.rig.shared_jitter import widened_by_stamps
+from freeswing.vision.rig.stamp_jitter import lateness, stamp_jitter_s, widened_step
 from freeswing.vision.rig.standing_still import nothing_asked, stands_still
 from freeswing.vision.rig.untied_cameras import untied_shifts
 

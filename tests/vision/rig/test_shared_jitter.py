@@ -10,10 +10,15 @@ import numpy as np
 import pytest
 
 from freeswing.cdpr.rotation import log_rotation
-from freeswing.vision.fuse.motion.motion_from_poses import LeftOut
-from freeswing.vision.fuse.poses import Poses, unknown_poses
+from freeswing.vision.fuse.motion.motion_from_poses import Missed
+from freeswing.vision.fuse.poses import Poses, motions_of, unknown_poses, with_course
 from freeswing.vision.rig.correct_rig import correct_rig
-from freeswing.vision.rig.stamp_jitter import along_the_motion_s, widened_along
+from freeswing.vision.rig.shared_jitter import (
+    SharedJitter,
+    along_the_motion,
+    robust_variance,
+    widened_along,
+)
 from tests.vision.rig import made_views as made
 from tests.vision.rig.made_views import SWING, Recorded, made_views
 
@@ -60,11 +65,67 @@ def test_one_camera_has_none_that_is_alike(tmp_path) -> None:
     assert "ms (standard deviation): their deviations count it" in said
 
 
-def late_poses(late_s: float, std_s: float, count: int = 100) -> Poses:
-    """Poses that lie as far before as behind the others' motion, claimed to some of their way."""
-    left = np.where(np.arange(count) % 2, 1.0, -1.0)[:, None] * late_s * SPEED
+STD_M = 1e-5
+RATE_HZ = 30.0
+
+
+def swung(jitter_s: float, fast_m: float = 0.0, share: float = 0.0, count: int = 240) -> Poses:
+    """Poses of a swing of 50 mm at 1.3 Hz and an oscillation at a share of the frame rate."""
+    rng = np.random.default_rng(8)
+    stamps = np.arange(count) / RATE_HZ
+    t = stamps + jitter_s * rng.standard_normal(count)
+    along = 0.05 * np.sin(8.2 * t) + fast_m * np.sin(2.0 * np.pi * share * RATE_HZ * t)
+    places = along[:, None] * np.array([0.6, 0.8, 0.0]) + STD_M * rng.standard_normal((count, 3))
+    poses = replace(
+        unknown_poses(stamps),
+        positions_m=places,
+        rotations=np.tile(np.eye(3), (count, 1, 1)),
+        covariances=np.tile(STD_M**2 * np.eye(6), (count, 1, 1)),
+        known=np.ones(count, dtype=bool),
+    )
+    poses = with_course(poses, np.full(6, STD_M))
+    return replace(poses, motions=motions_of(poses))
+
+
+@pytest.mark.parametrize("jitter_s", [3e-4, 1e-3, 3e-3])
+def test_jitter_of_all_stamps_is_told(jitter_s) -> None:
+    found = along_the_motion(swung(jitter_s))
+    assert found.std_s == pytest.approx(jitter_s, rel=0.15)
+    assert not found.at_most
+
+
+def test_even_frames_have_none() -> None:
+    assert along_the_motion(swung(0.0)) == SharedJitter(0.0)
+
+
+@pytest.mark.parametrize(("share", "slow"), [(0.225, True), (0.275, False)])
+def test_a_motion_below_a_quarter_of_the_frame_rate_hides_nothing(share, slow) -> None:
+    """Half a millimetre at 6.8 Hz of 30, or at 8.3."""
+    found = along_the_motion(swung(5e-4, 5e-4, share))
+    assert found.at_most != slow
+    assert found.std_s == pytest.approx(5e-4, rel=0.3)
+
+
+@pytest.mark.parametrize(("share", "told"), [(0.37, False), (0.41, True)])
+def test_a_motion_below_four_tenths_of_the_frame_rate_is_none(share, told) -> None:
+    """60 um at 11 Hz of 30 are 0.2 ms of a swing's way; at 12 Hz nothing tells that from jitter."""
+    found = along_the_motion(swung(0.0, 6e-5, share))
+    assert (found.std_s > 0.0) == told, found
+
+
+def late_poses(late_s: float, std_s: float, count: int = 100, whole_s: float = 0.0) -> Poses:
+    """Poses that lie so far before or behind the others' motion, claimed to some of their way.
+
+    Between all frequencies `whole_s` instead, where it is told. Half the numbers are free.
+    """
+    sign = np.where(np.arange(count) % 2, 1.0, -1.0)[:, None]
+
+    def missed(low: float, high: float) -> Missed:
+        size_s = whole_s if whole_s and high - low > 0.2 else late_s
+        return Missed(sign * size_s * np.sqrt(0.5) * SPEED, np.full(count, 0.5))
+
     course: Any = SimpleNamespace(
-        left_out=lambda: LeftOut(left, np.zeros(count)), deviations=np.ones(6)
+        missed=missed, deviations=np.ones(6), spectrum=SimpleNamespace(too_fast_hz=None)
     )
     return replace(
         unknown_poses(np.arange(count) / 20.0),
@@ -75,12 +136,40 @@ def late_poses(late_s: float, std_s: float, count: int = 100) -> Poses:
     )
 
 
-@pytest.mark.parametrize(("times", "told"), [(0.96 * 1.932, False), (1.04 * 1.932, True)])
+ALIKE = robust_variance(np.ones(100))
+"""The variance of values that all are one is not one: normal ones have larger ones among them."""
+
+
+@pytest.mark.parametrize(("times", "told"), [(0.93 * 1.6, False), (1.07 * 1.6, True)])
 def test_it_has_to_stand_out_of_what_is_claimed(times, told) -> None:
-    """Of a hundred poses a variance by the median is known to 23 %: four of these."""
-    poses = late_poses(np.sqrt(times) * 1e-3 / 1.4826, 1e-3)
-    found = along_the_motion_s(poses)
-    assert found == pytest.approx(1e-3 * np.sqrt(times - 1.0) if told else 0.0, rel=0.01)
+    """A variance by fifty numbers is known to a fifth: three of these."""
+    found = along_the_motion(late_poses(np.sqrt(times / ALIKE) * 1e-3, 1e-3))
+    assert found.std_s == pytest.approx(1e-3 * np.sqrt(times - 1.0) if told else 0.0, rel=0.01)
+
+
+@pytest.mark.parametrize(("times", "at_most"), [(0.93 * 1.85, False), (1.07 * 1.85, True)])
+def test_more_where_motions_are_slower_is_motion(times, at_most) -> None:
+    late_s = 1e-3 / np.sqrt(ALIKE)
+    found = along_the_motion(late_poses(late_s, 1e-5, whole_s=np.sqrt(times) * late_s))
+    assert found.at_most == at_most
+    assert found.std_s == pytest.approx(1e-3 if at_most else 1e-3 * np.sqrt(times), rel=0.01)
+
+
+@pytest.mark.parametrize(("count", "told"), [(19, False), (20, True)])
+def test_twenty_poses_tell(count, told) -> None:
+    assert (along_the_motion(late_poses(5e-3, 1e-4, count)).std_s > 0.0) == told
+
+
+def test_what_lies_far_off_counts_no_more() -> None:
+    """Of values that all are one the deviation is 1.13; one and a half of it are 1.70."""
+
+    def with_one(size: float) -> float:
+        return robust_variance(np.append(np.ones(200), size))
+
+    assert with_one(1.76) == pytest.approx(with_one(50.0), rel=1e-6)
+    assert with_one(1.65) < 0.9995 * with_one(50.0)
+    normal = np.random.default_rng(1).standard_normal(20000)
+    assert robust_variance(normal) == pytest.approx(1.0, rel=0.03)
 
 
 def test_what_it_moves_poses_by_is_added() -> None:

@@ -234,3 +234,11 @@ def test_what_lenses_leave_is_no_jitter(monkeypatch, noise_px, shown) -> None:
 )
 def test_cameras_that_stand_as_calibrated_tell_their_lag(known_m, free_m, plausible) -> None:
     assert _is_plausible(known_m, free_m) == plausible
+
+
+@pytest.mark.parametrize(("times", "shown"), [(0.97 * 1.466, False), (1.03 * 1.466, True)])
+def test_jitter_has_to_stand_out_of_the_pixels_noise(monkeypatch, times, shown) -> None:
+    """A variance by the median of four hundred steps is known to 12 %: four of these."""
+    drawn = 1.039  # the variance by the median of the steps that this seed draws
+    noise_px = 0.03 * np.sqrt(times / drawn)
+    assert bool(jitter(monkeypatch, 401, 0.0, noise_px, 30.0)) == shown

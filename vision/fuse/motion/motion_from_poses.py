@@ -43,16 +43,17 @@ class Carried(NamedTuple):
     variances: Array
 
 
-class LeftOut(NamedTuple):
-    """Poses against the motion that the others make.
+class Missed(NamedTuple):
+    """What poses miss a motion by that holds some frequencies only.
 
     Attributes:
-        misses: of position and small rotation, NaN where no pose is known, (n, 6).
-        others: variance that the others leave of it, in that of a pose's own noise, (n,).
+        misses: of position and small rotation, by the inverse of all poses' covariance, (n, 6).
+        variances: of these in poses that scatter about such a motion as they claim, in that of a
+            pose's own noise, (n,); zero where no pose is known.
     """
 
     misses: Array
-    others: Array
+    variances: Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,25 +111,24 @@ class Course:
         where = where.ravel()
         return Carried(shifts[where], motions[where], variances[where])
 
-    def left_out(self) -> LeftOut:
-        """What each pose misses the motion by that the others make.
+    def missed(self, low: float, high: float) -> Missed:
+        """What poses show between two shares of the pose rate.
 
         Source:
-            Rasmussen, Williams 2006, Gaussian Processes for Machine Learning, sec. 5.4.2:
-            predictions of what is left out.
+            Rasmussen, Williams 2006, Gaussian Processes for Machine Learning, sec. 2.2: the inverse
+            covariance leaves what no motion of these frequencies explains.
         """
         n = len(self.times_s)
-        groups = np.arange(-(-n // _TOGETHER))
-        stretch = self._stretches(groups)
-        patterns, waves = stretch.patterns(), self.spectrum.waves()
-        inverses = inverse_covariances(patterns, waves)[patterns.of]
-        pulled = inverses @ stretch.steps
+        stretch = self._stretches(np.arange(-(-n // _TOGETHER)))
+        patterns = stretch.patterns()
+        inverses = inverse_covariances(patterns, self.spectrum.without(low, high).waves())
         at = np.arange(n)
         group = at // _TOGETHER
-        own = inverses[group, at - stretch.first[group], at - stretch.first[group]]
-        variances = np.divide(1.0, own, out=np.full(n, np.nan), where=self.known)
-        misses = pulled[group, at - stretch.first[group]] * variances[:, None]
-        return LeftOut(misses * self.deviations, variances / waves.noise - 1.0)
+        own = at - stretch.first[group]
+        pulled = inverses[patterns.of] @ stretch.steps
+        squares = np.einsum("pij,pji->pi", inverses, inverses)[patterns.of]
+        variances = np.where(self.known, squares[group, own], 0.0)
+        return Missed(pulled[group, own] * self.deviations, variances)
 
     def _stretches(self, groups: Ints) -> _Stretches:
         return _stretches(

@@ -68,6 +68,12 @@ class Spectrum:
             return None
         return float(_middles()[np.argmax(high)] / self.step_s)
 
+    def without(self, low: float, high: float) -> Spectrum:
+        """The same without what lies between two shares of the pose rate; noise is as claimed."""
+        whole = np.maximum(self.power + self.excess / BANDS, AS_LARGE)
+        out = (_middles() >= low) & (_middles() < high)
+        return Spectrum(self.step_s, np.where(out, _LEAST_POWER, whole), 1.0)
+
     def waves(self) -> Waves:
         """What the kernels take: the bands, then images of those that may be too fast."""
         bands = _middles()
