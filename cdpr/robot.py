@@ -45,6 +45,9 @@ BODY_NAMES = (
     "Iyz_kg_m2",
 )
 STANDARD_GRAVITY_M_S2 = 9.80665
+# Millimetres given as metres are a thousand times too large: stadium cameras hang on 200 m, and
+# the smallest laboratory frame, 0.3 m, would read 300.
+LARGEST_FRAME_M = 200.0
 
 Array = NDArray[Any]
 

@@ -12,11 +12,10 @@ from numpy.typing import NDArray
 from freeswing.cdpr.driven.drive import LEAST_DRIVEN, MOTOR_NUMBERS, Drive, Motor, Shape
 from freeswing.cdpr.driven.formula import FUNCTIONS, Formula
 from freeswing.cdpr.files.table_reader import Reader
+from freeswing.cdpr.robot import LARGEST_FRAME_M
 
 Array = NDArray[np.float64]
 
-# Larger than any hall: a robot in mm is 1000 times its size.
-LARGEST_FRAME_M = 200.0
 LARGEST_DRUM_M = 0.5  # a drum of 17.5 written in mm is 35 times this, one of 0.6 m drives a crane
 LIMITS = ("current_limits_A", "tension_limits_N")
 # Width of the smoothed sign of Coulomb friction, tanh(rate / width), where a file states none:

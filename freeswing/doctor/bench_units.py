@@ -124,6 +124,12 @@ def _of_run(run: BenchRun, robot: Robot, radius_m: float) -> Iterator[str]:
     for payload in run.payloads:
         yield from _of_mass("payload mass_kg", payload.mass_kg, robot)
         yield from _of_place("payload position_m", payload.position_m, radius_m)
+        gyration = float(np.sqrt(0.5 * abs(payload.inertia_kg_m2[:3].sum()) / payload.mass_kg))
+        if gyration > FARTHEST * radius_m > 0.0:
+            yield (
+                f"payload inertia_kg_m2 of {payload.mass_kg:.4g} kg is a radius of gyration of "
+                f"{gyration:.3g} m, the wires {radius_m:.4g} m from their middle: in kg mm²?"
+            )
     if run.lengths_m is None or not radius_m > 0.0:
         return
     length = float(np.mean(run.lengths_m))

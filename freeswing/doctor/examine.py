@@ -17,6 +17,7 @@ from freeswing.doctor.footage import (
     video_findings,
 )
 from freeswing.doctor.markers import marker_findings
+from freeswing.doctor.robot_file.mass_and_inertia import mass_findings, payload_findings
 from freeswing.doctor.robot_file.mistaken_cables import mistaken_cables
 from freeswing.doctor.robot_file.units_and_places import robot_findings
 from freeswing.doctor.run_roles import split_findings
@@ -42,6 +43,7 @@ def _findings(session: Session, progress: Progress) -> Iterator[Finding]:
     target = yield from _tried("target", lambda: load_target(session))
     if robot is not None:
         yield from robot_findings(robot)
+        yield from mass_findings(robot)
     yield from calibration_findings(session)
     progress("reading the markers", 0.0)
     markers = read_marker_runs(session, target)
@@ -59,6 +61,7 @@ def _findings(session: Session, progress: Progress) -> Iterator[Finding]:
     if robot is not None and bench:
         swings = yield from bench_findings(session, robot, target)
     if robot is not None and not bench:
+        yield from payload_findings(session.runs, robot)
         said, remedy = mistaken_cables(swings, robot)
         if said:
             yield Finding("error", "robot", said, remedy)

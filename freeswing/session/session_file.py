@@ -14,8 +14,7 @@ from freeswing.calib.scene.scene_keys import read_scene, read_surveyed
 from freeswing.calib.scene.source import SceneSource
 from freeswing.calib.scene.tape_measured import SurveyedPoint
 from freeswing.cdpr.files.documents import InputError, Problems, Reader, inside, load_toml
-from freeswing.cdpr.files.drive_file import LARGEST_FRAME_M
-from freeswing.cdpr.robot import frozen_array
+from freeswing.cdpr.robot import LARGEST_FRAME_M, frozen_array
 from freeswing.cdpr.system.confine import results_folder
 from freeswing.ident.bench.channels import Channel
 from freeswing.ident.bench.runs import KnownBody, Load, Placed

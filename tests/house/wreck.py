@@ -173,7 +173,8 @@ HELD = (
     Held("cdpr/files/trajectory_trc.py", ("RATE_TOLERANCE",), FILES),
     Held("cdpr/files/mocap/fill_values.py", ("LEAST_FILL",), FILES),
     Held("cdpr/files/trajectory_c3d.py", ("SPARE_SHARE",), FILES),
-    Held("cdpr/files/drive_file.py", ("LARGEST_FRAME_M", "LARGEST_DRUM_M"), FILES),
+    Held("cdpr/robot.py", ("LARGEST_FRAME_M",), FILES),
+    Held("cdpr/files/drive_file.py", ("LARGEST_DRUM_M",), FILES),
     Held(
         "cdpr/files/robot_file.py", ("MOST_DRIVEN", "AXIS_TOLERANCE", "LARGEST_GRAVITY_M_S2"), FILES
     ),
@@ -210,10 +211,15 @@ HELD = (
     Held(
         "freeswing/doctor/robot_file/units_and_places.py",
         (
-            "LARGEST_FRAME_M", "LARGEST_PLATFORM_M", "LARGEST_PULLEY_M", "LEAST_GRAVITY_M_S2",
-            "MOST_GRAVITY_M_S2", "SAME_POINT_M",
+            "LARGEST_PLATFORM_M", "LARGEST_PULLEY_M", "LEAST_GRAVITY_M_S2", "MOST_GRAVITY_M_S2",
+            "SAME_POINT_M",
         ),
         "tests/freeswing/doctor/test_doctor.py",
+    ),
+    Held(
+        "freeswing/doctor/robot_file/mass_and_inertia.py",
+        ("LARGEST", "SMALLEST", "DENSEST", "DENSEST_PAYLOAD"),
+        "tests/freeswing/doctor/test_mass_and_inertia.py",
     ),
     Held(
         "freeswing/doctor/run_samples.py",

@@ -110,19 +110,23 @@ def check(path: Path, results: str | None, console: Console) -> None:
         DataError: when a finding keeps it from a result.
     """
     from freeswing.cdpr.files.documents import DataError, write_json
+    from freeswing.doctor.finding import Finding
+    from freeswing.doctor.robot_file.mass_and_inertia import mass_findings
     from freeswing.ident.drive.records.mistaken_records import findings
     from freeswing.session.drive_session import read_drive_session
 
     file = read_drive_session(path, results)
-    found = findings(file.session)
-    entries = [{"level": "error", "subject": "", "text": text, "remedy": ""} for text in found]
+    told = [Finding("error", "", text) for text in findings(file.session)]
+    units = [*mass_findings(file.session.model.robot)]
+    entries = [one.entry() for one in (*told, *units)]
     write_json(file.results / "check.json", {"format": "freeswing-check/1", "findings": entries})
-    for text in found:
+    for text in (*(one.text for one in told), *(one.line() for one in units)):
         console.say(text)
     console.show_file(file.results / "check.json")
-    if found:
-        raise DataError(f"{path}: {len(found)} to mend before a result")
-    console.say(f"{file.name}: nothing keeps it from a result (0 findings)")
+    wrong = [*told, *(one for one in units if one.level == "error")]
+    if wrong:
+        raise DataError(f"{path}: {len(wrong)} to mend before a result")
+    console.say(f"{file.name}: nothing keeps it from a result ({len(entries)} findings)")
 
 
 def diagnose(path: Path, results: str | None, only: list[str] | None, console: Console) -> None:

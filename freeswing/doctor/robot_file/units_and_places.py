@@ -6,12 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from freeswing.cdpr.robot import Robot
+from freeswing.cdpr.robot import LARGEST_FRAME_M, Robot
 from freeswing.doctor.finding import Finding
 
-# Millimetres given as metres are a thousand times too large: stadium cameras hang on 200 m, and
-# the smallest laboratory frame, 0.3 m, would read 300.
-LARGEST_FRAME_M = 200.0
 # A platform of 30 mm would read 30 m; none that hangs on cables is larger than 20 m.
 LARGEST_PLATFORM_M = 20.0
 # The smallest groove, 1 mm, would read 1 m; drums of cranes reach half a metre in radius.

@@ -29,6 +29,11 @@ def payload(mass_kg: float, far_m: float) -> dict[str, Any]:
     return {"payloads": (KnownBody(mass_kg, np.array([far_m, 0.0, 0.0]), np.zeros(6)),)}
 
 
+def turned(mass_kg: float, gyration_m: float) -> dict[str, Any]:
+    inertia = mass_kg * gyration_m**2 * np.array([1.0, 0.5, 0.5, 0.0, 0.0, 0.0])
+    return {"payloads": (KnownBody(mass_kg, np.zeros(3), inertia),)}
+
+
 def counted(known: int) -> dict[str, Any]:
     return {"signals": (Signal("chi", np.where(np.arange(100) < known, 0.1, np.nan)),)}
 
@@ -56,6 +61,8 @@ PENDULUM_S = 2.0 * np.pi * np.sqrt(1.2 / 9.81)
         (payload(241.0, 0.1), "run a: payload mass_kg = 241 kg"),
         (payload(0.4, 2.4), ""),
         (payload(0.4, 2.6), "run a: payload position_m is 2.6 m"),
+        (turned(0.4, 2.4), ""),
+        (turned(0.4, 2.6), "run a: payload inertia_kg_m2 of 0.4 kg is a radius of gyration of 2.6"),
         (load(241.0, 0.1), "loads cube: mass_kg = 241 kg"),
         (load(0.4, 2.6), "loads cube: com_m is 2.6 m"),
         ({"lengths_std_m": 0.059}, ""),
