@@ -46,6 +46,7 @@ from freeswing.vision.planar.fit_plane import PlaneFit, RunPlane, fit_planes
 from freeswing.vision.planar.plane import Items
 from freeswing.vision.planar.report import planar_run, signal_run
 from freeswing.vision.planar.two_dots import COLUMNS, channel_block, dot_signals
+from freeswing.vision.rig.lost.recounted import not_looked_for
 from freeswing.vision.track_run import camera_count
 from freeswing.vision.track_session import examined, sightings_folder
 
@@ -129,9 +130,12 @@ def track_planar(
         Film(run, film, CameraViews(camera, own))
         for (run, film), own in zip(found, paths, strict=True)
     ]
+    lost = not_looked_for([film.views for film in films], "by one camera from above")
     if target is None or not (target.tags or target.markers):
-        return _two_dots(films, camera, watch, remarks)
-    return _in_plane(films, camera, watch, remarks, lens_known=cameras is not None)
+        tracked = _two_dots(films, camera, watch, remarks)
+    else:
+        tracked = _in_plane(films, camera, watch, remarks, lens_known=cameras is not None)
+    return replace(tracked, said=(*tracked.said, *lost))
 
 
 def _only(run: FilmedRun) -> Recording:

@@ -19,8 +19,8 @@ LARGEST = 30.0
 # less.
 SMALLEST = 1.0 / 30.0
 # Mean density of a platform over the ball that its attachments span, or that reaches from P to
-# twice its centre of mass, kg/m³: of lead.
-DENSEST = 11340.0
+# twice its centre of mass, kg/m³: of steel.
+DENSEST = 7850.0
 # The same of what lies on one: of water. A block of steel fills an eighth of the ball then.
 DENSEST_PAYLOAD = 1000.0
 
@@ -52,7 +52,7 @@ def mass_findings(robot: Robot) -> Iterator[Finding]:
         if dense > DENSEST:
             text = (
                 f"mass_kg = {platform.mass_kg:.4g} on attachments {span:.3g} m apart is denser "
-                "than lead: this looks like g"
+                "than steel: this looks like g"
             )
             yield Finding("warning", "robot", text, "write kg")
 

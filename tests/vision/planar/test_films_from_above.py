@@ -119,7 +119,9 @@ def test_two_dots_without_a_target_become_channels_of_the_session(tmp_path: Path
     motion = bench_motion(5, SHORT_S)
     film(tmp_path / "runs" / "a", motion, SHORT_S, spheres=bright_dots())
     assert track(tmp_path) == 0, capsys.readouterr().err
-    assert 'column = "dot1_px"' in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert 'column = "dot1_px"' in printed
+    assert "are not looked for by one camera from above" in printed
     header = (tmp_path / "results" / "tracks" / "a.csv").read_text().splitlines()[0]
     assert header == "t_s,dot1_px,dot2_px,std_dot1_px,std_dot2_px"
     assert main(["track", str(tmp_path), "--write-channels", "--workers", "1"]) == 0

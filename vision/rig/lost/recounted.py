@@ -10,7 +10,7 @@ from freeswing.cdpr.files.documents import DataError
 from freeswing.vision.fuse.run_views import CameraViews
 from freeswing.vision.rig.lag_accepted import own_track
 from freeswing.vision.rig.lag_search import OwnTrack
-from freeswing.vision.rig.lost.lost_frames import Loss, Lost, lost_frames
+from freeswing.vision.rig.lost.lost_frames import Loss, Lost, counted, lost_frames
 from freeswing.vision.rig.rig_step import Finding
 
 
@@ -31,6 +31,19 @@ def recounted(
         findings += own
         said += words
     return now, findings, said
+
+
+def not_looked_for(views: Sequence[CameraViews], why: str) -> tuple[str, ...]:
+    """Which cameras' stamps may have been counted on over lost frames that nothing looks for."""
+    stamps = [(view.camera.name, view.stamps_s[np.isfinite(view.stamps_s)]) for view in views]
+    names = dict.fromkeys(name for name, own in stamps if counted(np.unique(own)) is not None)
+    if not names:
+        return ()
+    return (
+        f"{', '.join(names)}: stamps are even, and frames that were lost while they were counted "
+        f"on are not looked for {why}. Where a recorder may have dropped some, put the frames' own "
+        "times beside the video (CAMERA.csv with frame,t_s)",
+    )
 
 
 def _put_right(
