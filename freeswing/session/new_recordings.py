@@ -7,7 +7,8 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from freeswing.cdpr.files.documents import replace_file
-from freeswing.session.session_file import ROLES, TRAJECTORY_SUFFIXES, Session
+from freeswing.cdpr.files.toml_text import toml_string
+from freeswing.session.session_file import ROLES, TRAJECTORY_SUFFIXES, Session, as_run_name
 
 Mark = dict[str, tuple[int, int]]
 
@@ -54,14 +55,18 @@ def take_in(session: Session, new: Iterable[Path]) -> list[str]:
     roles = [run.role for run in session.runs]
     text, names = session.path.read_text(encoding="utf-8"), []
     for path in sorted(set(new) - named):
-        if path.stem.casefold() in taken or (path.is_dir() and len(_films(path)) < films):
+        name = as_run_name(path.stem)
+        if name.casefold() in taken or not path.name.isprintable():
+            continue
+        if path.is_dir() and len(_films(path)) < films:
             continue
         longer = text.rstrip("\n") + "\n" + _table(session, path, next_role(roles))
         if not _reads(longer):
             continue
         text = longer
         roles.append(next_role(roles))
-        names.append(path.stem)
+        names.append(name)
+        taken.add(name.casefold())
     if names:
         replace_file(session.path, text.encode("utf-8"))
     return names
@@ -76,7 +81,8 @@ def next_role(roles: list[str]) -> str:
 def _table(session: Session, path: Path, role: str) -> str:
     key = "video" if path.is_dir() else "trajectory"
     place = path.relative_to(session.folder).as_posix()
-    return f'\n[[runs]]\nname = "{path.stem}"\nrole = "{role}"\n{key} = "{place}"\n'
+    name = toml_string(as_run_name(path.stem))
+    return f'\n[[runs]]\nname = {name}\nrole = "{role}"\n{key} = {toml_string(place)}\n'
 
 
 def _reads(text: str) -> bool:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import itertools
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
@@ -42,6 +43,7 @@ BOARD_KEYS = {
 }
 OPTIONAL_BOARD_KEYS = {"charuco": ("legacy",), "aprilgrid": ("family",)}
 MOST_RUNS = 10_000
+_LONGEST_NAME = 100  # of a run: file names are longer nowhere than 255 bytes
 PORTS = (f"{port}{number}" for port in ("com", "lpt") for number in range(10))
 DEVICES = frozenset(("con", "prn", "aux", "nul", *PORTS))
 
@@ -337,7 +339,21 @@ def _read_run(reader: Reader, paths: _Paths) -> Run:
 def _is_file_stem(name: str) -> bool:
     plain = all(letter.isalnum() or letter in "._- " for letter in name)
     tidy = not name.startswith(".") and not name.endswith(".") and name.strip() == name
-    return plain and tidy and len(name) <= 100 and not is_device(name)
+    return plain and tidy and len(name) <= _LONGEST_NAME and not is_device(name)
+
+
+def as_run_name(text: str, taken: Collection[str] = ()) -> str:
+    """A name that a run may have, as near to a text as it can be, and none of those taken."""
+    plain = "".join(letter if letter.isalnum() or letter in "._- " else "-" for letter in text)
+    plain = plain[:_LONGEST_NAME].strip(" .") or "run"
+    plain = f"run-{plain}"[:_LONGEST_NAME].rstrip(" .") if is_device(plain) else plain
+    name, others = plain, {one.casefold() for one in taken}
+    for k in itertools.count(2):
+        if name.casefold() not in others:
+            break
+        ending = f"-{k}"
+        name = plain[: _LONGEST_NAME - len(ending)] + ending
+    return name
 
 
 def is_device(name: str) -> bool:

@@ -16,6 +16,7 @@ from freeswing.cdpr.files.toml_text import toml_string
 from freeswing.cdpr.files.trajectory_csv import column_name
 from freeswing.cdpr.files.trajectory_files import holds_markers
 from freeswing.cdpr.robot import POSE_COORDINATES
+from freeswing.session.session_file import as_run_name
 from freeswing.starter.kinds import MISSING
 
 TIME = "t_s"
@@ -144,7 +145,6 @@ def _question_values(path: Path, table: SignalTable, channels: Sequence[str]) ->
 
 def signals_session(name: str, found: Signals, cables: int) -> str:
     """A run a recording, and what each may carry to be filled in or deleted."""
-    lengths = ", ".join([MISSING] * cables)
     lines = [
         'format = "freeswing-session/1"',
         f"name = {toml_string(name)}",
@@ -160,7 +160,28 @@ def signals_session(name: str, found: Signals, cables: int) -> str:
             'coordinates = ["chi", "x", "y"]   # what moves it',
             "order = 3          # a dot on a flat wall is a curved map of yaw",
         ]
-    lines += [
+    lines += load_lines()
+    rolls = cables == 2 and "phi" not in found.coordinates
+    names: list[str] = []
+    for path in found.files:
+        names.append(as_run_name(path.stem, names))
+        lines += [
+            "",
+            "[[runs]]",
+            f"name = {toml_string(names[-1])}",
+            'role = "identify"      # or validate: never fitted',
+            f"trajectory = {toml_string(f'runs/{path.name}')}",
+            *carried_lines(cables),
+            "# window_s = [2.0, 32.0]    # from after the hand has let go; absent: all of it",
+        ]
+        if rolls:
+            lines.append("# level_std_rad = 0.003     # a spirit level showed that it hangs level")
+    return "\n".join([*lines, ""])
+
+
+def load_lines() -> list[str]:
+    """The object that a bench measures, and what its runs are of."""
+    return [
         "",
         "[[loads]]          # the object to be measured; without one delete this table",
         'name = "object"',
@@ -171,20 +192,14 @@ def signals_session(name: str, found: Signals, cables: int) -> str:
         "# Each run is of the empty platform, of a known mass on it (payload), or of the object",
         "# (loads): uncomment what it carried.",
     ]
-    rolls = cables == 2 and "phi" not in found.coordinates
-    for path in found.files:
-        lines += [
-            "",
-            "[[runs]]",
-            f"name = {toml_string(path.stem)}",
-            'role = "identify"      # or validate: never fitted',
-            f"trajectory = {toml_string(f'runs/{path.name}')}",
-            f"cable_lengths_m = [{lengths}]   # hanging loaded, from bend to bend",
-            "cable_lengths_std_m = 0.001",
-            "# payload = { mass_kg = 0.5, position_m = [0.1, 0.0, 0.0] }",
-            '# loads = ["object"]',
-            "# window_s = [2.0, 32.0]    # from after the hand has let go; absent: all of it",
-        ]
-        if rolls:
-            lines.append("# level_std_rad = 0.003     # a spirit level showed that it hangs level")
-    return "\n".join([*lines, ""])
+
+
+def carried_lines(cables: int) -> list[str]:
+    """A bench's run: how long its wires are and what lay on the platform."""
+    lengths = ", ".join([MISSING] * cables)
+    return [
+        f"cable_lengths_m = [{lengths}]   # hanging loaded, from bend to bend",
+        "cable_lengths_std_m = 0.001",
+        "# payload = { mass_kg = 0.5, position_m = [0.1, 0.0, 0.0] }",
+        '# loads = ["object"]',
+    ]

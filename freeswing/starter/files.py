@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from freeswing.cdpr.files.toml_text import toml_string
+from freeswing.starter.bench_signals import carried_lines, load_lines
 from freeswing.starter.markers import Recorded, role
 
 
@@ -19,8 +20,14 @@ def marker_target(found: Recorded) -> str:
     return "\n".join([*lines, ""])
 
 
-def recorded_session(name: str, found: Recorded) -> str:
-    """session.toml of recordings: a run a swing, a third of them kept apart."""
+def recorded_session(name: str, found: Recorded, bench_cables: int | None = None) -> str:
+    """session.toml of recordings: a run a swing, a third of them kept apart.
+
+    Args:
+        name: of the session.
+        found: in the recordings.
+        bench_cables: how many wires a bench has, all of whose runs are fitted; else None.
+    """
     lines = [
         'format = "freeswing-session/1"',
         f"name = {toml_string(name)}",
@@ -31,18 +38,27 @@ def recorded_session(name: str, found: Recorded) -> str:
         "# [mocap]",
         '# up = "y"                 # or three points measured in both frames: docs/formats.md',
     ]
+    bench = bench_cables is not None
+    lines += load_lines() if bench else []
     for k, run in enumerate(found.runs):
+        part = "identify" if bench else role(k, len(found.runs))
         lines += [
             "",
             "[[runs]]",
             f"name = {toml_string(run.name)}",
-            f'role = "{role(k, len(found.runs))}"      # identify, or validate: never fitted',
-            f'trajectory = "runs/{run.file.name}"',
+            f'role = "{part}"      # identify, or validate: never fitted',
+            f"trajectory = {toml_string(f'runs/{run.file.name}')}",
+            *(carried_lines(bench_cables) if bench_cables is not None else ()),
         ]
-        if run.window_s is None:
+        if run.window_s is None and bench:
+            lines.append(
+                "# window_s = [2.0, 32.0]    # from after the hand has let go; absent: all of it"
+            )
+        elif run.window_s is None:
             lines.append("# window_s = [2.0, 12.0]   # the free motion; absent: it is found")
         else:
             start, end = run.window_s
             lines.append(f"window_s = [{start:.2f}, {end:.2f}]    # a free swing that was found")
-        lines.append("# cable_lengths_m = []     # as held; absent: from the poses")
+        if not bench:
+            lines.append("# cable_lengths_m = []     # as held; absent: from the poses")
     return "\n".join([*lines, ""])

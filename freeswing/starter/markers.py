@@ -21,6 +21,7 @@ from freeswing.cdpr.robot import Array
 from freeswing.cdpr.rotation import nearest_rotation
 from freeswing.ident.signals.free_motions import free_motions
 from freeswing.session.new_recordings import VALIDATE_EVERY
+from freeswing.session.session_file import as_run_name
 
 FEWEST = 3
 _ROUNDS = 5
@@ -121,10 +122,12 @@ def _runs(files: Sequence[Path], motions: Sequence[Trajectory]) -> tuple[FoundRu
     found: list[FoundRun] = []
     for file, motion in zip(files, motions, strict=True):
         windows = free_motions(motion)
-        if len(windows) < 2:
-            found.append(FoundRun(file.stem, file))
-            continue
-        found += [FoundRun(f"{file.stem}-{k:02d}", file, w) for k, w in enumerate(windows, start=1)]
+        parts = [(file.stem, None)]
+        if len(windows) > 1:
+            parts = [(f"{file.stem}-{k:02d}", w) for k, w in enumerate(windows, start=1)]
+        for stem, window in parts:
+            name = as_run_name(stem, [one.name for one in found])
+            found.append(FoundRun(name, file, window))
     return tuple(found)
 
 

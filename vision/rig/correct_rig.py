@@ -30,7 +30,7 @@ from freeswing.vision.rig.gross_faults import (
     refuse_gross,
 )
 from freeswing.vision.rig.lag_accepted import Missed, aligned, later
-from freeswing.vision.rig.lost.recounted import not_looked_for, recounted
+from freeswing.vision.rig.lost.recounted import recounted
 from freeswing.vision.rig.moved_cameras import moved_cameras, repose_by_base_tags
 from freeswing.vision.rig.real_effects import LEAST_CLOCK_S, LEAST_LINE_S, is_real
 from freeswing.vision.rig.rig_kernels import CLOCK, LINE, PER_CAMERA, POSE
@@ -92,10 +92,8 @@ def correct_rig(
             than clocks do, or the cameras do not agree after all corrections.
     """
     started, lost, counted = None, [], []
-    if look and watch.tags:
-        views, lost, counted = recounted(views)
-    elif look:
-        counted = [*not_looked_for(views, "without tags")]
+    if look:
+        views, lost, counted = recounted(views, by_tags=bool(watch.tags))
     calibrated = tuple(views)
     if look and watch.tags and len(views):
         started = aligned(

@@ -74,7 +74,7 @@ def run(options: Namespace, console: Console) -> None:
         raise InputError(f"{', '.join(there)}: already there; name a new folder")
     answers = _answers(options)
     kind = KINDS[answers.kind or USUAL_KIND]
-    cables = kind.cables if answers.cables is None else answers.cables
+    cables = _cables(answers)
     if not 1 <= cables <= 5:
         raise InputError(f"--cables {cables}: 1 to 5 strings leave a free motion to record")
     name = folder.resolve().name
@@ -102,12 +102,27 @@ def run(options: Namespace, console: Console) -> None:
         console.say(line)
 
 
+def _cables(answers: Answers) -> int:
+    """How many strings: as said, else as the kind has."""
+    kind = KINDS[answers.kind or USUAL_KIND]
+    return kind.cables if answers.cables is None else answers.cables
+
+
 def _answers(options: Namespace) -> Answers:
     """What flags say, and what a person at a terminal adds."""
     from freeswing.cdpr.files.documents import InputError
+    from freeswing.session.session_file import as_run_name
     from freeswing.starter.questions import Answers, ask, files_of
 
+    for camera in options.cameras or ():
+        if as_run_name(camera) != camera:
+            raise InputError(
+                f"--cameras {camera[:40]!r}: recordings are named so: letters, digits, . _ - only"
+            )
     recordings = files_of(options.mocap or ())
+    for file in recordings:
+        if not file.name.isprintable():
+            raise InputError(f"--mocap {file.name!r}: holds a control character: rename it")
     for word in options.mocap or ():
         if not files_of([word]):
             raise InputError(f"--mocap {word}: no such file")
@@ -230,7 +245,8 @@ def _recorded(name: str, answers: Answers, paper: str, console: Console) -> dict
     console.say(f"the reference point is seen at {span}")
     if len(found.runs) > len(found.files):
         console.say(f"{len(found.runs)} free swings in them: each is a run of its own")
-    texts = {"session.toml": files.recorded_session(name, found).encode("utf-8")}
+    bench = _cables(answers) if KINDS[answers.kind or USUAL_KIND].is_bench else None
+    texts = {"session.toml": files.recorded_session(name, found, bench).encode("utf-8")}
     if found.names:
         texts["target.toml"] = files.marker_target(found).encode("utf-8")
     return texts | {f"runs/{file.name}": file.read_bytes() for file in found.files}
@@ -247,8 +263,7 @@ def _signals(name: str, answers: Answers, paper: str, console: Console) -> dict[
     console.say(f"{len(found.files)} recordings of {found.words} at {found.rate_hz:g} Hz")
     for sentence in found.taken_for:
         console.say(sentence)
-    cables = KINDS[answers.kind or USUAL_KIND].cables if answers.cables is None else answers.cables
-    texts = {"session.toml": signals_session(name, found, cables).encode("utf-8")}
+    texts = {"session.toml": signals_session(name, found, _cables(answers)).encode("utf-8")}
     return texts | {f"runs/{file.name}": file.read_bytes() for file in found.files}
 
 

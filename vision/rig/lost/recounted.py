@@ -15,14 +15,18 @@ from freeswing.vision.rig.rig_step import Finding
 
 
 def recounted(
-    views: Sequence[CameraViews],
+    views: Sequence[CameraViews], *, by_tags: bool = True
 ) -> tuple[list[CameraViews], list[Finding], list[str]]:
     """Cameras with true stamps, what was found of each, and the same in words.
+
+    Without tags no camera has poses of its own that would tell: that is said.
 
     Raises:
         DataError: naming the camera and the place, when frames were lost and it is not sure how
             many.
     """
+    if not by_tags:
+        return list(views), [], [*not_looked_for(views, "without tags")]
     now, findings, said = [], [], []
     for view in views:
         track = own_track(view)

@@ -1,0 +1,80 @@
+"""Recordings of any name, and whole poses of a bench: what `new` writes is read again."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from pathlib import Path
+
+import pytest
+
+from freeswing.main import main
+from freeswing.session.new_recordings import take_in
+from freeswing.session.session_file import as_run_name, read_session
+from tests.places import SAMPLES
+
+POSES = sorted((SAMPLES / "trifilar" / "poses" / "runs").glob("*.csv"))
+
+
+def named(folder: Path, names: list[str]) -> list[str]:
+    folder.mkdir()
+    for name, file in zip(names, POSES, strict=False):
+        shutil.copy(file, folder / name)
+    return [str(folder / name) for name in names]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no such file names there")
+def test_recordings_of_any_name_become_runs(tmp_path: Path, capsys) -> None:
+    files = named(tmp_path / "in", ['a "b" (1).csv', "a 'b' (1).csv", "back\\slash.csv"])
+    folder = tmp_path / "lab-day"
+    assert main(["new", str(folder), "--kind", "plate", "--mocap", *files]) == 0
+    runs = read_session(folder).runs
+    assert [run.name for run in runs] == ["a -b- -1-", "a -b- -1--2", "back-slash"]
+    assert all(run.trajectory is not None and run.trajectory.is_file() for run in runs)
+    later = folder / "runs" / 'late "one".csv'
+    shutil.copy(POSES[0], later)
+    assert take_in(read_session(folder), [later]) == ["late -one-"]
+    assert read_session(folder).runs[-1].trajectory == later
+    broken = folder / "runs" / "two\nlines.csv"
+    shutil.copy(POSES[0], broken)
+    assert take_in(read_session(folder), [broken]) == []
+    assert main(["new", str(tmp_path / "b"), "--mocap", str(broken)]) == 2
+    assert r"'two\nlines.csv': holds a control character: rename it" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("text", "taken", "name"),
+    [
+        ("swing-01", (), "swing-01"),
+        ("swing-01", ("Swing-01", "swing-01-2"), "swing-01-3"),
+        (" .hidden. ", (), "hidden"),
+        ("con", (), "run-con"),
+        ("...", (), "run"),
+        ("a/b\n\u2028c", (), "a-b--c"),
+        ("x" * 200, ("x" * 100,), "x" * 98 + "-2"),
+    ],
+)
+def test_a_name_that_a_run_may_have(text: str, taken: tuple[str, ...], name: str) -> None:
+    assert as_run_name(text, taken) == name
+
+
+def test_a_camera_names_its_files(tmp_path: Path, capsys) -> None:
+    assert main(["new", str(tmp_path / "a"), "--cameras", 'le"ft', "right"]) == 2
+    assert "--cameras 'le\"ft': recordings are named so" in capsys.readouterr().err
+
+
+def test_whole_poses_of_a_bench_have_loads_payloads_and_lengths(tmp_path: Path) -> None:
+    """As those of its parts have: all of a bench's runs are fitted."""
+    folder = tmp_path / "bench"
+    flags = ["--kind", "trifilar", "--mocap", *map(str, POSES)]
+    assert main(["new", str(folder), *flags]) == 0
+    text = (folder / "session.toml").read_text(encoding="utf-8")
+    assert text.count("cable_lengths_m = [nan, nan, nan]") == len(POSES)
+    assert text.count("# payload = ") == text.count('# loads = ["object"]') == len(POSES)
+    filled = text.replace("[nan, nan, nan]", "[1.2, 1.2, 1.2]").replace("= nan ", "= 0.8 ")
+    filled = filled.replace('# loads = ["object"]', 'loads = ["object"]', 2)
+    (folder / "session.toml").write_text(filled, encoding="utf-8")
+    session = read_session(folder)
+    assert {run.role for run in session.runs} == {"identify"}
+    assert [load.mass_kg for load in session.loads] == [0.8]
+    assert [len(run.loads) for run in session.runs] == [1, 1, 0, 0, 0, 0]
