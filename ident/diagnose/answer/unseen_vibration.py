@@ -8,10 +8,11 @@ from freeswing.cdpr.effects import effect_named
 from freeswing.cdpr.robot import Array
 from freeswing.ident.diagnose.refit import Refit, colour_of
 from freeswing.ident.diagnose.sets.ways import Exchange, Way
-from freeswing.ident.diagnose.springs.full_motion import vibrating
+from freeswing.ident.diagnose.springs.full_motion import MORE_LIKELY, vibrating
 
-# Both motions have one stretch and one damping. Where these differ by more of their deviations the
-# full motion rings with a line of the noise: that was thirteen off, those that are right below two.
+# Both motions have one stretch and one damping. Where these differ by more of their deviations, and
+# runs do not speak for it, the full motion rings with a line of the noise: that was thirteen off,
+# those that are right below two.
 SAME_STRETCH = 3.0
 
 
@@ -33,8 +34,8 @@ def unseen_vibration(last: Refit, noise_scales: Array) -> Exchange | None:
         fuller = effect_named(name).fully
         if fuller and fuller not in last.effects:
             colour = colour_of(last.fit, noise_scales)
-            full = vibrating(last, name, noise_scales, colour).fit
-            if full is not None and _is_same(last, full, name):
+            full, chance, _ = vibrating(last, name, noise_scales, colour)
+            if full is not None and (chance > MORE_LIKELY or _is_same(last, full, name)):
                 return Exchange((name,), 0.0, (last,), (Way((fuller,), 1.0, full),))
     return None
 

@@ -11,7 +11,7 @@ from freeswing.cdpr.effects import effect_named
 from freeswing.cdpr.model.elastic_motion import lengths_of
 from freeswing.cdpr.model.known_values import with_effects
 from freeswing.cdpr.robot import Array
-from freeswing.ident.diagnose.decision import included, lacks_little
+from freeswing.ident.diagnose.decision import included
 from freeswing.ident.diagnose.refit import Refit, ranked, rescored
 from freeswing.ident.diagnose.variants import effect_of
 from freeswing.ident.likelihood.blocks import STARTS, eased, effect_blocks, with_effect_values
@@ -52,8 +52,6 @@ def fully(slow: Refit, key: str, noise_scales: Array, colour: float) -> Refit:
     """
     if not effect_named(effect_of(key)).fully:
         return slow
-    if lacks_little(slow):
-        return replace(slow, slowly="stretch that follows its tension leaves nothing but noise")
     found = vibrating(slow, key, noise_scales, colour)
     if found.fit is not None and found.probability > MORE_LIKELY:
         return found.fit

@@ -40,6 +40,14 @@ def test_the_same_stretch_with_its_vibration_counts_as_sure(monkeypatch, away, c
         assert "cable_elasticity is told by its slow part" in vibration_note(one)
 
 
+@pytest.mark.parametrize(("chance", "counts"), [(0.49, False), (0.51, True)])
+def test_another_stretch_counts_where_runs_speak_for_it(monkeypatch, chance, counts) -> None:
+    slow, full = found(0.0, 1.0, STRETCH), found(50.0, 1.0, STRETCH, VIBRATION)
+    monkeypatch.setattr(room, "vibrating", lambda *_: Vibrating(full, chance, "not seen"))
+    monkeypatch.setattr(room, "colour_of", lambda *_: 1.0)
+    assert (unseen_vibration(slow, np.ones(2)) is not None) == counts
+
+
 def test_what_cannot_be_followed_or_is_in_the_model_does_not(monkeypatch) -> None:
     monkeypatch.setattr(room, "vibrating", lambda *_: Vibrating(None, 0.0, "no motion"))
     monkeypatch.setattr(room, "colour_of", lambda *_: 1.0)
