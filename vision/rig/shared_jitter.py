@@ -26,6 +26,7 @@ from freeswing.vision.look.watched_target import Watch
 from freeswing.vision.rig.stamp_jitter import LEAST_JITTER_S
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 FASTEST = 0.4
 """Of the pose rate. Above it swings near a singularity at 30 Hz leave 0.03 to 0.08 ms (one 0.3),
@@ -51,6 +52,22 @@ class _Spread(NamedTuple):
     numbers: float
 
 
+class _Along(NamedTuple):
+    """How late poses are by what they miss.
+
+    Attributes:
+        moving: poses that are known and move, (n,).
+        sought: coordinates that are, (6,).
+        rows: of those poses, times their misses seconds, (m, k).
+        claimed_s2: variance of these seconds, (m,).
+    """
+
+    moving: Mask
+    sought: Mask
+    rows: Array
+    claimed_s2: Array
+
+
 class SharedJitter(NamedTuple):
     """How late frames come by chance, all cameras' alike.
 
@@ -72,35 +89,61 @@ def along_the_motion(poses: Poses) -> SharedJitter:
     moving = poses.known & (np.abs(poses.motions[:, :6]).sum(axis=1) > 0.0)
     if course is None or not len(poses.covariances) or moving.sum() < _LEAST_POSES:
         return SharedJitter(0.0)
-    least = _spread(poses, course, moving, FASTEST, _HIGHEST)
+    ways = [_along(poses, course, moving, apart=apart) for apart in (False, True)]
+    parts = [(FASTEST, _HIGHEST)]
     if course.spectrum.too_fast_hz is not None:  # perhaps an oscillation, perhaps jitter itself
-        below = _spread(poses, course, moving, FAST, FASTEST)
-        least = min(least, below, key=lambda one: one.variance_s2)
-    whole = _spread(poses, course, moving, FAST, _HIGHEST)
+        parts.append((FAST, FASTEST))
+    told = [(_spread(course, way, *part), way) for part in parts for way in ways]
+    least, way = min(told, key=lambda one: one[0].variance_s2)
+    whole = _spread(course, way, FAST, _HIGHEST)
     by_chance = _SURE_SIGMAS * math.sqrt(2.0 / least.numbers + 2.0 / whole.numbers)
     at_most = whole.variance_s2 > least.variance_s2 * (1.0 + by_chance)
     found = least if at_most else whole
     if found.variance_s2 < found.claimed_s2 * (1.0 + _SURE_SIGMAS * math.sqrt(2.0 / found.numbers)):
         return SharedJitter(0.0)
     jitter = math.sqrt(found.variance_s2 - found.claimed_s2)
-    return SharedJitter(jitter, at_most) if jitter > LEAST_JITTER_S else SharedJitter(0.0)
+    if jitter < LEAST_JITTER_S:
+        return SharedJitter(0.0)
+    return SharedJitter(jitter * math.sqrt(_expected(found.numbers)), at_most)
 
 
-def _spread(
-    poses: Poses, course: Course, moving: NDArray[np.bool_], low: float, high: float
-) -> _Spread:
+def _expected(numbers: float) -> float:
+    """What a normal number's square is expected to be, by the mean square of so many others.
+
+    Source:
+        Gelman et al. 2013, Bayesian Data Analysis, sec. 3.2: a variance that is not known makes a
+        normal number one of Student's, here of no fewer than four degrees of freedom.
+    """
+    numbers = max(numbers, 4.0)
+    return numbers / (numbers - 2.0)
+
+
+def _along(poses: Poses, course: Course, moving: Mask, *, apart: bool) -> _Along:
+    """How poses' misses are weighed along their motion: sharpest, or each coordinate `apart`.
+
+    What is told sharply across a motion makes much of the little that a fast one leaves there.
+    """
+    sought = course.deviations > 0.0
+    motion = poses.motions[moving, :6][:, sought]
+    covariances = poses.covariances[moving][:, sought][:, :, sought]
+    taken = covariances * np.eye(sought.sum()) if apart else covariances
+    rows = np.linalg.solve(taken, motion[:, :, None])[:, :, 0]
+    rows /= np.einsum("ni,ni->n", rows, motion)[:, None]
+    claimed = np.einsum("ni,nij,nj->n", rows, covariances, rows)
+    return _Along(moving, sought, rows, claimed)
+
+
+def _spread(course: Course, way: _Along, low: float, high: float) -> _Spread:
     """How poses scatter along their motion between two shares of the pose rate."""
     missed = course.missed(low, high)
-    sought = course.deviations > 0.0
-    motion, misses = poses.motions[moving, :6][:, sought], missed.misses[moving][:, sought]
-    weight = np.linalg.inv(poses.covariances[moving][:, sought][:, :, sought])
-    pulled = np.einsum("nij,nj->ni", weight, motion)
-    claimed = 1.0 / np.einsum("ni,ni->n", pulled, motion)
-    shown = missed.variances[moving]
-    late = claimed * np.einsum("ni,ni->n", pulled, misses) / np.sqrt(shown)
-    sharp = claimed <= np.median(claimed)
+    shown = missed.variances[way.moving]
+    late = np.einsum("ni,ni->n", way.rows, missed.misses[way.moving][:, way.sought])
+    late /= np.sqrt(shown)
+    sharp = way.claimed_s2 <= np.median(way.claimed_s2)
     return _Spread(
-        robust_variance(late[sharp]), float(np.median(claimed[sharp])), float(shown[sharp].sum())
+        robust_variance(late[sharp]),
+        float(np.median(way.claimed_s2[sharp])),
+        float(shown[sharp].sum()),
     )
 
 
