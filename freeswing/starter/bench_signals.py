@@ -23,6 +23,17 @@ TIME = "t_s"
 SPOKEN = {"roll": "phi", "pitch": "theta", "yaw": "chi"}
 DEGREES = frozenset({"deg", "degree", "degrees"})
 UNITS = frozenset({"m", "mm", "cm", "rad", "mrad", *DEGREES})
+_LOAD_ENDS = (
+    "mass_std_kg = 0.001",
+    "# com_m = [0.0, 0.0, 0.0]   # where its centre of mass should be, with com_std_m = 0.01",
+    "",
+    "# Each run is of the empty platform, of a known mass on it (payload), or of the object",
+    "# (loads): uncomment what it carried.",
+)
+_CARRIED = (
+    "# payload = { mass_kg = 0.5, position_m = [0.1, 0.0, 0.0] }",
+    '# loads = ["object"]',
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,11 +197,7 @@ def load_lines() -> list[str]:
         "[[loads]]          # the object to be measured; without one delete this table",
         'name = "object"',
         f"mass_kg = {MISSING}      # weigh it",
-        "mass_std_kg = 0.001",
-        "# com_m = [0.0, 0.0, 0.0]   # where its centre of mass should be, with com_std_m = 0.01",
-        "",
-        "# Each run is of the empty platform, of a known mass on it (payload), or of the object",
-        "# (loads): uncomment what it carried.",
+        *_LOAD_ENDS,
     ]
 
 
@@ -200,6 +207,25 @@ def carried_lines(cables: int) -> list[str]:
     return [
         f"cable_lengths_m = [{lengths}]   # hanging loaded, from bend to bend",
         "cable_lengths_std_m = 0.001",
-        "# payload = { mass_kg = 0.5, position_m = [0.1, 0.0, 0.0] }",
-        '# loads = ["object"]',
+        *_CARRIED,
     ]
+
+
+def bench_of_poses(cables: int) -> tuple[list[str], list[str]]:
+    """The same of whole poses, of the session and of a run: as comments, for a swing needs none."""
+    lengths = ", ".join(["1.2"] * cables)
+    load = [
+        "",
+        "# An object that lay on the platform in some runs, which is to be measured:",
+        "# [[loads]]",
+        '# name = "object"',
+        "# mass_kg = 0.8      # weigh it",
+        *(line if line.startswith("#") or not line else f"# {line}" for line in _LOAD_ENDS),
+    ]
+    run = [
+        f"# cable_lengths_m = [{lengths}]   # hanging loaded, from bend to bend; absent: from the "
+        "poses",
+        "# cable_lengths_std_m = 0.001",
+        *_CARRIED,
+    ]
+    return load, run

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from freeswing.cdpr.files.toml_text import toml_string
-from freeswing.starter.bench_signals import carried_lines, load_lines
+from freeswing.starter.bench_signals import bench_of_poses
 from freeswing.starter.markers import Recorded, role
 
 
@@ -26,7 +26,7 @@ def recorded_session(name: str, found: Recorded, bench_cables: int | None = None
     Args:
         name: of the session.
         found: in the recordings.
-        bench_cables: how many wires a bench has, all of whose runs are fitted; else None.
+        bench_cables: how many wires a bench has, on which something may lie; else None.
     """
     lines = [
         'format = "freeswing-session/1"',
@@ -38,27 +38,22 @@ def recorded_session(name: str, found: Recorded, bench_cables: int | None = None
         "# [mocap]",
         '# up = "y"                 # or three points measured in both frames: docs/formats.md',
     ]
-    bench = bench_cables is not None
-    lines += load_lines() if bench else []
+    load, carried = ([], []) if bench_cables is None else bench_of_poses(bench_cables)
+    lines += load
     for k, run in enumerate(found.runs):
-        part = "identify" if bench else role(k, len(found.runs))
         lines += [
             "",
             "[[runs]]",
             f"name = {toml_string(run.name)}",
-            f'role = "{part}"      # identify, or validate: never fitted',
+            f'role = "{role(k, len(found.runs))}"      # identify, or validate: never fitted',
             f"trajectory = {toml_string(f'runs/{run.file.name}')}",
-            *(carried_lines(bench_cables) if bench_cables is not None else ()),
         ]
-        if run.window_s is None and bench:
-            lines.append(
-                "# window_s = [2.0, 32.0]    # from after the hand has let go; absent: all of it"
-            )
+        if run.window_s is None and carried:  # of parallel wires, or loaded, all of it is fitted
+            lines.append("# window_s = [2.0, 32.0]   # from after the hand has let go")
         elif run.window_s is None:
             lines.append("# window_s = [2.0, 12.0]   # the free motion; absent: it is found")
         else:
             start, end = run.window_s
             lines.append(f"window_s = [{start:.2f}, {end:.2f}]    # a free swing that was found")
-        if not bench:
-            lines.append("# cable_lengths_m = []     # as held; absent: from the poses")
+        lines += carried or ["# cable_lengths_m = []     # as held; absent: from the poses"]
     return "\n".join([*lines, ""])

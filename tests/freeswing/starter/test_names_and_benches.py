@@ -63,18 +63,23 @@ def test_a_camera_names_its_files(tmp_path: Path, capsys) -> None:
     assert "--cameras 'le\"ft': recordings are named so" in capsys.readouterr().err
 
 
-def test_whole_poses_of_a_bench_have_loads_payloads_and_lengths(tmp_path: Path) -> None:
-    """As those of its parts have: all of a bench's runs are fitted."""
+def test_whole_poses_of_a_bench_show_loads_payloads_and_lengths(tmp_path: Path) -> None:
+    """As comments: the platform's own swings need none of them."""
     folder = tmp_path / "bench"
     flags = ["--kind", "trifilar", "--mocap", *map(str, POSES)]
     assert main(["new", str(folder), *flags]) == 0
+    assert len(read_session(folder).runs) == len(POSES)
     text = (folder / "session.toml").read_text(encoding="utf-8")
-    assert text.count("cable_lengths_m = [nan, nan, nan]") == len(POSES)
-    assert text.count("# payload = ") == text.count('# loads = ["object"]') == len(POSES)
-    filled = text.replace("[nan, nan, nan]", "[1.2, 1.2, 1.2]").replace("= nan ", "= 0.8 ")
-    filled = filled.replace('# loads = ["object"]', 'loads = ["object"]', 2)
-    (folder / "session.toml").write_text(filled, encoding="utf-8")
+    head, *runs = text.split("[[runs]]")
+    opened = ("[[loads]]", 'name = "', "mass_kg", "mass_std_kg", "com_m", "payload", "loads")
+    for key in (*opened, "cable_lengths_m", "cable_lengths_std_m"):
+        head = head.replace(f"\n# {key}", f"\n{key}")
+        runs[0] = runs[0].replace(f"\n# {key}", f"\n{key}")
+    (folder / "session.toml").write_text("[[runs]]".join([head, *runs]), encoding="utf-8")
     session = read_session(folder)
-    assert {run.role for run in session.runs} == {"identify"}
     assert [load.mass_kg for load in session.loads] == [0.8]
-    assert [len(run.loads) for run in session.runs] == [1, 1, 0, 0, 0, 0]
+    first, *others = session.runs
+    assert len(first.loads) == len(first.payloads) == 1
+    assert first.cable_lengths_m is not None
+    assert first.cable_lengths_m.tolist() == [1.2, 1.2, 1.2]
+    assert not any(run.loads or run.payloads for run in others)
