@@ -118,7 +118,8 @@ def test_twenty_poses_tell_of_the_rig(monkeypatch, known, looked) -> None:
     monkeypatch.setattr(correct_rig, "fuse", lambda *_, **__: (poses, stub()))
     monkeypatch.setattr(correct_rig, "moved_cameras", reached)
     with pytest.raises(Reached) if looked else nullcontext():
-        found = correct_rig.correct_rig([stub(camera=VIEW)], stub(tags=(), markers=()), 3e-4)
+        view = stub(camera=VIEW, stamps_s=np.arange(10.0))
+        found = correct_rig.correct_rig([view], stub(tags=(), markers=()), 3e-4)
         assert found.findings == ()
 
 
