@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from freeswing.cdpr.effects import effect_named
 from freeswing.cdpr.model.equations import Model
 from freeswing.cdpr.robot import POSE_COORDINATES, Array, frozen_array
 from freeswing.cdpr.rotation import pose_differences
@@ -144,17 +145,31 @@ def _fitted_to(
     free: tuple[str, ...] | None,
     before: LikelihoodFit | None = None,
 ) -> LikelihoodFit:
-    """A run's own unknowns under a model, from where they were under another or from a guess."""
-    model = stage.model
-    if before is not None:
-        swings = Swings(model, (_thinned(sampled(run, free)),), np.ones(2))
-        unknowns = _carried(_held(stage, swings, before.value(STARTS)), model, before)
-        found = _near(swings, unknowns, _AS_GOOD * _error(before))
-        if found is not None:
-            return _weighed(found)
-    samples, first = started(model, run, free, stage.inertia)
-    swings = Swings(model, (_thinned(samples),), np.ones(2))
-    return _weighed(_followed(swings, _held(stage, swings, first[None])))
+    """A run's own unknowns under a model, from where they were under another or from a guess.
+
+    Of a platform on springs from both: where a rigid one was off by millimetres it stayed.
+    """
+    near = None if before is None else _carried_on(stage, run, free, before)
+    if near is not None and not any(effect_named(name).springs for name in stage.model.effects):
+        return _weighed(near)
+    try:
+        samples, first = started(stage.model, run, free, stage.inertia)
+        swings = Swings(stage.model, (_thinned(samples),), np.ones(2))
+        guessed = _followed(swings, _held(stage, swings, first[None]))
+    except (ValueError, np.linalg.LinAlgError):
+        if near is None:
+            raise
+        return _weighed(near)
+    return _weighed(min(filter(None, (near, guessed)), key=lambda one: one.deviance))
+
+
+def _carried_on(
+    stage: Stage, run: PreparedRun, free: tuple[str, ...] | None, before: LikelihoodFit
+) -> LikelihoodFit | None:
+    """The fit from where another model ended; None where that turns out not to be near."""
+    swings = Swings(stage.model, (_thinned(sampled(run, free)),), np.ones(2))
+    unknowns = _carried(_held(stage, swings, before.value(STARTS)), stage.model, before)
+    return _near(swings, unknowns, _AS_GOOD * _error(before))
 
 
 def _held(stage: Stage, swings: Swings, starts: Array) -> Unknowns:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 import freeswing.ident.judge.prediction
 from freeswing.cdpr.measured.trajectory import Trajectory
+from freeswing.cdpr.model.elastic_motion import SPRUNG
 from freeswing.cdpr.model.equations import build_model
 from freeswing.cdpr.model.statics import modes
 from freeswing.cdpr.robot import POSE_COORDINATES
@@ -93,3 +96,34 @@ def test_a_run_s_frame_stays_within_what_markers_can_be_off() -> None:
     right = predict(model, run, None, LIGHT)
     assert right.rmse_m == pytest.approx(NOISE_M, rel=0.1)
     assert np.abs(right.values / tolerances).max() < 1.0, right.values
+
+
+@pytest.mark.parametrize(
+    ("effects", "guess", "taken"),
+    [
+        ((), 1.0, 500.0),
+        (SPRUNG, 1.0, 1.0),
+        (SPRUNG, 900.0, 500.0),
+        (SPRUNG, None, 500.0),
+    ],
+)
+def test_a_platform_on_springs_is_begun_from_a_guess_too(
+    monkeypatch, effects, guess, taken
+) -> None:
+    """Where a rigid one was 2.3 mm off the vibrating one stayed, at 23 times the noise."""
+    place = freeswing.ident.judge.prediction
+
+    def followed(*_: object) -> SimpleNamespace:
+        if guess is None:
+            raise ValueError("no start")
+        return SimpleNamespace(deviance=guess)
+
+    monkeypatch.setattr(place, "_carried_on", lambda *_: SimpleNamespace(deviance=500.0))
+    monkeypatch.setattr(place, "_followed", followed)
+    monkeypatch.setattr(place, "_held", lambda *_: None)
+    monkeypatch.setattr(place, "_thinned", lambda samples: samples)
+    monkeypatch.setattr(place, "started", lambda *_: (SimpleNamespace(), np.zeros(12)))
+    monkeypatch.setattr(place, "_weighed", lambda found: found)
+    stage: Any = SimpleNamespace(model=SimpleNamespace(effects=effects), inertia=LIGHT)
+    nothing: Any = SimpleNamespace()
+    assert place._fitted_to(stage, nothing, None, nothing).deviance == taken
