@@ -55,12 +55,12 @@ def take_in(session: Session, new: Iterable[Path]) -> list[str]:
     roles = [run.role for run in session.runs]
     text, names = session.path.read_text(encoding="utf-8"), []
     for path in sorted(set(new) - named):
-        name = as_run_name(path.stem)
-        if name.casefold() in taken or not path.name.isprintable():
+        if path.stem.casefold() in taken or not path.name.isprintable():
             continue
         if path.is_dir() and len(_films(path)) < films:
             continue
-        longer = text.rstrip("\n") + "\n" + _table(session, path, next_role(roles))
+        name = as_run_name(path.stem, taken)
+        longer = text.rstrip("\n") + "\n" + _table(session, path, name, next_role(roles))
         if not _reads(longer):
             continue
         text = longer
@@ -78,11 +78,12 @@ def next_role(roles: list[str]) -> str:
     return validate if VALIDATE_EVERY * (roles.count(validate) + 1) <= len(roles) + 1 else identify
 
 
-def _table(session: Session, path: Path, role: str) -> str:
+def _table(session: Session, path: Path, name: str, role: str) -> str:
     key = "video" if path.is_dir() else "trajectory"
     place = path.relative_to(session.folder).as_posix()
-    name = toml_string(as_run_name(path.stem))
-    return f'\n[[runs]]\nname = {name}\nrole = "{role}"\n{key} = {toml_string(place)}\n'
+    return (
+        f'\n[[runs]]\nname = {toml_string(name)}\nrole = "{role}"\n{key} = {toml_string(place)}\n'
+    )
 
 
 def _reads(text: str) -> bool:

@@ -35,6 +35,10 @@ def test_recordings_of_any_name_become_runs(tmp_path: Path, capsys) -> None:
     shutil.copy(POSES[0], later)
     assert take_in(read_session(folder), [later]) == ["late -one-"]
     assert read_session(folder).runs[-1].trajectory == later
+    alike = [folder / "runs" / name for name in ("b [1].csv", "b (1).csv")]
+    for file in alike:
+        shutil.copy(POSES[0], file)
+    assert take_in(read_session(folder), alike) == ["b -1-", "b -1--2"], "one was left alone"
     broken = folder / "runs" / "two\nlines.csv"
     shutil.copy(POSES[0], broken)
     assert take_in(read_session(folder), [broken]) == []
