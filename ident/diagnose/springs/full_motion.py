@@ -66,7 +66,7 @@ def vibrating(slow: Refit, key: str, noise_scales: Array, colour: float) -> Vibr
         return Vibrating(None, 0.0, "cables that do not stretch do not vibrate")
     try:
         full = _plucked(found, name, noise_scales, colour)
-    except NotFollowedError as error:
+    except (NotFollowedError, np.linalg.LinAlgError) as error:
         return Vibrating(None, 0.0, f"no motion with vibration follows the runs: {error}")
     # A line of the noise is as good as a vibration that rings for ever, and settles values by it.
     chance = included(slow, full, key, noise_scales)
@@ -78,6 +78,7 @@ def _plucked(found: LikelihoodFit, name: str, noise_scales: Array, colour: float
 
     Raises:
         NotFollowedError: when that cannot be simulated.
+        LinAlgError: when a motion has no derivatives, at a singular pose.
     """
     model = with_effects(found.model, (name,))
     place, start = model.place_of(name), model.start_values

@@ -166,14 +166,18 @@ def test_vibration_must_be_likelier_than_none(monkeypatch, chance, taken) -> Non
     assert ("do not show a vibration (probability 0.49)" in found.slowly) == (not taken)
 
 
-def test_a_motion_that_cannot_be_followed_is_said(monkeypatch) -> None:
+@pytest.mark.parametrize(
+    "error",
+    [NotFollowedError("run 2: no motion from there"), np.linalg.LinAlgError("Singular matrix")],
+)
+def test_a_motion_that_cannot_be_followed_is_said(monkeypatch, error) -> None:
     def stuck(*_: Any) -> Any:
-        raise NotFollowedError("run 2: no motion from there")
+        raise error
 
     monkeypatch.setattr(module, "ranked", stuck)
     found = fully(slow(0.0), SPRUNG[0], SCALES, 1.0)
     assert found.fit is slow(0.0).fit
-    assert found.slowly == "no motion with vibration follows the runs: run 2: no motion from there"
+    assert found.slowly == f"no motion with vibration follows the runs: {error}"
 
 
 def test_other_errors_of_that_fit_are_not_taken_for_it(monkeypatch) -> None:
