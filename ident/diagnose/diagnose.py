@@ -39,7 +39,7 @@ from freeswing.ident.diagnose.answer.settled_geometry import cut, settled_places
 from freeswing.ident.diagnose.answer.still_missing import still_missing
 from freeswing.ident.diagnose.answer.taken_back import taken_back
 from freeswing.ident.diagnose.answer.unmet_validation import with_unmet
-from freeswing.ident.diagnose.answer.unseen_vibration import unseen_vibration, vibration_note
+from freeswing.ident.diagnose.answer.unseen_vibration import unseen_vibration
 from freeswing.ident.diagnose.decision import (
     LARGEST_EXCESS_LEFT,
     LEAST_SHARE_EXPLAINED,
@@ -284,8 +284,8 @@ def _told(
         spread = with_ways(spread, final, exchange)
         notes += filter(None, [sentence(exchange)])
     if vibration := unseen_vibration(last, scales):
-        spread = with_ways(spread, final, vibration)
-        notes.append(vibration_note(vibration))
+        spread = with_ways(spread, final, vibration.exchange)
+        notes.append(vibration.note)
     spread = with_settled(spread, last) if held else spread
     left = still_missing(final, not all_settled(accepted), search.kinematics is not None)
     notes += filter(None, [left.note(spread)])

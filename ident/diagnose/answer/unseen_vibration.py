@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from freeswing.cdpr.effects import effect_named
@@ -16,7 +18,34 @@ from freeswing.ident.diagnose.springs.full_motion import MORE_LIKELY, vibrating
 SAME_STRETCH = 3.0
 
 
-def unseen_vibration(last: Refit, noise_scales: Array) -> Exchange | None:
+class UnseenVibration(NamedTuple):
+    """A vibration beside stretch that is told by its slow part.
+
+    Attributes:
+        exchange: what it makes of the values, as if it were sure.
+        probability: that the runs show it.
+    """
+
+    exchange: Exchange
+    probability: float
+
+    @property
+    def note(self) -> str:
+        """What deviations hold of it."""
+        (name,) = self.exchange.leader
+        if self.probability > MORE_LIKELY:
+            return (
+                f"{name} is told by its slow part, as it was when it was found; beside all that is "
+                f"told a vibration of the cables is likelier than none ({self.probability:.2g}): "
+                "deviations hold what that would make of the values"
+            )
+        return (
+            f"{name} is told by its slow part, since these runs do not show that cables vibrate "
+            "beside it; deviations hold what that would make of the values"
+        )
+
+
+def unseen_vibration(last: Refit, noise_scales: Array) -> UnseenVibration | None:
     """What the vibration of stretching cables makes of a fit with their slow part alone.
 
     Cables that stretch vibrate whether runs show it or not, and the slow part is a little off for
@@ -36,16 +65,9 @@ def unseen_vibration(last: Refit, noise_scales: Array) -> Exchange | None:
             colour = colour_of(last.fit, noise_scales)
             full, chance, _ = vibrating(last, name, noise_scales, colour)
             if full is not None and (chance > MORE_LIKELY or _is_same(last, full, name)):
-                return Exchange((name,), 0.0, (last,), (Way((fuller,), 1.0, full),))
+                told = Exchange((name,), 0.0, (last,), (Way((fuller,), 1.0, full),))
+                return UnseenVibration(told, chance)
     return None
-
-
-def vibration_note(told: Exchange) -> str:
-    """What deviations hold of it."""
-    return (
-        f"{told.leader[0]} is told by its slow part, since these runs do not show that cables "
-        "vibrate beside it; deviations hold what that would make of the values"
-    )
 
 
 def _is_same(slow: Refit, full: Refit, name: str) -> bool:
