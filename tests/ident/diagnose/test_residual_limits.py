@@ -20,7 +20,16 @@ from freeswing.ident.diagnose.sets import fits_as_rivals
     ("position_um", "angle_urad", "small"), [(19, 95, True), (21, 95, False), (19, 105, False)]
 )
 def test_residuals_that_no_calibration_can_be_trusted_to(position_um, angle_urad, small) -> None:
-    fit = SimpleNamespace(noise=1e-6 * np.array([position_um, angle_urad]))
+    runs = [SimpleNamespace(slow=None)] * 2
+    fit = SimpleNamespace(noise=1e-6 * np.array([position_um, angle_urad]), samples=runs)
+    assert spectrum.too_small(fit) == small
+
+
+@pytest.mark.parametrize(("stating", "small"), [(2, False), (1, True)])
+def test_poses_that_state_how_far_they_err_together_are_trusted_to_that(stating, small) -> None:
+    """A day in the laboratory: a tilt of 3.5 mrad leaves 0.014 mm and 0.08 mrad (0.012, 0.07)."""
+    runs = [SimpleNamespace(slow=object() if k < stating else None) for k in range(2)]
+    fit = SimpleNamespace(noise=np.array([1.4e-5, 8e-5]), samples=runs)
     assert spectrum.too_small(fit) == small
 
 
