@@ -35,6 +35,7 @@ from freeswing.ident.diagnose.answer.not_the_cause import (
     without_forces,
 )
 from freeswing.ident.diagnose.answer.open_exchanges import open_exchanges
+from freeswing.ident.diagnose.answer.parted_places import parted
 from freeswing.ident.diagnose.answer.settled_geometry import cut, settled_places, with_settled
 from freeswing.ident.diagnose.answer.still_missing import still_missing
 from freeswing.ident.diagnose.answer.taken_back import taken_back
@@ -280,6 +281,11 @@ def _told(
     is_missing = won or _follows_badly(last, rest)
     check = check or gravity_unasked(accepted, last, is_missing, scales)
     rest = with_unmet(suspected(rest, check) if check else rest, rungs[-1].held_out)
+    if not held and not _follows_badly(last, rest):
+        told_apart = parted(accepted, last, final, spread, scales)
+        instead = dict(zip(map(id, accepted), told_apart, strict=True))
+        search.rounds = [instead.get(id(one), one) for one in search.rounds]
+        accepted = told_apart
     for exchange in open_exchanges(search.rounds, accepted, scales):
         spread = with_ways(spread, final, exchange)
         notes += filter(None, [sentence(exchange)])

@@ -54,7 +54,7 @@ from freeswing.ident.diagnose.screen import Group, Screen, screens
 from freeswing.ident.diagnose.sets.exchange import decisions, exchange
 from freeswing.ident.diagnose.sets.ways import Places
 from freeswing.ident.diagnose.spectrum import Residual, too_small
-from freeswing.ident.diagnose.springs.full_motion import fully
+from freeswing.ident.diagnose.springs.full_motion import fully, fully_by_now
 from freeswing.ident.diagnose.variants import effect_of, inside, variants
 from freeswing.ident.likelihood.fit_swings import LikelihoodFit
 
@@ -229,7 +229,8 @@ class Search:
             return Round(current, decision, stand_in=stand_in)
         share = 1.0 / MOST_ROUNDS
         # Ranking stopped early: the winner goes on to convergence.
-        found, removed = self._freed(polished(decision.winner.fit, self.noise_scales)), []
+        found, removed = polished(decision.winner.fit, self.noise_scales), []
+        found = self._freed(fully_by_now(found, self.noise_scales) if index else found)
         while name := superfluous(found, decision.group):
             self._tell(f"round {index + 1}: without {name}", (index + 0.9) * share)
             fewer = without(found.fit, name, self.noise_scales)

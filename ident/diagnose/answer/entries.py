@@ -58,9 +58,8 @@ def accepted_entries(
     """
     settled = settled_places(final.model)
     entries, unknowns = [], final.unknowns
-    beside = {n for key, group in groups.items() for n in group if n != key} - set(groups)
     for name in claims(final.model.effects):
-        if name in beside:  # in the model because nobody can tell it from the one named
+        if name not in groups:  # in the model because lengths cannot tell it from the one named
             continue
         block, columns = unknowns.block(name), unknowns.columns(name)
         together = covariance[np.ix_(columns, columns)]

@@ -12,7 +12,7 @@ from freeswing.cdpr.model.elastic_motion import lengths_of
 from freeswing.cdpr.model.known_values import with_effects
 from freeswing.cdpr.robot import Array
 from freeswing.ident.diagnose.decision import included
-from freeswing.ident.diagnose.refit import Refit, ranked, rescored
+from freeswing.ident.diagnose.refit import Refit, colour_of, polished, ranked, rescored
 from freeswing.ident.diagnose.variants import effect_of
 from freeswing.ident.likelihood.blocks import STARTS, eased, effect_blocks, with_effect_values
 from freeswing.ident.likelihood.fit_swings import LikelihoodFit, Swings
@@ -99,3 +99,22 @@ def _plucked(found: LikelihoodFit, name: str, noise_scales: Array, colour: float
         values[place.start] = size
         unknowns = with_effect_values(moving.unknowns, model, values)
         moving = ranked(moving.swings, unknowns, moving.cost)
+
+
+def fully_by_now(found: Refit, noise_scales: Array) -> Refit:
+    """A fit again with the full motion of what an earlier round took the slow part of alone.
+
+    Beside all that was missing then a vibration was not likelier; what is missing no more does not
+    hide it.
+
+    Args:
+        found: the fit, converged.
+        noise_scales: of metres and radians, (2,).
+    """
+    for name in found.effects:
+        full = effect_named(name).fully
+        if full and full not in found.effects:
+            moving = fully(found, name, noise_scales, colour_of(found.fit, noise_scales))
+            is_likelier = full in moving.effects
+            found = polished(moving.fit, noise_scales) if is_likelier else found
+    return found

@@ -202,7 +202,8 @@ def test_what_cannot_be_followed_is_told_by_its_run() -> None:
 def test_the_result_says_whether_stretch_was_fitted_with_its_vibration() -> None:
     for found, said in ((full(0.0), "with vibration"), (slow(0.0), "quasi-static: at the noise")):
         told = np.eye(len(found.fit.covariance))
-        (entry,) = accepted_entries(found.fit, told, {}, {SPRUNG[0]: "at the noise"})
+        groups = {SPRUNG[0]: (SPRUNG[0],)}
+        (entry,) = accepted_entries(found.fit, told, groups, {SPRUNG[0]: "at the noise"})
         assert entry["motion"] == said
 
 
@@ -227,3 +228,38 @@ def test_plucks_beyond_what_they_were_held_to_are_fitted_again(monkeypatch, time
 
 def _unscored(found: Any, *_: Any) -> Any:
     return Refit(found, full(0.0).evidence, full(0.0).score)
+
+
+@pytest.mark.parametrize(
+    ("effects", "likelier", "asked"),
+    [
+        (SPRUNG[:1], True, True),
+        (SPRUNG[:1], False, True),
+        (SPRUNG, True, False),
+        (("rotational_drag",), True, False),
+    ],
+)
+def test_vibration_is_asked_again_once_less_is_missing(
+    monkeypatch, effects, likelier, asked
+) -> None:
+    """Beside a missing attachment and tilt it was not likelier; after them, by 2081 in density."""
+    found: Any = SimpleNamespace(effects=effects, fit="slow")
+    moving: Any = SimpleNamespace(effects=SPRUNG, fit="full")
+    asks: list[str] = []
+
+    def fully_so(one, name, *_):
+        asks.append(name)
+        return moving if likelier else one
+
+    monkeypatch.setattr(module, "fully", fully_so)
+    monkeypatch.setattr(module, "colour_of", lambda *_: 1.0)
+    monkeypatch.setattr(module, "polished", lambda fit, *_: fit)
+    told = module.fully_by_now(found, SCALES)
+    assert asks == (["cable_elasticity"] if asked else [])
+    assert told == ("full" if asked and likelier else found)
+
+
+def test_what_stands_in_the_model_beside_a_place_that_leads_is_not_told() -> None:
+    """It widens the others, and is nothing."""
+    found = slow(0.0)
+    assert not accepted_entries(found.fit, np.eye(len(found.fit.covariance)), {}, {})
