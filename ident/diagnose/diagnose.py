@@ -297,7 +297,7 @@ def _told(
     notes += filter(None, [left.note(spread)])
     before = still_missing(first, False, False) if accepted else left
     spreads = before.widened(honest_covariance(first, begun)), left.widened(spread)
-    return _Told(last, accepted, rest, rungs, first, final, spreads, left.reliance)
+    return _Told(last, accepted, rest, rungs, first, final, spreads, left.reliance(spread))
 
 
 def _kept_from_dynamics(

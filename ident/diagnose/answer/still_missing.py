@@ -64,11 +64,14 @@ class StillMissing:
         """
         return covariance + self.moved + self.random
 
-    @property
-    def reliance(self) -> str:
-        """That values are not to be relied on, or how far, a sentence; empty where they are."""
+    def reliance(self, covariance: Array) -> str:
+        """That values are not to be relied on, or how far, a sentence; empty where they are.
+
+        Args:
+            covariance: of the shared unknowns without it, (p, p).
+        """
         if self.left < FAR_FROM_WHITE:
-            return ""
+            return self.note(covariance)
         if self.refused:
             return (
                 "do not take these values for more than their deviations say: something is still "
