@@ -293,7 +293,8 @@ def _told(
         spread = with_ways(spread, final, vibration.exchange)
         notes.append(vibration.note)
     spread = with_settled(spread, last) if held else spread
-    left = still_missing(final, not all_settled(accepted), search.kinematics is not None)
+    by_lengths = search.kinematics is not None
+    left = still_missing(final, not all_settled(accepted), by_lengths, search.candidates)
     notes += filter(None, [left.note(spread)])
     before = still_missing(first, False, False) if accepted else left
     spreads = before.widened(honest_covariance(first, begun)), left.widened(spread)

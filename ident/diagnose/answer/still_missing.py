@@ -7,20 +7,26 @@ deviations, though none is sure enough to be named. Two things are known that `i
 know. Where cable lengths were asked, what they do not settle is as good as its tolerances, whatever
 forces act; elsewhere geometry is grossly off at most. And where effects were found that explain
 most of the excess, all others were held against what they leave, and refused on runs left out: it
-is a rest, as large as it is.
+is a rest, as large as it is. A search of some candidates alone knows neither of what it left out.
 """
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
 
-from freeswing.cdpr.effects import effect_named
+from freeswing.cdpr.effects import Recorded, catalogue, effect_named
 from freeswing.cdpr.frozen import freeze
 from freeswing.cdpr.robot import INERTIA_NAMES, Array
 from freeswing.ident.diagnose.answer.settled_geometry import settled_places
-from freeswing.ident.judge.asked_errors import GEOMETRY, Asked, asked_errors
+from freeswing.ident.judge.asked_errors import (
+    GEOMETRY,
+    Asked,
+    asked_errors,
+    shown,
+)
 from freeswing.ident.judge.likely_sizes import likely_sizes
 from freeswing.ident.judge.missing_forces import FAR_FROM_WHITE
 from freeswing.ident.judge.wrong_geometry import LEAST_NOISE
@@ -114,15 +120,24 @@ class StillMissing:
         )
 
 
-def still_missing(found: LikelihoodFit, refused: bool, by_lengths: bool) -> StillMissing:
+def still_missing(
+    found: LikelihoodFit,
+    refused: bool,
+    by_lengths: bool,
+    candidates: Collection[str] | None = None,
+) -> StillMissing:
     """What a fit leaves, and what that does to its shared unknowns.
 
     Args:
         found: the fit, as it is told.
-        refused: whether effects were found in it that explain most of the excess, and all others
-            were refused beside them.
-        by_lengths: whether cable lengths have settled its geometry.
+        refused: whether effects were found in it that explain most of the excess, and all other
+            candidates were refused beside them.
+        by_lengths: whether cable lengths have settled the geometry among the candidates.
+        candidates: effects that were looked for; None for all.
     """
+    if candidates is not None:
+        by_lengths = by_lengths and set(shown(found.model.robot)) <= set(candidates)
+        refused = refused and _shown_by(found) <= {*candidates, *found.model.effects}
     nothing = np.zeros(found.covariance.shape)
     if np.nanmax(found.noise) < LEAST_NOISE:
         return StillMissing({}, nothing, nothing)
@@ -145,6 +160,17 @@ def still_missing(found: LikelihoodFit, refused: bool, by_lengths: bool) -> Stil
     is_rest = refused and left >= FAR_FROM_WHITE and np.isfinite(found.covariance).all()
     rest = found.covariance * (left / asked.colour) if is_rest else nothing
     return StillMissing(sizes, moved, rest, left, refused)
+
+
+def _shown_by(found: LikelihoodFit) -> set[str]:
+    """Effects that the recordings of a fit could show."""
+    recorded = Recorded(lengths=any(run.lengths_m is not None for run in found.samples))
+    robot = found.model.robot
+    return {
+        name
+        for name, effect in catalogue().items()
+        if not (effect.nuisance or effect.cannot_show(robot, recorded))
+    }
 
 
 def _most_left(asked: Asked, refused: bool) -> float:

@@ -11,6 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from freeswing.cdpr.effects import catalogue
 from freeswing.cdpr.model.equations import build_model
 from freeswing.ident.diagnose.answer import still_missing as room
 from freeswing.ident.diagnose.answer.still_missing import still_missing
@@ -26,7 +27,9 @@ COLOUR = 4.0
 def fit(noise_m: float = 1e-4) -> SimpleNamespace:
     model = build_model(paper_model().robot)
     covariance = COLOUR * np.eye(UNKNOWNS)
-    return SimpleNamespace(noise=np.full(2, noise_m), model=model, covariance=covariance)
+    return SimpleNamespace(
+        noise=np.full(2, noise_m), model=model, covariance=covariance, samples=()
+    )
 
 
 def answered(monkeypatch, seen: np.ndarray, of_geometry: float = 1.0) -> None:
@@ -95,6 +98,36 @@ def test_what_is_asked_for_at_the_noise_is_said_too(monkeypatch) -> None:
     told = COLOUR * np.eye(UNKNOWNS)
     assert found.left < 2.0
     assert found.reliance(told) == found.note(told) != ""
+
+
+ALL = tuple(catalogue())
+
+
+@pytest.mark.parametrize(
+    ("without", "held"),
+    [("", True), ("tether", False), ("pulley_friction", False), ("cable_length_bias", True)],
+)
+def test_what_was_not_looked_for_was_not_refused(monkeypatch, without: str, held: bool) -> None:
+    """Of drag alone a rest was told that "no force or geometry that is known here follows it".
+
+    Without lengths these cannot be biased.
+    """
+    answered(monkeypatch, rest(100.0))
+    names = [name for name in ALL if name != without]
+    found = still_missing(fit(), refused=True, by_lengths=False, candidates=names)
+    assert found.refused == held == bool(found.random.any())
+    assert (set(found.sizes) == set()) == held
+
+
+@pytest.mark.parametrize(("without", "size"), [("", 1.0), ("tether", 1.0), ("anchor_offset", 3.0)])
+def test_geometry_that_lengths_were_not_asked_of_is_not_settled(
+    monkeypatch, without: str, size: float
+) -> None:
+    """An anchor beside `--only gravity_tilt` was held to be off by a tolerance at most."""
+    answered(monkeypatch, np.append(np.ones(50), 300.0 * np.ones(10)), of_geometry=100.0)
+    names = [name for name in ALL if name != without]
+    found = still_missing(fit(), refused=False, by_lengths=True, candidates=names)
+    assert found.sizes[GEOMETRY] == pytest.approx(size, rel=0.05)
 
 
 @pytest.mark.parametrize("refused", [False, True])
