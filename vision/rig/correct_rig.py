@@ -128,7 +128,8 @@ def correct_rig(
         offsets = np.array([view.camera.clock_offset_s for view in current])
         even, runs, said = at_one_rate(calibrated, offsets, rates)
         again = correct_rig(even, watch, survey_std_m, rated=True)
-        findings, remarks = (*lost, *runs, *again.findings), (*counted, *said, *again.remarks)
+        remarks = tuple(dict.fromkeys((*counted, *said, *again.remarks)))  # counted twice alike
+        findings = (*lost, *runs, *again.findings)
         return replace(again, before=before, findings=findings, remarks=remarks)
     clocks = clocks + lags
     remarks += _motion_sentences(views, poses, jitter)

@@ -12,6 +12,7 @@ import pytest
 
 from freeswing.cdpr.files.documents import DataError
 from freeswing.cdpr.rotation import log_rotation
+from freeswing.vision.rig import correct_rig as module
 from freeswing.vision.rig.clock_rates import Rates, refuse_far_apart
 from freeswing.vision.rig.correct_rig import correct_rig
 from freeswing.vision.tracked_runs import TrackedCamera, rate_by
@@ -23,10 +24,13 @@ def stub(**attributes: Any) -> Any:
     return SimpleNamespace(**attributes)
 
 
-def test_a_clock_that_runs_faster_is_put_right(tmp_path) -> None:
+def test_a_clock_that_runs_faster_is_put_right(tmp_path, monkeypatch) -> None:
     """1.6e-4 between two: each is put on by half, all else is right to its deviations."""
+    unseen = "lost frames are not looked for"
+    monkeypatch.setattr(module, "recounted", lambda views, **_: (list(views), [], [unseen]))
     views, watch = made_views(tmp_path, (Recorded(rate=1.00016), Recorded()), seconds=6.0)
     found = correct_rig(views, watch, 1e-3)
+    assert found.remarks.count(unseen) == 1, "said of the stamps as they were, and put right"
     told = {f.camera: f.parameters[0] for f in found.findings if f.effect == "clock_rate"}
     assert told.keys() == {"left", "right"}
     for camera, wanted in (("left", 8e-5), ("right", -8e-5)):
