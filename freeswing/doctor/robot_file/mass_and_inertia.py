@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from freeswing.cdpr.robot import Robot
+from freeswing.cdpr.robot import Array, Robot
 from freeswing.doctor.finding import Finding
 from freeswing.session.session_file import Run
 
@@ -31,14 +31,14 @@ def mass_findings(robot: Robot) -> Iterator[Finding]:
     if not span > 0.0:
         return
     if platform.specific_inertia_m2 is not None:
-        gyration = math.sqrt(0.5 * float(platform.specific_inertia_m2[:3].sum()))
+        gyration = _gyration_m(platform.specific_inertia_m2)
         apart = f"a radius of gyration of {gyration:.3g} m, its attachments {span:.3g} m apart"
         if gyration > LARGEST * span:
             text = f"the platform's inertia gives {apart}: this looks like kg mm²"
             yield Finding(
                 "error", "robot", text, "write kg m² (inertia_kg_m2) or m² (specific_inertia_m2)"
             )
-        elif gyration < SMALLEST * span:
+        elif 0.0 < gyration < SMALLEST * span:  # none at all is of a point
             text = f"the platform's inertia gives {apart}: this looks like mass_kg in g"
             yield Finding("warning", "robot", text, "write kg and kg m²")
     far = 0.0 if platform.com_m is None else float(np.linalg.norm(platform.com_m))
@@ -58,7 +58,7 @@ def mass_findings(robot: Robot) -> Iterator[Finding]:
 
 
 def payload_findings(runs: Sequence[Run], robot: Robot) -> Iterator[Finding]:
-    """Of the known masses on the platform: places in mm, masses in g."""
+    """Of the known masses on the platform: places in mm, inertias in kg mm², masses in g."""
     span = _span_m(robot)
     for run in runs if span > 0.0 else ():
         for payload in run.payloads:
@@ -70,6 +70,13 @@ def payload_findings(runs: Sequence[Run], robot: Robot) -> Iterator[Finding]:
                 yield Finding(
                     "error", f"run {run.name}", f"{text}: this looks like mm", "write metres"
                 )
+            gyration = _gyration_m(payload.inertia_kg_m2 / payload.mass_kg)
+            if gyration > LARGEST * span:
+                text = (
+                    f"payload inertia_kg_m2 of {payload.mass_kg:.4g} kg is a radius of gyration of "
+                    f"{gyration:.3g} m, the attachments {span:.3g} m apart: this looks like kg mm²"
+                )
+                yield Finding("error", f"run {run.name}", text, "write kg m²")
             if payload.mass_kg > DENSEST_PAYLOAD * _ball_m3(span):
                 text = f"payload mass_kg = {payload.mass_kg:.4g} on attachments {span:.3g} m apart"
                 yield Finding(
@@ -81,6 +88,11 @@ def _span_m(robot: Robot) -> float:
     """The largest distance between two attachments."""
     points = robot.attachments_m
     return float(np.linalg.norm(points[:, None] - points[None], axis=-1).max())
+
+
+def _gyration_m(specific_inertia_m2: Array) -> float:
+    """Radius of gyration; files may round a point's moments of inertia below zero."""
+    return math.sqrt(max(0.5 * float(specific_inertia_m2[:3].sum()), 0.0))
 
 
 def _ball_m3(diameter_m: float) -> float:

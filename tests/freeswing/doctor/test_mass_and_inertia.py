@@ -39,6 +39,8 @@ def gyrating(radius_m: float) -> Platform:
         (gyrating(15.1), "error: the platform's inertia gives a radius of gyration of 15.1 m"),
         (gyrating(0.0170), ""),
         (gyrating(0.0163), "warning: the platform's inertia gives a radius of gyration of 0.0163"),
+        (gyrating(0.0), ""),
+        (Platform(8.0, np.zeros(3), -1e-12 * np.ones(6)), ""),
         (Platform(com_m=np.array([0.0, 0.0, 14.9])), ""),
         (Platform(com_m=np.array([0.0, 0.0, 15.1])), "error: com_m is 15.1 m from P"),
         (Platform(0.98 * 7850.0 * BALL_M3), ""),
@@ -58,16 +60,19 @@ def test_a_load_far_below_its_ring_is_not_dense() -> None:
 
 
 @pytest.mark.parametrize(
-    ("mass_kg", "far_m", "says"),
+    ("mass_kg", "far_m", "gyration_m", "says"),
     [
-        (0.98 * 1000.0 * BALL_M3, 0.1, ""),
-        (1.02 * 1000.0 * BALL_M3, 0.1, "warning run a: payload mass_kg = 66.76 on attachments"),
-        (0.5, 14.9, ""),
-        (0.5, 15.1, "error run a: payload position_m is 15.1 m from P"),
+        (0.98 * 1000.0 * BALL_M3, 0.1, 0.0, ""),
+        (1.02 * 1000.0 * BALL_M3, 0.1, 0.0, "warning run a: payload mass_kg = 66.76 on attachment"),
+        (0.5, 14.9, 0.0, ""),
+        (0.5, 15.1, 0.0, "error run a: payload position_m is 15.1 m from P"),
+        (0.5, 0.1, 14.9, ""),
+        (0.5, 0.1, 15.1, "error run a: payload inertia_kg_m2 of 0.5 kg is a radius of gyration of"),
     ],
 )
-def test_of_a_payload(mass_kg: float, far_m: float, says: str) -> None:
-    body = KnownBody(mass_kg, np.array([far_m, 0.0, 0.0]), np.zeros(6))
+def test_of_a_payload(mass_kg: float, far_m: float, gyration_m: float, says: str) -> None:
+    inertia = mass_kg * gyration_m**2 * np.array([1.0, 0.5, 0.5, 0.0, 0.0, 0.0])
+    body = KnownBody(mass_kg, np.array([far_m, 0.0, 0.0]), inertia)
     run: Any = SimpleNamespace(name="a", payloads=(body,))
     found = payload_findings([run], robot(Platform()))
     said = [f"{one.level} {one.subject}: {one.text}" for one in found]
