@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from argparse import ArgumentParser, Namespace
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -111,14 +112,8 @@ def _cables(answers: Answers) -> int:
 def _answers(options: Namespace) -> Answers:
     """What flags say, and what a person at a terminal adds."""
     from freeswing.cdpr.files.documents import InputError
-    from freeswing.session.session_file import as_run_name
     from freeswing.starter.questions import Answers, ask, files_of
 
-    for camera in options.cameras or ():
-        if as_run_name(camera) != camera:
-            raise InputError(
-                f"--cameras {camera[:40]!r}: recordings are named so: letters, digits, . _ - only"
-            )
     recordings = files_of(options.mocap or ())
     for file in recordings:
         if not file.name.isprintable():
@@ -143,7 +138,21 @@ def _answers(options: Namespace) -> Answers:
     is_asked = options.kind is None and not options.no_questions
     is_asked = is_asked and sys.stdin.isatty() and sys.stderr.isatty()
     quiet = options.json or options.quiet
-    return ask(said) if is_asked and not quiet else said
+    told = ask(said) if is_asked and not quiet else said
+    _check_names(told.cameras)
+    return told
+
+
+def _check_names(cameras: Sequence[str]) -> None:
+    from freeswing.cdpr.files.documents import InputError
+    from freeswing.session.session_file import as_run_name
+
+    for camera in cameras:
+        if as_run_name(camera) != camera:
+            raise InputError(
+                f"--cameras {camera[:40]!r}: its films are named so, which not every computer lets "
+                f"files be: take letters, digits, spaces, . _ -, such as {as_run_name(camera)[:40]}"
+            )
 
 
 def _measured_by(options: Namespace, recorded: bool) -> str | None:

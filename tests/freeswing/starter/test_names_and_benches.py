@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import sys
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,7 @@ import pytest
 from freeswing.main import main
 from freeswing.session.new_recordings import take_in
 from freeswing.session.session_file import as_run_name, read_session
+from freeswing.starter import questions
 from tests.places import SAMPLES
 
 POSES = sorted((SAMPLES / "trifilar" / "poses" / "runs").glob("*.csv"))
@@ -63,8 +65,21 @@ def test_a_name_that_a_run_may_have(text: str, taken: tuple[str, ...], name: str
 
 
 def test_a_camera_names_its_files(tmp_path: Path, capsys) -> None:
-    assert main(["new", str(tmp_path / "a"), "--cameras", 'le"ft', "right"]) == 2
-    assert "--cameras 'le\"ft': recordings are named so" in capsys.readouterr().err
+    for name, nearest in (('le"ft', "le-ft"), ("con", "run-con")):
+        assert main(["new", str(tmp_path / "a"), "--cameras", name, "right"]) == 2
+        said = capsys.readouterr().err
+        assert f"--cameras {name!r}: its films are named so" in said
+        assert said.rstrip().endswith(f"such as {nearest}")
+
+
+def test_a_camera_named_at_the_terminal_names_its_files_too(tmp_path, capsys, monkeypatch) -> None:
+    told = questions.Answers(kind="plate", cameras=("le/ft", "right"), measured_by="cameras")
+    monkeypatch.setattr(questions, "ask", lambda _: told)
+    for stream in (sys.stdin, sys.stderr):
+        monkeypatch.setattr(stream, "isatty", lambda: True)
+    assert main(["new", str(tmp_path / "a")]) == 2
+    assert "--cameras 'le/ft'" in capsys.readouterr().err
+    assert not (tmp_path / "a").exists()
 
 
 def test_whole_poses_of_a_bench_show_loads_payloads_and_lengths(tmp_path: Path) -> None:
