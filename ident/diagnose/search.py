@@ -33,7 +33,6 @@ from freeswing.ident.diagnose.decision import (
     by_lengths,
     decided,
     excess_of,
-    lacks_little,
     promising,
     settles,
 )
@@ -117,7 +116,7 @@ class Search:
     def _followed(self, current: Refit, first: int) -> Refit:
         """The last fit of the rounds from `first` on, until none adds anything."""
         for index in range(first, MOST_ROUNDS):
-            if index and (lacks_little(current) or too_small(current.fit)):
+            if index and too_small(current.fit):
                 break
             done = self._round(current, index)
             self.rounds += self._instead(done, index)

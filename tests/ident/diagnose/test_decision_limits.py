@@ -10,7 +10,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from freeswing.cdpr.effects.base import Parameter
 from freeswing.ident.diagnose import (
     backward_removal,
     decision,
@@ -31,7 +30,6 @@ from freeswing.ident.diagnose.decision import (
     settles,
 )
 from freeswing.ident.diagnose.leave_one_out import Score
-from tests.oracle.scenes.robots import declared_robot
 
 NOTHING = np.zeros(0)
 
@@ -124,7 +122,7 @@ def test_a_run_loses_what_counts(own, mean_gain, held_out, worse) -> None:
 
 @pytest.mark.parametrize(
     ("excess", "gain", "passes"),
-    [(0.0047, 0.9, False), (0.0053, 0.9, True), (0.02, 0.23, False), (0.02, 0.27, True)],
+    [(0.0047, 0.23, False), (0.0047, 0.27, True), (0.02, 0.23, False), (0.02, 0.27, True)],
 )
 def test_a_further_effect_must_be_worth_its_place(excess, gain, passes) -> None:
     count = 1e6
@@ -137,14 +135,11 @@ def test_a_further_effect_must_be_worth_its_place(excess, gain, passes) -> None:
 
 
 @pytest.mark.parametrize("off", [False, True])
-def test_lengths_that_are_off_want_a_further_effect_at_the_noise_too(monkeypatch, off) -> None:
+def test_lengths_that_are_off_are_not_settled_at_the_noise(monkeypatch, off) -> None:
     """A bias of 2 mm beside a displaced anchor: 51 of 20 500 squares, in 21 stated lengths."""
     monkeypatch.setattr(decision, "lengths_off", lambda _: off)
     count = 1e6
     before = fitted([count / 4] * 4, 1e6, count)
-    after = fitted([(count - 5000.0) / 4] * 4, 0.0, count)
-    text = _complaint(before, after, "effect", np.ones(2), later=True)
-    assert (text == "") == off, text
     winner = Decision((), before, "effect", ("effect",))
     assert settles(winner, fitted([count] * 4, 1e6, count), np.ones(2))
     assert settles(winner, before, np.ones(2)) != off
@@ -360,18 +355,6 @@ def test_runs_to_leave_one_out_of(runs, enough) -> None:
             declared_model.refuse_few([None] * runs)
 
 
-@pytest.mark.parametrize(("value", "complaints"), [(-5e-5, 1), (5e-5, 0)])
-def test_a_cable_does_not_weigh_less_than_nothing(value, complaints) -> None:
-    """Beyond a range by chance it may lie; on the wrong side of nothing it is none."""
-    parameter = Parameter("linear_density_over_mass_1_m", 0.0, 0.05, 0.002)
-    model = SimpleNamespace(robot=declared_robot("three-cable"), parameters=(parameter,))
-    fit = SimpleNamespace(model=model, values=np.array([value]), std=lambda _: np.array([3e-5]))
-    one = SimpleNamespace(fit=fit, values_of=lambda _: slice(0, 1))
-    found = refit.plausible(one, "cable_mass")
-    assert len(found) == complaints, found
-    assert all("no such effect can have" in text for text in found), found
-
-
 @pytest.mark.parametrize(("left", "fits"), [(110.0, 1), (90.0, 2)])
 def test_a_fit_is_weighed_by_what_it_leaves(monkeypatch, left, fits) -> None:
     """Its search had stopped at 200 times the noise: what leaves 90 was weighed too loosely."""
@@ -389,19 +372,3 @@ def test_a_fit_is_weighed_by_what_it_leaves(monkeypatch, left, fits) -> None:
     monkeypatch.setattr(refit, "rescored", lambda one, _, colour: colour)
     assert refit.polished(begun, np.ones(2)) == pytest.approx(200.0 if fits == 1 else left)
     assert [float(scales[0] ** 2) for scales in made] == pytest.approx([200.0, left][:fits])
-
-
-@pytest.mark.parametrize(("amplitude", "refused"), [(0.0, True), (1e-9, False)])
-def test_a_candidate_that_no_step_takes_away_from_nothing_explains_nothing(
-    monkeypatch, amplitude, refused
-) -> None:
-    """Its frequency is no amount."""
-    parts = Parameter("sine_x_m_s2", -3.0, 3.0, 0.05, per_run=True)
-    hz = Parameter("frequency_hz", 0.05, 40.0, 2.0, start=2.0, amplitude=False)
-    model = SimpleNamespace(
-        place_of=lambda _: slice(1, 3), parameters=(None, parts, hz), robot=None
-    )
-    motions = [SimpleNamespace(values=np.array([0.3, one, 37.0])) for one in (0.0, amplitude)]
-    monkeypatch.setattr(refit, "inside", lambda *_: np.array([True, True]))
-    found = SimpleNamespace(model=model, motions=motions)
-    assert refit._does_nothing(found, "harmonic_force") == refused

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from freeswing.cdpr.effects import effect_named
+from freeswing.cdpr.effects.base import Parameter
 from freeswing.ident.diagnose import refit as module
 from tests.oracle.scenes.robots import declared_robot
 
@@ -79,3 +80,31 @@ def test_a_displacement_of_nothing_is_refused_but_not_impossible(metres, refused
     one: Any = SimpleNamespace(fit=fit, values_of=lambda _: slice(0, len(names)))
     assert bool(module.plausible(one, "anchor_offset")) == refused
     assert module.impossible_values(one, "anchor_offset") == []
+
+
+@pytest.mark.parametrize(("value", "complaints"), [(-5e-5, 1), (5e-5, 0)])
+def test_a_cable_does_not_weigh_less_than_nothing(value, complaints) -> None:
+    """Beyond a range by chance it may lie; on the wrong side of nothing it is none."""
+    parameter = Parameter("linear_density_over_mass_1_m", 0.0, 0.05, 0.002)
+    model: Any = SimpleNamespace(robot=ROBOT, parameters=(parameter,))
+    fit = SimpleNamespace(model=model, values=np.array([value]), std=lambda _: np.array([3e-5]))
+    one: Any = SimpleNamespace(fit=fit, values_of=lambda _: slice(0, 1))
+    found = module.plausible(one, "cable_mass")
+    assert len(found) == complaints, found
+    assert all("no such effect can have" in text for text in found), found
+
+
+@pytest.mark.parametrize(("amplitude", "refused"), [(0.0, True), (1e-9, False)])
+def test_a_candidate_that_no_step_takes_away_from_nothing_explains_nothing(
+    monkeypatch, amplitude, refused
+) -> None:
+    """Its frequency is no amount."""
+    parts = Parameter("sine_x_m_s2", -3.0, 3.0, 0.05, per_run=True)
+    hz = Parameter("frequency_hz", 0.05, 40.0, 2.0, start=2.0, amplitude=False)
+    model: Any = SimpleNamespace(
+        place_of=lambda _: slice(1, 3), parameters=(None, parts, hz), robot=None
+    )
+    motions = [SimpleNamespace(values=np.array([0.3, one, 37.0])) for one in (0.0, amplitude)]
+    monkeypatch.setattr(module, "inside", lambda *_: np.array([True, True]))
+    found: Any = SimpleNamespace(model=model, motions=motions)
+    assert module._does_nothing(found, "harmonic_force") == refused
