@@ -49,6 +49,15 @@ def plain(name: str) -> str:
     return name.replace("_", " ")
 
 
+def motion_words(motion: str) -> str:
+    """How stretching cables were fitted (`motion` of results/diagnosis.json), as words."""
+    if not motion.startswith("quasi-static"):
+        return motion
+    why = motion.removeprefix("quasi-static").removeprefix(": ")
+    slow = "without vibration: cables are as long as their tension makes them"
+    return f"{slow}; {why}" if why else slow
+
+
 def number(value: object, digits: int = 3) -> str:
     """A number to so many significant digits; a dash where there is none."""
     if not isinstance(value, int | float) or isinstance(value, bool) or not math.isfinite(value):

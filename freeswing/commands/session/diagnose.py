@@ -111,13 +111,13 @@ def _make_bench(session: Session, console: Console, robot: Robot, only: list[str
 def _summarise(document: Diagnosis, console: Console) -> None:
     from freeswing.report.panels.answer import verdict
     from freeswing.report.panels.ladder import seen_directions
-    from freeswing.report.words import millimetres, number, plain
+    from freeswing.report.words import millimetres, motion_words, number, plain
 
     for entry in document.accepted:
         values = ", ".join(f"{p.name} {number(p.value, 4)}" for p in entry.parameters)
         console.say(f"  accepted: {plain(entry.effect)} ({values})")
         if entry.motion:
-            console.say(f"    fitted {entry.motion}")
+            console.say(f"    fitted {motion_words(entry.motion)}")
         for sentence in seen_directions(entry.directions):
             console.say(f"    {sentence}")
     for place in document.lengths.wrong if document.lengths else ():

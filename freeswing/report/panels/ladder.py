@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from freeswing.report.figures import AFTER, BEFORE, FAINT, figure
 from freeswing.report.material import Material
-from freeswing.report.words import millimetres, number, parameter_row, plain
+from freeswing.report.words import millimetres, motion_words, number, parameter_row, plain
 from freeswing.results.common import FoundEffect, SeenDirection
 from freeswing.results.diagnosis import Candidate
 
@@ -66,7 +66,9 @@ def effect_rows(effect: FoundEffect) -> list[dict[str, str]]:
         size = f"{row['value']} ± {row['half_width']} {row['unit']}"
         rows.append({"effect": name, "number": row["name"], "value ± 95 %": size})
     if effect.motion:
-        rows.append({"effect": name, "number": "motion", "value ± 95 %": effect.motion})
+        rows.append(
+            {"effect": name, "number": "motion", "value ± 95 %": motion_words(effect.motion)}
+        )
     return rows
 
 

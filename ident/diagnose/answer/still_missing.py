@@ -81,9 +81,9 @@ class StillMissing:
         if self.refused:
             return (
                 "do not take these values for more than their deviations say: something is still "
-                f"missing, {self.left:.3g} times as strong as white noise would be where errors of "
-                "a model show, and no force or geometry that is known here follows it; deviations "
-                "take it for random there"
+                f"missing, {self.left:.3g} times as strong as white noise would be in what a wrong "
+                "model changes, and no force or geometry that the program knows follows it; "
+                "deviations hold it as if it were random, which a force that acts as inertia is not"
             )
         return (
             "do not rely on these values: what is missing was not found, and to first order no "

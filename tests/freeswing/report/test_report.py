@@ -293,6 +293,10 @@ def test_how_stretching_cables_were_fitted_is_a_row() -> None:
     row = {"effect": "cable elasticity", "number": "motion", "value ± 95 %": "with vibration"}
     assert effect_rows(found) == [row]
     assert not effect_rows(FoundEffect(effect="gravity_tilt"))
+    slow = "without vibration: cables are as long as their tension makes them"
+    for told, said in (("quasi-static: why", f"{slow}; why"), ("quasi-static", slow)):
+        (row,) = effect_rows(FoundEffect(effect="cable_elasticity", motion=told))
+        assert row["value ± 95 %"] == said
 
 
 def test_rivals_are_sentences_and_told_of_once_below_the_bars_and_in_the_advice() -> None:
