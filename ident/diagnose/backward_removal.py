@@ -98,7 +98,16 @@ def turned(decision: Decision) -> Decision:
     key, fit = decision.ahead
     first = effect_of(key)
     group = (first, *(name for name in decision.group if name != first))
-    return replace(decision, winner=fit, key=key, group=group, rival=decision.winner, ahead=None)
+    led = {} if decision.winner is None else {decision.key: decision.winner}
+    return replace(
+        decision,
+        winner=fit,
+        key=key,
+        group=group,
+        rival=decision.winner,
+        others=led | {name: one for name, one in decision.others.items() if name != key},
+        ahead=None,
+    )
 
 
 def _likeliest_refused(

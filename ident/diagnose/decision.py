@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -91,6 +91,7 @@ class Decision:
         group: effects that held-out runs cannot tell from it, its own among them.
         rival: the fit with the likeliest other effect of the group, or None.
         ahead: key of one of the group that left-out runs speak for far more, with its fit, or None.
+        others: fits with the others of the group, by key.
         instead: those of the group that may be wrong instead by other parts than are in the model.
         exchange: what may be there instead of the winner, or although nothing won.
     """
@@ -101,6 +102,7 @@ class Decision:
     group: tuple[str, ...] = ()
     rival: Refit | None = None
     ahead: tuple[str, Refit] | None = None
+    others: Mapping[str, Refit] = field(default_factory=dict)
     instead: tuple[str, ...] = ()
     exchange: Exchange | None = None
 
@@ -207,14 +209,9 @@ def decided(
     """
     ranked = sorted(linear, key=lambda name: float(linear[name].held_out.sum()))
     runs = left_out(current, noise_scales)
-    complaints: dict[str, str] = {}
-    passed: dict[str, Refit] = {}
-    for name, one in tried.items():
-        complaint = _complaint(current, one, name, noise_scales, later)
-        if complaint:
-            complaints[name] = complaint
-        else:
-            passed[name] = one
+    said = {n: _complaint(current, one, n, noise_scales, later) for n, one in tried.items()}
+    complaints = {n: why for n, why in said.items() if why}
+    passed = {n: one for n, one in tried.items() if n not in complaints}
     chances = probabilities(current, tried, noise_scales)
     key, group = _winner(passed, chances, current, runs)
     told = _best_of_each([key, *sorted(tried, key=lambda n: tried[n].held_out), *ranked])
@@ -230,12 +227,13 @@ def decided(
         candidates.append(
             Candidate(effect_of(one), verdict, float(bic), gain, others, reason, chance)
         )
-    others = [n for n in passed if effect_of(n) in group and effect_of(n) != effect_of(key)]
-    rival = max(others, key=lambda n: chances[n], default="")
+    keys = [n for n in passed if effect_of(n) in group and effect_of(n) != effect_of(key)]
+    others, won = {n: passed[n] for n in keys}, passed.get(key)
+    rival = others.get(max(keys, key=lambda n: chances[n], default=""))
     unsure = None if key else _unsure(current, tried, chances)
-    winner, rival_fit = passed.get(key), passed.get(rival)
-    ahead = _ahead(key, {n: passed[n] for n in (key, *others) if key}, runs)
-    return Decision(tuple(candidates), winner, key, group, rival_fit, ahead, exchange=unsure)
+    ahead = _ahead(key, {key: won, **others} if won else {}, runs)
+    words = tuple(candidates)
+    return Decision(words, won, key, group, rival, ahead, others, exchange=unsure)
 
 
 def _unsure(current: Refit, tried: dict[str, Refit], chances: dict[str, float]) -> Exchange | None:

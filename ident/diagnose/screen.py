@@ -49,6 +49,10 @@ class Screen:
         """Evidence over the base and the named candidates' amplitudes."""
         return self.evidence.subset(np.concatenate([self.base, *(self.columns[n] for n in keys)]))
 
+    def start_of(self, key: str) -> Array:
+        """Values of a candidate's whole effect as it was screened, doing nothing, (k,)."""
+        return self.values[self.model.place_of(effect_of(key))].copy()
+
 
 def screen(
     fit: LikelihoodFit,

@@ -51,6 +51,7 @@ from freeswing.ident.diagnose.refit import (
 )
 from freeswing.ident.diagnose.screen import Group, Screen, screens
 from freeswing.ident.diagnose.sets.exchange import decisions, exchange
+from freeswing.ident.diagnose.sets.rivals_again import asked_again
 from freeswing.ident.diagnose.sets.ways import Places
 from freeswing.ident.diagnose.spectrum import Residual, too_small
 from freeswing.ident.diagnose.springs.full_motion import fully, fully_by_now
@@ -111,7 +112,7 @@ class Search:
         current = self._freed(self._geometry(current))
         with self.pool_of() as self.pool:
             current = self._other_way(self._followed(current, 0))
-        return self._without_stand_ins(current)
+        return self._asked_again(self._without_stand_ins(current))
 
     def _followed(self, current: Refit, first: int) -> Refit:
         """The last fit of the rounds from `first` on, until none adds anything."""
@@ -165,6 +166,16 @@ class Search:
             ]
             self.rounds[won[-1] :] = [Round(last.before, Decision(tuple(words)))]
             current = last.before
+
+    def _asked_again(self, current: Refit) -> Refit:
+        """The last fit, each group held against its leader once nothing else is missing."""
+        won = [k for k, one in enumerate(self.rounds) if one.decision.winner is not None]
+        told = [self.rounds[k].decision for k in won]
+        if excess_of(current) <= LARGEST_EXCESS_LEFT:
+            told, current = asked_again(told, current, self.noise_scales)
+        for k, one in zip(won, told, strict=True):
+            self.rounds[k] = replace(self.rounds[k], decision=one)
+        return current
 
     def _geometry(self, current: Refit) -> Refit:
         """Kinematics first: what constant cable lengths settle, no force has to explain."""
@@ -326,11 +337,10 @@ class Search:
         colour: float,
     ) -> dict[str, Refit]:
         jobs = {
-            name: (current, name, _start_of(seen[name], name), self.noise_scales, colour)
+            name: (current, name, seen[name].start_of(name), self.noise_scales, colour)
             for name in names
         }
-        share = 1.0 / MOST_ROUNDS
-        found: dict[str, Refit] = {}
+        share, found = 1.0 / MOST_ROUNDS, dict[str, Refit]()
         if not jobs:
             return found
         # Stretch takes longest: begun last, it would keep one process busy alone.
@@ -388,8 +398,3 @@ def _of_set(
         return exchanged(found.fit, key, places, values, noise_scales)
     except ValueError:
         return None
-
-
-def _start_of(one: Screen, key: str) -> Array:
-    """Values of a candidate's effect as it was screened, doing nothing, (k,)."""
-    return one.values[one.model.place_of(effect_of(key))].copy()

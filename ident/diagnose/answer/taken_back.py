@@ -57,7 +57,8 @@ def taken_back(
 def _before_last(accepted: Sequence[Round], last: Refit, name: str, noise_scales: Array) -> Refit:
     """The fit that stood before the last effect, without others that were taken back since."""
     before = accepted[-1].before
-    known = {other for one in accepted for other in one.decision.group}
+    known = {effect_of(one.decision.key) for one in accepted}
+    known |= {name for one in accepted if one.by_lengths for name in one.decision.group}
     if known.issuperset(claims(before.effects)):
         return before
     return without(last.fit, name, noise_scales)
