@@ -251,7 +251,7 @@ def _freed_of(found: LikelihoodFit, key: str) -> tuple[Model, Unknowns]:
     name, model, unknowns = effect_of(key), found.model, found.unknowns
     block, mine = unknowns.block(name), inside(model.robot, key)
     if not (block.mask & ~mine).any():
-        return without_effect(model, name), unknowns.without(name)
+        return _lacking(model, unknowns, name)
     start = np.array([p.start for p in model.parameters[model.place_of(name)]])
     value = np.where(mine, start, block.value)
     return model, unknowns.exchanged(replace(block, value=value, estimated=block.mask & ~mine))
@@ -287,13 +287,18 @@ def freed(one: Refit, noise_scales: Array) -> Refit:
 
 def without(found: LikelihoodFit, name: str, noise_scales: Array) -> Refit:
     """A fit without one of its effects, from where it stands, converged."""
-    unknowns, fewer = found.unknowns, found.model
-    for one in (effect_named(name).fully, name):
-        if one in fewer.effects:
-            mine = (one, each_run(one)) if each_run(one) in unknowns else (one,)
-            unknowns, fewer = unknowns.without(*mine), without_effect(fewer, one)
+    fewer, unknowns = _lacking(found.model, found.unknowns, name)
     exact = fit(Swings(fewer, found.samples, found.scales), unknowns, SEARCHED)
     return rescored(exact, noise_scales, colour_of(exact, noise_scales))
+
+
+def _lacking(model: Model, unknowns: Unknowns, name: str) -> tuple[Model, Unknowns]:
+    """A model and its unknowns without an effect and what moves fully by it."""
+    for one in (effect_named(name).fully, name):
+        if one in model.effects:
+            mine = (one, each_run(one)) if each_run(one) in unknowns else (one,)
+            model, unknowns = without_effect(model, one), unknowns.without(*mine)
+    return model, unknowns
 
 
 def ranked(swings: Swings, unknowns: Unknowns, cost: float) -> LikelihoodFit:

@@ -16,12 +16,13 @@ from freeswing.cdpr.model.equations import build_model
 from freeswing.cdpr.robot import POSE_COORDINATES
 from freeswing.cdpr.simulation.free_swing import Motion, simulate
 from freeswing.ident.diagnose import heldout, screen
+from freeswing.ident.diagnose import refit as fits
 from freeswing.ident.diagnose.answer.entries import accepted_entries
 from freeswing.ident.diagnose.own_values import OwnValues
 from freeswing.ident.diagnose.refit import Refit, rescored, without
 from freeswing.ident.diagnose.springs import full_motion as module
 from freeswing.ident.diagnose.springs.full_motion import fully
-from freeswing.ident.likelihood.blocks import STARTS, eased, first_unknowns
+from freeswing.ident.likelihood.blocks import STARTS, each_run, eased, first_unknowns
 from freeswing.ident.likelihood.fit import fit
 from freeswing.ident.likelihood.fit_swings import ONWARD, Swings
 from freeswing.ident.likelihood.joint_problem import NotFollowedError
@@ -155,6 +156,13 @@ def test_what_a_fan_and_plucks_say_alike_is_charged_once() -> None:
     found = (part(run, motion, 1.0) for part in (screen._own_values, screen._plucked))
     charges = [np.log(one.curves[0, 0] + 1.0) for one in found if one is not None]
     assert sum(charges) == pytest.approx(np.linalg.slogdet(joint)[1])
+
+
+def test_stretch_that_makes_way_takes_its_vibration_along() -> None:
+    """An anchor held against it at the end of a search would have stood beside the vibration."""
+    model, unknowns = fits._freed_of(full(0.0).fit, SPRUNG[0])
+    assert not model.effects
+    assert not {*SPRUNG, each_run(SPRUNG[1])} & {block.name for block in unknowns.blocks}
 
 
 @pytest.mark.parametrize(("chance", "taken"), [(0.49, False), (0.51, True)])
