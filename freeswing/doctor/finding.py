@@ -46,5 +46,10 @@ class Finding:
 
 def named_runs(names: Sequence[str]) -> str:
     """The first by name, and how many more there are."""
-    more = f" (and {len(names) - 1} more runs)" if len(names) > 1 else ""
+    more = f" (and {len(names) - 1} more run{'s' * (len(names) > 2)})" if len(names) > 1 else ""
     return f"run {names[0]}{more}"
+
+
+def counted(findings: int) -> str:
+    """How many findings there are, for a reader."""
+    return f"{findings} finding{'' if findings == 1 else 's'}"

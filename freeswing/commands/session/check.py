@@ -18,6 +18,7 @@ def run(options: Namespace, console: Console) -> None:
     from freeswing.cdpr.files.documents import DataError, write_json
     from freeswing.commands.session.drive import check as check_drive
     from freeswing.doctor.examine import examine
+    from freeswing.doctor.finding import counted
     from freeswing.results.check import Check, Found
     from freeswing.session.drive_session import drive_path
 
@@ -35,6 +36,5 @@ def run(options: Namespace, console: Console) -> None:
     console.show_file(result)
     errors = sum(finding.level == "error" for finding in findings)
     if errors:
-        plural = "" if errors == 1 else "s"
-        raise DataError(f"{session.path}: {errors} finding{plural} to mend before a result")
-    console.say(f"{session.name}: nothing keeps it from a result ({len(findings)} findings)")
+        raise DataError(f"{session.path}: {counted(errors)} to mend before a result")
+    console.say(f"{session.name}: nothing keeps it from a result ({counted(len(findings))})")

@@ -110,7 +110,7 @@ def check(path: Path, results: str | None, console: Console) -> None:
         DataError: when a finding keeps it from a result.
     """
     from freeswing.cdpr.files.documents import DataError, write_json
-    from freeswing.doctor.finding import Finding
+    from freeswing.doctor.finding import Finding, counted
     from freeswing.doctor.robot_file.mass_and_inertia import mass_findings
     from freeswing.ident.drive.records.mistaken_records import findings
     from freeswing.session.drive_session import read_drive_session
@@ -126,7 +126,7 @@ def check(path: Path, results: str | None, console: Console) -> None:
     wrong = [*told, *(one for one in units if one.level == "error")]
     if wrong:
         raise DataError(f"{path}: {len(wrong)} to mend before a result")
-    console.say(f"{file.name}: nothing keeps it from a result ({len(entries)} findings)")
+    console.say(f"{file.name}: nothing keeps it from a result ({counted(len(entries))})")
 
 
 def diagnose(path: Path, results: str | None, only: list[str] | None, console: Console) -> None:

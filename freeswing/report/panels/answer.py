@@ -22,7 +22,10 @@ from freeswing.results.common import Parameter
 from freeswing.results.diagnosis import Diagnosis
 from freeswing.results.identification import PLATFORM, Body
 
-NOTHING_MISSING = "The model explains the held-out runs; no effect that they would show is missing."
+NOTHING_MISSING = (
+    "The model explains the held-out runs; of the effects looked for, none that they would show is "
+    "missing."
+)
 IZZ_ABOUT = {"Izz_kg_m2": "about its own centre", "Izz_P_kg_m2": "about P"}
 
 
@@ -157,9 +160,7 @@ def verdict(diagnosis: Diagnosis | None) -> list[str]:
     untold = _untold(diagnosis)
     if untold:
         return [*sentences, untold]
-    return sentences or [
-        "The model explains the held-out runs; no effect that they would show is missing."
-    ]
+    return sentences or [NOTHING_MISSING]
 
 
 def _untold(diagnosis: Diagnosis) -> str:
