@@ -130,7 +130,7 @@ def test_rows_that_were_lost_while_stamps_were_counted_on(lost, levels) -> None:
     run = counted_on(lost)
     assert said(run, "rows were lost and the stamps counted on") == levels
     refuse_wrong_stamps([counted_on(2)], None)
-    with pytest.raises(DataError, match=r"run s \(and 1 more runs\): 2 steps, the first at 0.80 s"):
+    with pytest.raises(DataError, match=r"run s \(and 1 more run\): 2 steps, the first at 0.80 s"):
         refuse_wrong_stamps([counted_on(0), counted_on(2), counted_on(1)], None)
 
 
