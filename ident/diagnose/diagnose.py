@@ -38,7 +38,7 @@ from freeswing.ident.diagnose.answer.open_exchanges import open_exchanges
 from freeswing.ident.diagnose.answer.parted_places import parted
 from freeswing.ident.diagnose.answer.settled_geometry import cut, settled_places, with_settled
 from freeswing.ident.diagnose.answer.still_missing import still_missing
-from freeswing.ident.diagnose.answer.taken_back import taken_back
+from freeswing.ident.diagnose.answer.taken_back import taken_back, unshown
 from freeswing.ident.diagnose.answer.unmet_validation import with_unmet
 from freeswing.ident.diagnose.answer.unseen_vibration import unseen_vibration
 from freeswing.ident.diagnose.decision import (
@@ -265,7 +265,9 @@ def _told(
                 fewer, check = instead
             if fewer is None:
                 rungs = ladder()
-                fewer = unless_validated(accepted, [rung.held_out for rung in rungs], rest)
+                seen = [rung.held_out for rung in rungs]
+                fewer = unless_validated(accepted, seen, rest)
+                fewer = fewer or unshown(accepted, last, seen, scales)
                 if fewer is None:
                     break
             last, accepted, note = fewer

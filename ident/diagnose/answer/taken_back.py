@@ -8,8 +8,10 @@ from typing import NamedTuple
 from freeswing.cdpr.robot import Array
 from freeswing.ident.diagnose.answer.deviations import chance_of_nothing
 from freeswing.ident.diagnose.answer.entries import claims
+from freeswing.ident.diagnose.answer.unmet_validation import is_shown
 from freeswing.ident.diagnose.backward_removal import is_no_worse
-from freeswing.ident.diagnose.decision import ACCEPTED
+from freeswing.ident.diagnose.decision import ACCEPTED, lacks_little
+from freeswing.ident.diagnose.heldout import HeldOut
 from freeswing.ident.diagnose.refit import Refit, without
 from freeswing.ident.diagnose.search import Round
 from freeswing.ident.diagnose.variants import effect_of
@@ -52,6 +54,30 @@ def taken_back(
             beside = ", ".join(dict.fromkeys(effect_of(one.decision.key) for one in rounds))
             return TakenBack(fewer, rounds, f"{name} has {why} beside {beside}: taken back")
     return None
+
+
+def unshown(
+    accepted: Sequence[Round], last: Refit, ladder: Sequence[HeldOut], noise_scales: Array
+) -> TakenBack | None:
+    """The answer without an effect found at the noise that validation runs do not show.
+
+    There the fitted runs' evidence alone speaks for it: beside friction on pulleys, whose shape
+    differs a little from reality, a force at 11 Hz of 0.9997 was told that was not there.
+
+    Args:
+        accepted: rounds of the search that count.
+        last: its last fit.
+        ladder: validation runs before them and after each.
+        noise_scales: of metres and radians, (2,).
+    """
+    if not accepted or accepted[-1].by_lengths or not lacks_little(accepted[-1].before):
+        return None
+    if is_shown(ladder[-2], ladder[-1]):
+        return None
+    name = effect_of(accepted[-1].decision.key)
+    note = f"{name} was found at the noise, and validation runs are not predicted better with it"
+    before = _before_last(accepted, last, name, noise_scales)
+    return TakenBack(before, list(accepted[:-1]), f"{note}: not accepted")
 
 
 def _before_last(accepted: Sequence[Round], last: Refit, name: str, noise_scales: Array) -> Refit:

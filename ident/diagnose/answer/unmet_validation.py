@@ -34,6 +34,12 @@ def share_removed(before: HeldOut, after: HeldOut) -> float:
     return 1.0 - (last**2 - 1.0) / (first**2 - 1.0) if first > 1.0 else 0.0
 
 
+def is_shown(before: HeldOut, after: HeldOut) -> bool:
+    """Whether the validation runs are predicted better after than before."""
+    first, last = (_over_noise(one) or 1.0 for one in (before, after))
+    return last < first
+
+
 def with_unmet(rest: Unexplained, held: HeldOut) -> Unexplained:
     """What remains, with the validation run that says so where one does."""
     worst = unmet(held, rest.over_noise)

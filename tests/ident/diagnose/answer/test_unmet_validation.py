@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from freeswing.ident.diagnose.answer import taken_back
 from freeswing.ident.diagnose.answer.not_the_cause import unless_validated
 from freeswing.ident.diagnose.answer.unmet_validation import share_removed, unmet, with_unmet
 from freeswing.ident.diagnose.heldout import HeldOut, HeldOutRun
@@ -79,3 +80,37 @@ def test_forces_that_leave_validation_runs_unmet_are_not_the_cause(left, believe
 def test_geometry_that_lengths_settled_stays() -> None:
     settled: Any = SimpleNamespace(by_lengths=True, before="declared")
     assert unless_validated([settled], [held(one=20.0)] * 2, Unexplained(False, "")) is None
+
+
+@pytest.mark.parametrize(
+    ("after", "by_lengths", "at_the_noise", "stays"),
+    [
+        (0.999, False, True, True),
+        (1.001, False, True, False),
+        (1.001, False, False, True),
+        (1.001, True, True, True),
+    ],
+)
+def test_what_is_found_at_the_noise_must_show_in_validation_runs(
+    monkeypatch, after, by_lengths, at_the_noise, stays
+) -> None:
+    """A force at 11 Hz beside friction on pulleys: 0.9322 of the noise, 0.9336 with it."""
+    monkeypatch.setattr(taken_back, "lacks_little", lambda _: at_the_noise)
+    before: Any = SimpleNamespace(effects=("pulley_friction",))
+    rounds: Any = [
+        SimpleNamespace(by_lengths=False, decision=SimpleNamespace(key="pulley_friction")),
+        SimpleNamespace(
+            by_lengths=by_lengths, decision=SimpleNamespace(key="harmonic_force"), before=before
+        ),
+    ]
+    ladder = [held(one=7.0), held(one=1.0), held(one=after)]
+    fewer = taken_back.unshown(rounds, before, ladder, np.ones(2))
+    assert (fewer is None) == stays
+    if fewer is not None:
+        assert (fewer.last, fewer.accepted) == (before, rounds[:1])
+        assert "harmonic_force was found at the noise" in fewer.note
+
+
+def test_where_nothing_was_accepted_nothing_is_asked_of_validation_runs() -> None:
+    last: Any = None
+    assert taken_back.unshown([], last, [held(one=1.0)], np.ones(2)) is None
