@@ -35,7 +35,7 @@ from freeswing.ident.diagnose.answer.not_the_cause import (
     without_forces,
 )
 from freeswing.ident.diagnose.answer.open_exchanges import open_exchanges
-from freeswing.ident.diagnose.answer.parted_places import parted
+from freeswing.ident.diagnose.answer.parted_places import parted, retold, shown
 from freeswing.ident.diagnose.answer.settled_geometry import cut, settled_places, with_settled
 from freeswing.ident.diagnose.answer.still_missing import still_missing
 from freeswing.ident.diagnose.answer.taken_back import taken_back, unshown
@@ -285,9 +285,7 @@ def _told(
     rest = with_unmet(suspected(rest, check) if check else rest, rungs[-1].held_out)
     if not held and not _follows_badly(last, rest):
         told_apart = parted(accepted, last, final, spread, scales)
-        instead = dict(zip(map(id, accepted), told_apart, strict=True))
-        search.rounds = [instead.get(id(one), one) for one in search.rounds]
-        accepted = told_apart
+        search.rounds, accepted = retold(search.rounds, accepted, told_apart)
     for exchange in open_exchanges(search.rounds, accepted, scales):
         spread = with_ways(spread, final, exchange)
         notes += filter(None, [sentence(exchange)])
@@ -300,6 +298,8 @@ def _told(
     notes += filter(None, [left.note(spread)])
     before = still_missing(first, False, False) if accepted else left
     spreads = before.widened(honest_covariance(first, begun)), left.widened(spread)
+    said = shown(accepted, final, spreads[1])
+    search.rounds, accepted = retold(search.rounds, accepted, said)
     return _Told(last, accepted, rest, rungs, first, final, spreads, left.reliance(spread))
 
 

@@ -15,6 +15,7 @@ from freeswing.ident.diagnose.backward_removal import is_no_worse
 from freeswing.ident.diagnose.decision import ACCEPTED, Candidate, Decision
 from freeswing.ident.diagnose.refit import Refit, without
 from freeswing.ident.diagnose.search import Round
+from freeswing.ident.diagnose.variants import effect_of
 from freeswing.ident.likelihood.fit_swings import LikelihoodFit
 
 
@@ -39,6 +40,54 @@ def parted(
             place = _one_off(one.decision.group, last, final, spread, noise_scales)
         found.append(replace(one, decision=_told_as(place, one.decision)) if place else one)
     return found
+
+
+def shown(accepted: Sequence[Round], final: LikelihoodFit, spread: Array) -> list[Round]:
+    """The rounds of an answer, without geometry by lengths that is nothing as it is told.
+
+    Where what is left in the residuals widens it to that: it stays in the model and widens all
+    else, but it is not told, beside something that is.
+
+    Args:
+        accepted: rounds of the search that count.
+        final: the last fit as it is told.
+        spread: covariance of its shared unknowns as it is told, (p, p).
+    """
+    nothing = [
+        one.by_lengths
+        and len(one.decision.group) == 1
+        and effect_of(one.decision.key) in final.model.effects
+        and chance_of_nothing(final, spread, effect_of(one.decision.key)) >= 1.0 - ACCEPTED
+        for one in accepted
+    ]
+    if all(nothing):
+        return list(accepted)
+    return [
+        replace(one, decision=Decision(tuple(map(_unshown, one.decision.candidates))))
+        if is_nothing
+        else one
+        for one, is_nothing in zip(accepted, nothing, strict=True)
+    ]
+
+
+def retold(
+    rounds: Sequence[Round], accepted: Sequence[Round], told: Sequence[Round]
+) -> tuple[list[Round], list[Round]]:
+    """All rounds with those that count as they are told, and of these the ones that name one.
+
+    Args:
+        rounds: of the search.
+        accepted: those that count.
+        told: each of these as it is told.
+    """
+    instead = dict(zip(map(id, accepted), told, strict=True))
+    stand = [one for one in told if one.decision.key]
+    return [instead.get(id(one), one) for one in rounds], stand
+
+
+def _unshown(one: Candidate) -> Candidate:
+    why = "lengths say so; beside all that is told its values are nothing within their deviations"
+    return replace(one, verdict="rejected", confounded_with=(), reason=why)
 
 
 def _one_off(

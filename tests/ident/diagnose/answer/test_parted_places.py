@@ -68,3 +68,29 @@ def test_groups_that_forces_decided_stay(monkeypatch) -> None:
 def test_a_place_that_is_in_the_model_no_more_is_not_asked(monkeypatch) -> None:
     (one,) = told(monkeypatch, (0.9, 0.0), (True, False), in_model=NAMES[1:])
     assert one == settled()
+
+
+@pytest.mark.parametrize(("chance", "said"), [(0.04, 2), (0.06, 1)])
+def test_geometry_that_is_nothing_as_it_is_told_is_not_named(monkeypatch, chance, said) -> None:
+    """Axes of (-0.006 0.010 ..) +- 0.08 rad beside orientations that come 20 ms late."""
+    monkeypatch.setattr(module, "chance_of_nothing", lambda final, spread, name: chances[name])
+    chances = {"clock_offset": 0.0, "pulley_axis": chance, "tether": 0.5}
+    rounds = [won(name) for name in ("clock_offset", "pulley_axis")]
+    final: Any = SimpleNamespace(model=SimpleNamespace(effects=tuple(chances)))
+    told = module.shown(rounds, final, np.eye(1))
+    every, stand = module.retold([*rounds, won("tether", False)], rounds, told)
+    assert [one.decision.key for one in stand] == ["clock_offset", "pulley_axis"][:said]
+    assert len(every) == 3
+    (word,) = every[1].decision.candidates
+    assert word.verdict == ("accepted" if said == 2 else "rejected")
+    # Forces are asked where they are taken back, and nothing goes that stands alone.
+    force = won("tether", False)
+    assert module.shown([force, rounds[0]], final, np.eye(1))[0] is force
+    chances["clock_offset"] = 0.5
+    assert module.shown(rounds[:1], final, np.eye(1)) == rounds[:1]
+
+
+def won(name: str, by_lengths: bool = True) -> Round:
+    before: Any = "before"
+    word = Candidate(name, "accepted", -9.0, 0.9, (), "lengths", 1.0)
+    return Round(before, Decision((word,), before, name, (name,)), by_lengths=by_lengths)
