@@ -91,19 +91,21 @@ def would_explain(decision: Decision, tried: Mapping[str, Refit]) -> str:
     return f"{leader} would explain it with values that cannot be ({why})"
 
 
-def turned(decision: Decision) -> Decision:
-    """A decision led by the one of its group that left-out runs predict far better."""
-    if decision.ahead is None:
-        return decision
-    key, fit = decision.ahead
+def turned(decision: Decision, key: str, fit: Refit) -> Decision:
+    """A decision led by another of its group.
+
+    Args:
+        decision: of a round that has a winner.
+        key: of who leads instead.
+        fit: with it.
+    """
     first = effect_of(key)
-    group = (first, *(name for name in decision.group if name != first))
     led = {} if decision.winner is None else {decision.key: decision.winner}
     return replace(
         decision,
         winner=fit,
         key=key,
-        group=group,
+        group=(first, *(name for name in decision.group if name != first)),
         rival=decision.winner,
         others=led | {name: one for name, one in decision.others.items() if name != key},
         ahead=None,

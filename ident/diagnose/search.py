@@ -134,13 +134,14 @@ class Search:
         start. Where the search has ended with much missing and a group had one that left-out runs
         predict far better, that one is followed too, and stands where it ends near the noise.
         """
-        forks = [k for k, one in enumerate(self.rounds) if one.decision.ahead]
+        forks = [(k, one.decision.ahead) for k, one in enumerate(self.rounds) if one.decision.ahead]
         if not forks or excess_of(current) <= LARGEST_EXCESS_LEFT:
             return current
-        taken, fork = self.rounds, self.rounds[forks[0]]
-        self.rounds = taken[: forks[0]]
+        (first, (key, fit)), taken = forks[0], self.rounds
+        fork, self.rounds = taken[first], taken[:first]
         index = sum(not one.by_lengths for one in self.rounds)
-        done = self._ended(fork.before, turned(fork.decision), index, fork.stand_in)
+        led = turned(fork.decision, key, fit)
+        done = self._ended(fork.before, led, fit, index, fork.stand_in)
         self.rounds += self._instead(done, index)
         other = self._followed(self.rounds[-1].after, index + 1)
         if excess_of(other) <= LARGEST_EXCESS_LEFT:
@@ -169,10 +170,11 @@ class Search:
 
     def _asked_again(self, current: Refit) -> Refit:
         """The last fit, each group held against its leader once nothing else is missing."""
+        if excess_of(current) > LARGEST_EXCESS_LEFT:
+            return current
         won = [k for k, one in enumerate(self.rounds) if one.decision.winner is not None]
         told = [self.rounds[k].decision for k in won]
-        if excess_of(current) <= LARGEST_EXCESS_LEFT:
-            told, current = asked_again(told, current, self.noise_scales)
+        told, current = asked_again(told, current, self.noise_scales)
         for k, one in zip(won, told, strict=True):
             self.rounds[k] = replace(self.rounds[k], decision=one)
         return current
@@ -212,8 +214,7 @@ class Search:
             self.progress(label, fraction)
 
     def _round(self, current: Refit, index: int) -> Round:
-        share = 1.0 / MOST_ROUNDS
-        self._tell(f"round {index + 1}: screening", index * share)
+        self._tell(f"round {index + 1}: screening", index / MOST_ROUNDS)
         left = self._left(current)
         if not left:
             return Round(current, Decision(()))
@@ -231,25 +232,24 @@ class Search:
                 break
         if decision.winner is None:
             return Round(current, decision, stand_in=would_explain(decision, tried))
-        return self._ended(current, decision, index, outdone(decision, tried))
+        return self._ended(current, decision, decision.winner, index, outdone(decision, tried))
 
-    def _ended(self, current: Refit, decision: Decision, index: int, stand_in: str) -> Round:
+    def _ended(
+        self, current: Refit, decision: Decision, winner: Refit, index: int, stand_in: str
+    ) -> Round:
         """A round whose winner is fitted to its end, without what it makes superfluous."""
-        if decision.winner is None:
-            return Round(current, decision, stand_in=stand_in)
-        share = 1.0 / MOST_ROUNDS
         # Ranking stopped early: the winner goes on to convergence.
-        found, removed = polished(decision.winner.fit, self.noise_scales), []
+        found, removed = polished(winner.fit, self.noise_scales), []
         found = self._freed(fully_by_now(found, self.noise_scales) if index else found)
         while name := superfluous(found, decision.group):
-            self._tell(f"round {index + 1}: without {name}", (index + 0.9) * share)
+            self._tell(f"round {index + 1}: without {name}", (index + 0.9) / MOST_ROUNDS)
             fewer = without(found.fit, name, self.noise_scales)
             if not is_no_worse(fewer, found, name, self.noise_scales):
                 break
             found = fewer
             removed.append(name)
-        if decision.winner.slowly:
-            found = replace(found, slowly=decision.winner.slowly)
+        if winner.slowly:
+            found = replace(found, slowly=winner.slowly)
         return Round(current, replace(decision, winner=found), tuple(removed), stand_in=stand_in)
 
     def _instead(self, done: Round, index: int) -> list[Round]:
@@ -340,7 +340,7 @@ class Search:
             name: (current, name, seen[name].start_of(name), self.noise_scales, colour)
             for name in names
         }
-        share, found = 1.0 / MOST_ROUNDS, dict[str, Refit]()
+        found: dict[str, Refit] = {}
         if not jobs:
             return found
         # Stretch takes longest: begun last, it would keep one process busy alone.
@@ -353,7 +353,7 @@ class Search:
             for name in longest_first
         }
         for k, name in enumerate(names):
-            self._tell(f"round {index + 1}: {name}", (index + k / len(jobs)) * share)
+            self._tell(f"round {index + 1}: {name}", (index + k / len(jobs)) / MOST_ROUNDS)
             result = calls[name]()
             found |= {} if result is None else {name: result}
         return found

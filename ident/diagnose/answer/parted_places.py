@@ -11,6 +11,7 @@ from dataclasses import replace
 
 from freeswing.cdpr.robot import Array
 from freeswing.ident.diagnose.answer.deviations import chance_of_nothing
+from freeswing.ident.diagnose.answer.taken_back import unseen
 from freeswing.ident.diagnose.backward_removal import is_no_worse
 from freeswing.ident.diagnose.decision import ACCEPTED, Candidate, Decision
 from freeswing.ident.diagnose.refit import Refit, without
@@ -53,13 +54,8 @@ def shown(accepted: Sequence[Round], final: LikelihoodFit, spread: Array) -> lis
         final: the last fit as it is told.
         spread: covariance of its shared unknowns as it is told, (p, p).
     """
-    nothing = [
-        one.by_lengths
-        and len(one.decision.group) == 1
-        and effect_of(one.decision.key) in final.model.effects
-        and chance_of_nothing(final, spread, effect_of(one.decision.key)) >= 1.0 - ACCEPTED
-        for one in accepted
-    ]
+    names = [name for name, _ in unseen(accepted, final, spread)]
+    nothing = [one.by_lengths and effect_of(one.decision.key) in names for one in accepted]
     if all(nothing):
         return list(accepted)
     return [

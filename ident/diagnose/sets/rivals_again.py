@@ -7,6 +7,7 @@ cables. Once nothing else is missing each can be held against the one that stand
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 from freeswing.cdpr.robot import Array
@@ -48,10 +49,8 @@ def _held_against(
         if name in known or name in last.effects:
             continue
         values = {name: fit.fit.values[fit.values_of(name)]}
-        try:
+        with suppress(ValueError):  # stays a rival
             tried[key] = exchanged(last.fit, decision.key, (key,), values, noise_scales)
-        except ValueError:  # stays a rival
-            continue
     if len(tried) == 1:
         return decision, last
     fewer = without(last.fit, effect_of(decision.key), noise_scales)
@@ -59,7 +58,7 @@ def _held_against(
     if not again.key:
         return decision, last
     if again.key != decision.key:
-        decision = turned(replace(decision, ahead=(again.key, decision.others[again.key])))
+        decision = turned(decision, again.key, decision.others[again.key])
     runs = left_out(fewer, noise_scales)
     gains = {key: float(runs.gains(one.score).sum()) for key, one in tried.items()}
     chances = {one.effect: one.probability or 0.0 for one in again.candidates}

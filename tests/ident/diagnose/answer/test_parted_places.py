@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from freeswing.ident.diagnose.answer import parted_places as module
+from freeswing.ident.diagnose.answer import taken_back
 from freeswing.ident.diagnose.decision import Candidate, Decision
 from freeswing.ident.diagnose.search import Round
 
@@ -73,7 +74,7 @@ def test_a_place_that_is_in_the_model_no_more_is_not_asked(monkeypatch) -> None:
 @pytest.mark.parametrize(("chance", "said"), [(0.04, 2), (0.06, 1)])
 def test_geometry_that_is_nothing_as_it_is_told_is_not_named(monkeypatch, chance, said) -> None:
     """Axes of (-0.006 0.010 ..) +- 0.08 rad beside orientations that come 20 ms late."""
-    monkeypatch.setattr(module, "chance_of_nothing", lambda final, spread, name: chances[name])
+    monkeypatch.setattr(taken_back, "chance_of_nothing", lambda final, spread, name: chances[name])
     chances = {"clock_offset": 0.0, "pulley_axis": chance, "tether": 0.5}
     rounds = [won(name) for name in ("clock_offset", "pulley_axis")]
     final: Any = SimpleNamespace(model=SimpleNamespace(effects=tuple(chances)))
